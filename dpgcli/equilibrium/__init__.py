@@ -1,0 +1,1 @@
+"""From an energy to certified minima; knows no finger."""

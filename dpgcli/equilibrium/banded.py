@@ -1,0 +1,62 @@
+"""Symmetric banded matrices, factorized in batches: A = L D Lᵀ, batch index innermost.
+
+Storage: `band[k, j]` holds A[j+k, j] for the whole batch, shape (bandwidth + 1, size, batch).
+`reach[j]` says how far down column j may be nonzero, fill-in included; less than the
+bandwidth where the matrix is sparser there. There is no pivoting: the signs of D are the
+signs of the eigenvalues (Sylvester's law of inertia), and a positive definite matrix
+needs none. One singular matrix spoils its own lane only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array
+
+
+@dataclass(frozen=True)
+class Factorization:
+    """L (strictly below the diagonal, as a band) and the pivots D, shape (size, batch)."""
+
+    lower: Array
+    pivots: Array
+    reach: tuple[int, ...]
+
+
+def factorize(band: Array, reach: tuple[int, ...]) -> Factorization:
+    """Factorize in place; `band` is used up.
+
+    >>> band = np.array([[[4.0], [3.0]], [[2.0], [0.0]]])  # [[4, 2], [2, 3]]
+    >>> factorize(band, (1, 0)).pivots.ravel()
+    array([4., 2.])
+    """
+    for column, depth in enumerate(reach):
+        if depth == 0:
+            continue
+        below = band[1 : depth + 1, column].copy()
+        factors = np.divide(below, band[0, column], out=band[1 : depth + 1, column])
+        for k in range(depth):
+            band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
+    return Factorization(band[1:], band[0], reach)
+
+
+def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
+    """Overwrite b with y = L⁻¹ b; shape (size, batch) or (size, number, batch)."""
+    y = right_hand_sides
+    lower = factorization.lower
+    for column, depth in enumerate(factorization.reach):
+        if depth:
+            factors = lower[:depth, column]
+            if y.ndim == 3:
+                factors = factors[:, None]
+            y[column + 1 : column + 1 + depth] -= factors * y[column]
+    return y
+
+
+def backward(factorization: Factorization, y: Array) -> Array:
+    """Overwrite y with x = L⁻ᵀ y, shape (size, batch)."""
+    lower = factorization.lower
+    for column in range(len(factorization.reach) - 1, -1, -1):
+        for k in range(factorization.reach[column]):
+            y[column] -= lower[k, column] * y[column + 1 + k]
+    return y

@@ -1,0 +1,41 @@
+"""Every error raised on purpose."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in a spec, with all that is needed to mend it."""
+
+    file: str
+    line: int | None
+    column: int | None
+    key: str
+    expected: str
+    found: str
+    hint: str = ""
+
+    def __str__(self) -> str:
+        place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
+        hint = f" ({self.hint})" if self.hint else ""
+        return f"{place}: {self.key}: expected {self.expected}, found {self.found}{hint}"
+
+
+class SpecError(Exception):
+    """A spec, or an option that changes it, is wrong; carries every problem found."""
+
+    def __init__(self, problems: tuple[Problem, ...]) -> None:
+        super().__init__("\n".join(map(str, problems)))
+        self.problems = problems
+
+
+class UsageError(Exception):
+    """What was asked for makes no sense for this scene; the message says what to do."""
+
+
+class NothingSelectedError(Exception):
+    """A selection matches no state."""
+
+
+class OutputError(Exception):
+    """A file cannot be written; nothing half-written is left behind."""

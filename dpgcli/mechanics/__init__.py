@@ -1,0 +1,1 @@
+"""What the energy is: spring laws, the finger, and its two formulations. NumPy only."""

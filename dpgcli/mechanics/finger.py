@@ -1,0 +1,95 @@
+"""The finger as the model sees it: lattice dimensions and spring constants."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from dpgcli.arrays import Array, Indices
+
+@dataclass(frozen=True)
+class Finger:
+    """A batch of fingers with the same number of units.
+
+    Each array has shape (unit, design); an axis of length 1 means "the same for all",
+    so that a uniform finger carries, and computes with, one value instead of n.
+
+    - `segment_length` L and `segment_height` H: mm; H is shared by all struts of a finger
+    - `stroke` d: mm, the opening of the inverted dome
+    - `bistable_stiffness` k_b: N/mm; `force_linearity` α: 1
+    - `hinge_stiffness` k_θ: N mm/rad, of one hinge (two corners in series)
+    - `linear_stiffness` k_L: N/mm of every bar, infinite where bars are rigid
+    """
+
+    n_units: int
+    segment_length: Array
+    segment_height: Array
+    stroke: Array
+    bistable_stiffness: Array
+    force_linearity: Array
+    hinge_stiffness: Array
+    linear_stiffness: Array
+
+    def __post_init__(self) -> None:
+        for name, values in self.arrays().items():
+            if values.ndim != 2 or values.shape[0] not in (1, self.n_units):
+                raise ValueError(f"{name} has shape {values.shape}, not (1 or n_units, designs)")
+        if self.segment_height.shape[0] != 1 or self.linear_stiffness.shape[0] != 1:
+            raise ValueError("segment_height and linear_stiffness are shared by all units")
+        rigid = np.isinf(self.linear_stiffness)
+        if rigid.any() and not rigid.all():
+            raise ValueError("rigid and flexible bars cannot share a batch")
+
+    def arrays(self) -> dict[str, Array]:
+        """Every array by name, in the order of the fields."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "n_units"}
+
+    @property
+    def n_designs(self) -> int:
+        return int(np.broadcast_shapes(*(v.shape for v in self.arrays().values()))[1])
+
+    @property
+    def is_rigid(self) -> bool:
+        return bool(np.isinf(self.linear_stiffness).all())
+
+    @property
+    def is_uniform(self) -> bool:
+        return all(values.shape[0] == 1 for values in self.arrays().values())
+
+    @property
+    def force_scale(self) -> Array:
+        """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design)."""
+        hinge = self.hinge_stiffness / self.segment_height**2
+        return (self.bistable_stiffness + hinge) * self.stroke
+
+    def designs(self, index: Indices) -> "Finger":
+        """The designs at `index`, in its order; a design may repeat."""
+        picked = {k: v if v.shape[1] == 1 else v[:, index] for k, v in self.arrays().items()}
+        return Finger(self.n_units, **picked)
+
+    def units(self, first: int, stop: int) -> "Finger":
+        """The finger cut down to units first+1 … stop, counted from the base."""
+        cut = {k: v if v.shape[0] == 1 else v[first:stop] for k, v in self.arrays().items()}
+        return Finger(stop - first, **cut)
+
+
+def uniform_finger(
+    n_units: int,
+    *,
+    segment_length: float,
+    segment_height: float,
+    stroke: float,
+    bistable_stiffness: float,
+    force_linearity: float,
+    hinge_stiffness: float,
+    linear_stiffness: float = np.inf,
+) -> Finger:
+    """One finger of n equal units; mm, N/mm, N mm/rad.
+
+    >>> finger = uniform_finger(
+    ...     3, segment_length=13.5, segment_height=10.75, stroke=3.5,
+    ...     bistable_stiffness=12.84, force_linearity=0.043, hinge_stiffness=24.2)
+    >>> finger.is_rigid, finger.is_uniform, finger.n_designs
+    (True, True, 1)
+    """
+    values = {name: value for name, value in locals().items() if name != "n_units"}
+    return Finger(n_units, **{name: np.array([[float(v)]]) for name, v in values.items()})

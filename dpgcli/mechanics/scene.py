@@ -1,0 +1,45 @@
+"""What a spec describes, in the model's terms: a finger, perhaps twice, and where its numbers come from."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from dpgcli.mechanics.finger import Finger
+
+
+class Origin(StrEnum):
+    """How a lattice value came about."""
+
+    GIVEN = "given"
+    DERIVED = "derived"
+    CALIBRATED = "calibrated"
+    SCALED = "scaled"
+    EXTRAPOLATED = "extrapolated"
+
+
+@dataclass(frozen=True)
+class Source:
+    """One lattice value of some units: `units` as in the spec ("1-5", "4"), value in the key's unit."""
+
+    key: str
+    units: str
+    value: float
+    origin: Origin
+    rule: str
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Two mirrored fingers: distance of their base stations B_0 (mm), outward tilt of each (rad)."""
+
+    base_spacing: float
+    mounting_angle: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A finger, its gripper if it has one, and the thickness (mm) of its limiting layer if known."""
+
+    finger: Finger
+    sources: tuple[Source, ...]
+    gripper: Gripper | None = None
+    layer_thickness: float | None = None

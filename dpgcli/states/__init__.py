@@ -1,0 +1,1 @@
+"""Activation patterns and the certified stable states behind them."""

@@ -1,0 +1,227 @@
+"""All 2^n states of a long finger from two tables of half-fingers.
+
+Cells feel each other only through the strut they share, and that less by a factor of about
+k_b/k_L per cell. So each half is solved once for all its own patterns and those of the few
+nearest units of the other half (its context), and a state of the whole is a pair of table
+rows: poses compose as planar rigid motions, energies add. What the pair lacks to equilibrium
+is known exactly at the shared strut, and every state is certified by it (our derivation):
+
+- residual: of the halves, of the strut, and what the halves' disagreement Δs about the
+  strut's extension puts on the outer half's first cell, to first order in Δs
+- curvature: the Hessian is positive definite if both halves are with the strut held, and
+  the sum of their stiffnesses at the strut (Schur complements) is positive
+- wells: those of the halves
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Flags, total
+from dpgcli.equilibrium.banded import backward, factorize, forward
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.patterns import chunks, inverted_units
+from dpgcli.states.solve import (
+    Batch,
+    Units,
+    certify,
+    lanes_at_once,
+    reach,
+    solve,
+    tip,
+)
+
+@dataclass(frozen=True)
+class Joint:
+    """How a half holds the shared strut, arrays of shape (entry,), mm and N.
+
+    `extension` s of the strut in the half's own solution, `pull` the half's force on it
+    (∂E/∂s), `stiffness` the derivative of that force and `shift` the motion of the finger's
+    tip (mm per mm), both with the half following.
+    """
+
+    extension: Array
+    pull: Array
+    stiffness: Array
+    shift: Array
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a unit change of s does to an outer half that does not follow, (entry,), N/mm.
+
+    `pull` on the strut, `force` the largest on the half's first cell, and `relative_force`
+    the largest over the forces in play, 1/mm.
+    """
+
+    pull: Array
+    force: Array
+    relative_force: Array
+
+
+@dataclass(frozen=True)
+class Half:
+    """A table of half-fingers: all states of some units, each in every context.
+
+    Entries count through the patterns of all units solved, context included. `pose` is that
+    of the half's last station seen from its first. Rigid bars share nothing: no joint.
+    """
+
+    status: NDArray[np.uint8]
+    reached: Flags
+    pose: Array
+    energies: dict[str, Array]
+    residual: Array
+    relative_residual: Array
+    tip_error: Array
+    joint: Joint | None = None
+    held: Held | None = None
+
+
+@dataclass(frozen=True)
+class Split:
+    """A finger cut after `n_inner` units; each half is solved with `context` units of the other."""
+
+    units: Units
+    n_inner: int
+    context: int
+    tolerance: float
+
+    @property
+    def n_units(self) -> int:
+        return self.units.finger.n_units
+
+    @property
+    def n_outer(self) -> int:
+        return self.n_units - self.n_inner
+
+    @property
+    def n_solves(self) -> int:
+        """Half-fingers solved for both tables."""
+        return 2 ** (self.n_inner + self.context) + 2 ** (self.n_outer + self.context)
+
+    def inner(self) -> Half:
+        """Units 1 … n_inner, with context beyond them."""
+        own = slice(0, self.n_inner)
+        return _joined([self._inner(b, s) for b, s in self._solved(0, self.n_inner + self.context, own)])
+
+    def outer(self) -> Half:
+        """Units n_inner + 1 … n, with context before them."""
+        own = slice(self.context, None)
+        return _joined([self._outer(b, s) for b, s in self._solved(self.n_inner - self.context, self.n_units, own)])
+
+    def _solved(
+        self, first: int, stop: int, own: slice
+    ) -> Iterator[tuple[Batch, NDArray[np.uint8]]]:
+        units = Units.of(self.units.finger.units(first, stop))
+        for codes in chunks(2 ** (stop - first), lanes_at_once(stop - first)):
+            batch = solve(units, Chain, inverted_units(codes, stop - first), self.tolerance)
+            yield batch, certify(batch, units.wells, self.tolerance, own)
+
+    def _cut(self, first: int, stop: int) -> Chain:
+        return Chain(self.units.finger.units(first, stop))
+
+    def _inner(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
+        chain = self._cut(0, self.n_inner)
+        own = batch.equilibrium.coordinates[: len(chain.reach)]
+        at_own = evaluate(chain, own)
+        pose, jacobian = chain.tip(own)
+        whole, outer = (reach(f)[0] for f in (self.units.finger, self._cut(self.n_inner, self.n_units).finger))
+        joint = None
+        if not chain.finger.is_rigid:
+            factorization = factorize(at_own.hessian, chain.reach)
+            following = np.zeros_like(own)
+            following[-1] = 1.0
+            backward(factorization, following)
+            moved = total(jacobian * following[:, None])
+            joint = Joint(
+                own[-1],
+                at_own.gradient[-1],
+                factorization.pivots[-1],
+                np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * outer,
+            )
+        solved = reach(batch.formulation.finger)[0]
+        return self._half(batch, status, slice(0, self.n_inner), pose, at_own.energies, whole / solved, joint)
+
+    def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
+        chain = self._cut(self.n_inner, self.n_units)
+        coordinates = batch.equilibrium.coordinates
+        own = coordinates[-len(chain.reach) :]
+        pose, jacobian = chain.tip(own)
+        energies, joint, held = batch.equilibrium.energies, None, None
+        if not chain.finger.is_rigid:
+            before = self._cut(self.n_inner - self.context, self.n_inner)
+            strut = len(before.reach) - 1
+            at_before = evaluate(before, coordinates[: strut + 1])
+            energies = {k: e - at_before.energies[k] for k, e in energies.items()}
+            hold = evaluate(batch.formulation, coordinates).hessian[:, strut]
+            hold[0] -= at_before.hessian[0, strut]
+            pull = batch.equilibrium.gradient[strut] - at_before.gradient[strut]
+            answer = np.zeros_like(coordinates)
+            answer[strut] = 1.0
+            forward(batch.equilibrium.factorization, answer)
+            answer /= batch.equilibrium.factorization.pivots
+            backward(batch.equilibrium.factorization, answer)
+            stiffness = 1.0 / answer[strut] - factorize(at_before.hessian, before.reach).pivots[strut]
+            moved = total(jacobian * (answer[strut + 1 :] / answer[strut])[:, None])
+            joint = Joint(coordinates[strut], pull, stiffness, np.hypot(moved[0], moved[1]))
+            near = slice(strut + 1, strut + len(hold))
+            held = Held(
+                hold[0],
+                _largest(hold[1:], batch.formulation.force_unit[near]),
+                _largest(hold[1:], batch.formulation.gradient_scale[near]),
+            )
+        return self._half(batch, status, slice(self.context, None), pose, energies, 1.0, joint, held)
+
+    def _half(
+        self,
+        batch: Batch,
+        status: NDArray[np.uint8],
+        own: slice,
+        pose: Array,
+        energies: dict[str, Array],
+        lever: float,
+        joint: Joint | None,
+        held: Held | None = None,
+    ) -> Half:
+        return Half(
+            status,
+            batch.reached[own],
+            pose,
+            energies,
+            batch.equilibrium.residual,
+            batch.equilibrium.relative_residual,
+            lever * tip(batch, with_compliance=False).error,
+            joint,
+            held,
+        )
+
+
+def _largest(forces: Array, scale: Array) -> Array:
+    return np.asarray(np.max(np.abs(forces) / scale, axis=0))
+
+
+def _joined(parts: list[Half]) -> Half:
+    """One table from consecutive chunks of it."""
+    return _concatenated(parts)
+
+
+T = TypeVar("T")
+
+
+def _concatenated(parts: list[T]) -> T:
+    """Concatenate, field by field, arrays and what holds arrays."""
+    first = parts[0]
+    if first is None:
+        return first
+    if isinstance(first, np.ndarray):
+        return np.concatenate(parts, axis=-1)
+    if isinstance(first, dict):
+        return {k: _concatenated([p[k] for p in parts]) for k in first}
+    return type(first)(*(_concatenated([getattr(p, f.name) for p in parts]) for f in fields(first)))

@@ -1,0 +1,130 @@
+"""States of a whole finger as pairs of half-fingers (see `halves`), streamed in blocks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.chain import Chain
+from dpgcli.states.halves import Half, Split
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.solve import MARGINAL_CURVATURE, States, Status
+
+STATES_AT_ONCE = 2**16
+Values = TypeVar("Values", bound=np.generic)
+
+
+def paired_states(split: Split) -> Iterator[States]:
+    """All states in the order of their codes; a pair that does not fit is `NOT_CONVERGED`."""
+    inner, outer = split.inner(), split.outer()
+    rows = max(1, STATES_AT_ONCE >> split.n_outer)
+    for first in range(0, 2**split.n_inner, rows):
+        patterns = np.arange(first, min(first + rows, 2**split.n_inner))
+        yield _pair(split, inner, outer, _Block(patterns, split.n_outer, split.context))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Some inner patterns, each with all outer patterns.
+
+    Arrays get the axes (inner pattern, nearest outer units, other outer units): an inner
+    entry depends on the first two, an outer entry on the last two and the inner pattern's
+    own nearest units.
+    """
+
+    patterns: np.ndarray[tuple[int], np.dtype[np.int64]]
+    n_outer: int
+    context: int
+
+    def inner(self, table: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+        near = 2**self.context
+        entries = table.reshape(*table.shape[:-1], -1, near, 1)
+        return entries[..., self.patterns, :, :]
+
+    def outer(self, table: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+        near = 2**self.context
+        entries = table.reshape(*table.shape[:-1], near, near, -1)
+        return entries[..., self.patterns % near, :, :]
+
+    def flat(self, values: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+        near = 2**self.context
+        shape = (len(self.patterns), near, 2**self.n_outer // near)
+        lead = values.shape[:-3]
+        return np.broadcast_to(values, (*lead, *shape)).reshape(*lead, -1)
+
+
+class _Fit(NamedTuple):
+    """How well two halves agree at the shared strut."""
+
+    residual: Array
+    relative_residual: Array
+    tip_error: Array
+    is_convex: Flags
+
+
+def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
+    x, y, turn = block.inner(inner.pose)
+    cos, sin = np.cos(turn), np.sin(turn)
+    along, across, beyond = block.outer(outer.pose)
+    pose = np.stack(
+        [
+            block.flat(x + cos * along - sin * across),
+            block.flat(y + sin * along + cos * across),
+            block.flat(turn + beyond),
+        ]
+    )
+    fit = _fit(split, inner, outer, block)
+    status = np.maximum(block.inner(inner.status), block.outer(outer.status))
+    status = np.where(fit.is_convex, status, np.maximum(status, Status.MARGINAL))
+    fits = fit.relative_residual <= split.tolerance
+    status = np.where(fits, status, np.uint8(Status.NOT_CONVERGED))
+    codes = (block.patterns[:, None] << split.n_outer) + np.arange(2**split.n_outer)
+    reached = (block.flat(block.inner(inner.reached)), block.flat(block.outer(outer.reached)))
+    return States(
+        inverted=inverted_units(codes.ravel().astype(np.uint64), split.n_units),
+        reached=np.concatenate(reached),
+        status=block.flat(status),
+        pose=pose,
+        tip_error=block.flat(fit.tip_error),
+        energies={
+            kind: block.flat(block.inner(part) + block.outer(outer.energies[kind]))
+            for kind, part in inner.energies.items()
+        },
+        residual=block.flat(fit.residual),
+    )
+
+
+def _fit(split: Split, inner: Half, outer: Half, block: _Block) -> _Fit:
+    """Residual and Newton's next step of the pair, to first order in the disagreement Δs.
+
+    The pair takes the inner half's extension of the strut and holds the outer half.
+    """
+    residual = np.maximum(block.inner(inner.residual), block.outer(outer.residual))
+    relative = np.maximum(
+        block.inner(inner.relative_residual), block.outer(outer.relative_residual)
+    )
+    error = block.inner(inner.tip_error) + block.outer(outer.tip_error)
+    if inner.joint is None or outer.joint is None or outer.held is None:
+        return _Fit(residual, relative, error, np.ones((1, 1, 1), bool))
+    apart = block.inner(inner.joint.extension) - block.outer(outer.joint.extension)
+    pull = block.inner(inner.joint.pull) + block.outer(outer.joint.pull)
+    at_strut = np.abs(pull + block.outer(outer.held.pull) * apart)
+    inner_stiffness, outer_stiffness = (
+        block.inner(inner.joint.stiffness),
+        block.outer(outer.joint.stiffness),
+    )
+    stiffness = inner_stiffness + outer_stiffness
+    step = -(pull + outer_stiffness * apart) / stiffness
+    gap = np.abs(apart)
+    strut = 4 * split.n_inner - 1
+    scale = float(Chain(split.units.finger).gradient_scale[strut, 0])
+    return _Fit(
+        np.maximum(residual + block.outer(outer.held.force) * gap, at_strut),
+        np.maximum(relative + block.outer(outer.held.relative_force) * gap, at_strut / scale),
+        error
+        + block.inner(inner.joint.shift) * np.abs(step)
+        + block.outer(outer.joint.shift) * np.abs(apart + step),
+        stiffness > MARGINAL_CURVATURE * np.abs(inner_stiffness),
+    )

@@ -1,0 +1,134 @@
+"""Carry out a plan: every state asked for, certified, as blocks of columns."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from time import perf_counter, process_time
+
+import numpy as np
+
+from dpgcli.arrays import Codes, keep_freed_memory
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.columns import Group
+from dpgcli.states.pairs import paired_states
+from dpgcli.states.patterns import chunks, codes_of, inverted_units
+from dpgcli.states.plan import Plan, Request, explain
+from dpgcli.states.rows import Columns, as_text, batch_columns, state_columns
+from dpgcli.states.solve import States, Status, certify, lanes_at_once, solve, tip
+
+
+@dataclass
+class Summary:
+    """What a prediction came to, so far; errors and residuals are the largest of stable states.
+
+    Residual in N, tip error in mm, times in seconds spent on the states alone.
+    """
+
+    n_finger_solves: int = 0
+    statuses: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
+    residual: float = 0.0
+    tip_error: float = 0.0
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+    @property
+    def n_states(self) -> int:
+        return sum(self.statuses.values())
+
+    def add(self, block: Columns) -> None:
+        """Count a block's rows in."""
+        for status, count in enumerate(np.bincount(block["status"], minlength=len(Status))):
+            self.statuses[Status(status)] += int(count)
+        stable = block["status"] == Status.STABLE
+        if stable.any():
+            self.residual = max(self.residual, float(block["residual_N"][stable].max()))
+            self.tip_error = max(self.tip_error, float(block["tip_error_mm"][stable].max()))
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A plan, and the rows it gives block by block."""
+
+    plan: Plan
+    summary: Summary
+
+    def blocks(self) -> Iterator[Columns]:
+        """Columns by name, a block of states at a time; counts in `summary` as it goes."""
+        keep_freed_memory()
+        names = [column.name for column in self.plan.columns]
+        rows = _blocks(self.plan, self.summary)
+        while True:
+            wall, cpu = perf_counter(), process_time()
+            block = next(rows, None)
+            self.summary.seconds += perf_counter() - wall
+            self.summary.cpu_seconds += process_time() - cpu
+            if block is None:
+                return
+            self.summary.add(block)
+            yield {name: block[name] for name in names}
+
+    def arrays(self) -> Columns:
+        """All rows at once, patterns and statuses as text, as `pandas.DataFrame` takes them."""
+        blocks = list(self.blocks())
+        columns = {c: np.concatenate([b[c.name] for b in blocks]) for c in self.plan.columns}
+        return {column.name: as_text(column, values) for column, values in columns.items()}
+
+
+def predict(scene: Scene, request: Request | None = None) -> Prediction:
+    """Plan the stable states of a scene; iterating over the result's blocks solves them.
+
+    Raises UsageError and NothingSelectedError. What happens to a state is its row's status.
+
+    >>> from dpgcli.mechanics.finger import uniform_finger
+    >>> finger = uniform_finger(
+    ...     3, segment_length=13.5, segment_height=10.75, stroke=3.5,
+    ...     bistable_stiffness=12.84, force_linearity=0.043, hinge_stiffness=24.2,
+    ...     linear_stiffness=1e4)
+    >>> rows = predict(Scene(finger, sources=())).arrays()
+    >>> rows["pattern"][5], rows["status"][5], rows["tip_x_mm"][5].round(8)
+    (np.str_('101'), np.str_('stable'), np.float64(38.35981703))
+    """
+    return Prediction(explain(scene, request), Summary())
+
+
+def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
+    if plan.split is None:
+        for codes in _batches(plan):
+            yield _solved(plan, codes, summary)
+        return
+    summary.n_finger_solves += plan.split.n_solves
+    for states in paired_states(plan.split):
+        columns = state_columns(states)
+        unfit = np.flatnonzero(states.status == Status.NOT_CONVERGED)
+        if len(unfit):  # a pair that did not fit is solved as a whole
+            solved = _solved(plan, codes_of(states.inverted[:, unfit]), summary)
+            for name, values in columns.items():
+                values[unfit] = solved[name]
+        yield columns
+
+
+def _batches(plan: Plan) -> Iterator[Codes]:
+    size = lanes_at_once(plan.n_units)
+    if plan.codes is None:
+        yield from chunks(plan.n_states, size)
+        return
+    for first in range(0, plan.n_states, size):
+        yield plan.codes[first : first + size]
+
+
+def _solved(plan: Plan, codes: Codes, summary: Summary) -> Columns:
+    """Rows of the states with these codes, each solved as a whole finger."""
+    inverted = inverted_units(codes, plan.n_units)
+    batch = solve(plan.units, plan.formulate, inverted, plan.request.tolerance)
+    summary.n_finger_solves += len(codes)
+    status = certify(batch, plan.units.wells, plan.request.tolerance)
+    at_tip = tip(batch, with_compliance=Group.STIFFNESS in plan.groups)
+    states = States(
+        inverted,
+        batch.reached,
+        status,
+        at_tip.pose,
+        at_tip.error,
+        batch.equilibrium.energies,
+        batch.equilibrium.residual,
+    )
+    return state_columns(states) | batch_columns(plan.scene, plan.groups, batch, at_tip, status)

@@ -1,0 +1,131 @@
+"""From certified states to the columns of a table, named as in `columns`."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.formulation import Stations
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.gripper import grip
+from dpgcli.states.patterns import texts
+from dpgcli.states.solve import Batch, States, Status, Tip, min_eigenvalues
+
+Columns = dict[str, NDArray]  # type: ignore[type-arg]
+
+
+def as_text(column: Column, values: NDArray) -> NDArray:  # type: ignore[type-arg]
+    """Patterns and statuses as strings; all else unchanged."""
+    if column.kind is Kind.PATTERN:
+        return values.astype(str)
+    if column.kind is Kind.STATUS:
+        return np.array([status.text for status in Status])[values]
+    return values
+
+
+def _is_state(status: NDArray[np.uint8]) -> Flags:
+    """Where there is an equilibrium of the row's own pattern to speak of."""
+    return np.asarray((status == Status.STABLE) | (status == Status.MARGINAL))
+
+
+def state_columns(states: States) -> Columns:
+    """What every method knows; numbers of a pattern that has no state are NaN."""
+    is_state = _is_state(states.status)
+    energies = states.energies
+    numbers = {
+        "tip_x_mm": states.pose[0],
+        "tip_y_mm": states.pose[1],
+        "tip_angle_rad": states.pose[2],
+        "energy_mJ": sum(energies.values()),
+        "tip_error_mm": states.tip_error,
+        **{f"{kind}_energy_mJ": part for kind, part in energies.items()},
+    }
+    return {
+        "pattern": texts(states.inverted),
+        "status": states.status,
+        **{name: np.where(is_state, values, np.nan) for name, values in numbers.items()},
+        "residual_N": states.residual,
+        "reached_pattern": texts(states.reached),
+    }
+
+
+def batch_columns(
+    scene: Scene, groups: frozenset[Group], batch: Batch, at_tip: Tip, status: NDArray[np.uint8]
+) -> Columns:
+    """What only a solve of the whole finger knows, for the groups that are wanted."""
+    columns: Columns = {}
+    if Group.EIGENVALUE in groups:
+        columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(batch)
+    if at_tip.compliance is not None:
+        columns |= _stiffness_columns(at_tip.compliance)
+    coordinates = batch.equilibrium.coordinates
+    if Group.OPENINGS in groups:
+        openings = batch.formulation.openings(coordinates)
+        columns |= {f"opening_{i}_mm": x for i, x in enumerate(openings, start=1)}
+    if Group.GRIPPER in groups or Group.NODES in groups:
+        columns |= _shape_columns(scene, batch.formulation.stations(coordinates))
+    is_state = _is_state(status)
+    return {
+        name: values & is_state if values.dtype == bool else np.where(is_state, values, np.nan)
+        for name, values in columns.items()
+    }
+
+
+def _stiffness_columns(compliance: Array) -> Columns:
+    """Compliances as they are; stiffnesses are 1/eigenvalues of the 2×2 of the position."""
+    xx, xy, yy, xa, ya, aa = compliance
+    mean, split = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    softest = mean + split
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # the small eigenvalue as determinant over the large one: mean − split cancels
+        stiffest = softest / np.maximum(xx * yy - xy * xy, 0.0)
+        return {
+            "tip_stiffness_min_N_per_mm": 1.0 / softest,
+            "tip_stiffness_max_N_per_mm": stiffest,
+            "tip_compliance_xx_mm_per_N": xx,
+            "tip_compliance_xy_mm_per_N": xy,
+            "tip_compliance_yy_mm_per_N": yy,
+            "tip_compliance_x_angle_rad_per_N": xa,
+            "tip_compliance_y_angle_rad_per_N": ya,
+            "tip_compliance_angle_rad_per_N_mm": aa,
+        }
+
+
+def _shape_columns(scene: Scene, stations: Stations) -> Columns:
+    """Node positions with the clamped ones, of the finger or of the gripper's two."""
+    nodes = _with_base(stations, float(scene.finger.segment_height[0, 0]))
+    gripper = scene.gripper
+    if gripper is None:
+        return _node_columns("", nodes, 1.0)
+    gripped = grip(gripper, scene.layer_thickness or 0.0, nodes)
+    upper = gripped.upper
+    return {
+        "aperture_mm": gripped.aperture,
+        "fingers_overlap": gripped.overlaps,
+        "upper_tip_x_mm": upper.base_x[-1],
+        "upper_tip_y_mm": upper.base_y[-1],
+        "lower_tip_x_mm": upper.base_x[-1],
+        "lower_tip_y_mm": -upper.base_y[-1],
+        **_node_columns("upper_", upper, 1.0),
+        **_node_columns("lower_", upper, -1.0),
+    }
+
+
+def _with_base(stations: Stations, height: float) -> Stations:
+    clamped = (0.0, 0.0, 0.0, height)
+    return Stations(
+        *(
+            np.concatenate((np.full_like(rows[:1], value), rows))
+            for rows, value in zip(stations, clamped, strict=True)
+        )
+    )
+
+
+def _node_columns(prefix: str, nodes: Stations, mirror: float) -> Columns:
+    columns: Columns = {}
+    for i in range(len(nodes.base_x)):
+        columns[f"{prefix}B{i}_x_mm"] = nodes.base_x[i]
+        columns[f"{prefix}B{i}_y_mm"] = mirror * nodes.base_y[i]
+        columns[f"{prefix}T{i}_x_mm"] = nodes.top_x[i]
+        columns[f"{prefix}T{i}_y_mm"] = mirror * nodes.top_y[i]
+    return columns

@@ -1,0 +1,187 @@
+"""A single unit with rigid bars: where it rests, where it turns over, and what bars would add.
+
+By symmetry both corners open by m = φ/2, so x = 2H sin m, and a zero of the force other than
+x = 0 is a root of r(u) = 1 + β(2u² − 3u) + κ φ/sin φ with u = x/d, κ = k_θ/(k_b H²). r is convex
+(a quadratic plus a convex increasing function of a convex one), so there are at most two roots,
+barrier and well, and Newton's method from outside reaches each monotonically. r(0) = α + β + κ
+is positive. Our derivation; without the hinge the roots are u = [3β ± √(9β² − 8β)]/(4β).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics import laws
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.formulation import Internal
+from dpgcli.mechanics.terms import evaluate
+
+MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
+
+
+@dataclass(frozen=True)
+class Wells:
+    """The inverted well of each unit, arrays of shape (unit or 1, design).
+
+    `exists` says whether there is one; `angle` is its corner angle m (rad), `extension` its
+    x (mm) and `barrier` the x at the top between the wells. Where there is none, `angle` is
+    that of the full stroke and `barrier` the middle, so that a search can still begin.
+    """
+
+    exists: Flags
+    extension: Array
+    barrier: Array
+    angle: Array
+
+
+def inverted_wells(finger: Finger) -> Wells:
+    """Find each unit's inverted well and barrier in the rigid limit.
+
+    >>> from dpgcli.mechanics.finger import uniform_finger
+    >>> unit = uniform_finger(
+    ...     1, segment_length=13.5, segment_height=10.75, stroke=3.5,
+    ...     bistable_stiffness=12.84, force_linearity=0.043, hinge_stiffness=24.2)
+    >>> print(inverted_wells(unit).extension.round(6))  # mm
+    [[3.245015]]
+    """
+    half_height = finger.stroke / (2.0 * finger.segment_height)
+    hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
+    half_height, hinge, linearity = np.broadcast_arrays(
+        half_height, hinge, finger.force_linearity
+    )
+    widest = np.minimum(1.5, (1.0 - 1e-9) / half_height)
+    well, from_above = _root(widest, half_height, hinge, linearity, descending=True)
+    barrier, from_below = _root(np.zeros_like(well), half_height, hinge, linearity, descending=False)
+    exists = from_above & from_below & (barrier < well)
+    stroke = np.broadcast_to(finger.stroke, exists.shape)
+    extension = np.where(exists, well, np.minimum(1.0, widest)) * stroke
+    return Wells(
+        exists,
+        extension,
+        np.where(exists, barrier, MIDDLE) * stroke,
+        np.arcsin(extension / (2.0 * finger.segment_height)),
+    )
+
+
+def _root(
+    start: Array, half_height: Array, hinge: Array, linearity: Array, *, descending: bool
+) -> tuple[Array, Flags]:
+    """Newton on r from outside its roots; false where the slope shows that there is none."""
+    relative = start.astype(float)
+    beta = 1.0 - linearity
+    exists = np.ones(start.shape, bool)
+    running = exists.copy()
+    for _ in range(80):
+        sin = relative * half_height
+        turn = 2.0 * np.arcsin(sin)
+        ratio, slope = _turn_over_sine(turn)
+        value = linearity + beta * (1.0 - relative) * (1.0 - 2.0 * relative) + hinge * ratio
+        slope = beta * (4.0 * relative - 3.0) + hinge * slope * 2.0 * half_height / np.cos(turn / 2)
+        outside = value > 0.0
+        exists &= ~running | ~outside | ((slope > 0.0) == descending) & (slope != 0.0)
+        running &= exists & outside
+        step = np.where(running, -value / np.where(slope == 0.0, 1.0, slope), 0.0)
+        running &= np.abs(step) > 2e-16 * np.abs(relative)
+        if not running.any():
+            break
+        relative = relative + np.where(running, step, 0.0)
+    return relative, exists
+
+
+def _turn_over_sine(turn: Array) -> tuple[Array, Array]:
+    """φ/sin φ and its derivative; a series where the quotient would cancel."""
+    small = np.abs(turn) < 1e-2
+    safe = np.where(small, 1.0, turn)
+    sine = np.sin(safe)
+    ratio = np.where(small, 1.0 + turn**2 / 6.0 + 7.0 * turn**4 / 360.0, safe / sine)
+    slope = (sine - safe * np.cos(safe)) / sine**2
+    return ratio, np.where(small, turn / 3.0 + 7.0 * turn**3 / 90.0, slope)
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
+
+    `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,
+    a strut's by one of its two units; `by_chord`, `by_near_strut`, `by_far_strut` the answer of
+    the near corner to those, rad/mm (of the far corner: near and far exchanged). Shapes as in
+    `Wells`; a ground unit carries no force and has all of them zero.
+    """
+
+    rigid_angle: Array
+    chord: Array
+    strut: Array
+    by_chord: Array
+    by_near_strut: Array
+    by_far_strut: Array
+
+
+def first_order(finger: Finger, wells: Wells) -> FirstOrder:
+    """Answer of each inverted unit to the flexibility of its bars (our derivation).
+
+    With A the Hessian by the two corners, C its columns by a bar and g the force on the bar,
+    a bar extends by −g/k_L and the corners follow by −A⁻¹C times that.
+    """
+    zero = np.zeros_like(wells.angle)
+    if finger.is_rigid:
+        return FirstOrder(wells.angle, zero, zero, zero, zero, zero)
+    units, designs = wells.angle.shape
+    flat = _as_single_units(finger, (units, designs))
+    angle = wells.angle.reshape(1, -1)
+    rest = np.zeros_like(angle)
+    chain = Chain(flat)
+    at_well = evaluate(chain, chain.coordinates(Internal(rest, angle, angle, rest)))
+    # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
+    band, gradient = at_well.hessian, at_well.gradient
+    corner, mixed = band[0, 1], band[1, 1]
+    determinant = corner * corner - mixed * mixed
+    chord_near, strut_near, strut_far = band[1, 0], band[2, 1], band[1, 2]
+    shape = (units, designs)
+    stiffness = np.broadcast_to(finger.linear_stiffness, shape)
+    return FirstOrder(
+        wells.angle,
+        -gradient[0].reshape(shape) / stiffness,
+        -gradient[3].reshape(shape) / stiffness,
+        -(chord_near / (corner + mixed)).reshape(shape),
+        # by mirror symmetry the near strut acts on the near corner as the far on the far
+        -((corner * strut_far - mixed * strut_near) / determinant).reshape(shape),
+        -((corner * strut_near - mixed * strut_far) / determinant).reshape(shape),
+    )
+
+
+def _as_single_units(finger: Finger, shape: tuple[int, int]) -> Finger:
+    """Every unit of every design as a design of its own."""
+    arrays = {k: np.broadcast_to(v, shape).reshape(1, -1) for k, v in finger.arrays().items()}
+    return Finger(1, **arrays)
+
+
+def geometric_guess(
+    finger: Finger, inverted: Flags, unit: FirstOrder
+) -> Internal:
+    """The shape of a pattern, (unit, batch), with each unit in its own well.
+
+    Bars extend, and corners follow, to first order; the error left is of order (k_b/k_L)².
+    """
+    on = inverted.astype(float)
+    if finger.is_rigid:
+        rest = np.zeros((1, 1))
+        angle = unit.rigid_angle * on
+        return Internal(rest, angle, angle, rest)
+    strut = unit.strut * on
+    strut[:-1] += (unit.strut * on)[1:]
+    near_strut = np.zeros_like(strut)
+    near_strut[1:] = strut[:-1]
+    common = unit.rigid_angle + unit.by_chord * unit.chord
+    near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut)
+    far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut)
+    return Internal(unit.chord * on, near, far, strut)
+
+
+def stroke_guess(finger: Finger, inverted: Flags, strokes: float) -> Internal:
+    """The shape with every inverted unit opened by `strokes` times its stroke."""
+    half = np.minimum(strokes * finger.stroke / (2.0 * finger.segment_height), 1.0)
+    rest = np.zeros((1, 1))
+    angle = np.arcsin(half) * inverted
+    return Internal(rest, angle, angle, rest)
