@@ -6,7 +6,7 @@ Wright, Numerical Optimization, 2nd ed., 2006, sections 3.1 and 3.4). Lanes do n
 other: a lane's result is the same, bit for bit, in any batch.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from dpgcli.mechanics.terms import Evaluation, Potential, evaluate
 
 SUFFICIENT_DECREASE = 1e-4
 SMALLEST_FRACTION = 2.0**-40  # of a step; below it a lane has stalled
+SETTLED = 1e-6  # of the step cap: Newton's next step is then at rounding
+LEFT_BEHIND = 0.25  # finished share of a batch from which on it is worth leaving
 ROUNDING = 64 * np.finfo(float).eps  # of the energies added up
 
 
@@ -44,66 +46,113 @@ def minimize(
 ) -> Equilibrium:
     """Walk from `guess`, shape (size, batch), until each lane's relative residual is small.
 
-    A lane that has not converged after `max_iterations` evaluations stays where it is;
-    whoever asked sees so from its `relative_residual`.
+    The last step must have been small as well: where stiff directions settle before soft
+    ones, the residual alone stops too early. A lane that has not converged after
+    `max_iterations` evaluations is returned where the walk was; its `relative_residual` tells.
     """
     n_lanes = guess.shape[1]
-    final, iterations = guess.copy(), np.zeros(n_lanes, np.int64)
+    final = np.ascontiguousarray(guess)
+    iterations = np.full(n_lanes, max_iterations)
     lanes = np.arange(n_lanes)
-    here, trial = guess, guess
-    energy = np.full(n_lanes, np.inf)
-    step, slope, fraction = np.zeros_like(guess), np.zeros(n_lanes), np.ones(n_lanes)
-    local = potential
+    walk = _Walk.at(potential, final)
+    final = final.copy()
     for count in range(max_iterations):
-        evaluation = evaluate(local, trial)
-        done = _relative_residual(local, evaluation.gradient) <= tolerance
-        done |= fraction < SMALLEST_FRACTION
-        if count == max_iterations - 1:
-            done[:] = True
-        iterations[lanes[done]] = count
-        if done.all():
-            final[:, lanes] = trial
-            if len(lanes) == n_lanes:
-                return _equilibrium(potential, final, evaluation, iterations)
+        evaluation = evaluate(walk.potential, walk.trial)
+        newly = walk.look(evaluation, tolerance)
+        iterations[lanes[newly]] = count
+        if walk.finished.all():
             break
-        if done.mean() > 0.25:  # leave finished lanes behind
-            final[:, lanes[done]] = trial[:, done]
-            keep = np.flatnonzero(~done)
-            lanes, done = lanes[keep], done[keep]
-            local = local.designs(keep)
-            evaluation = _lanes_of(evaluation, keep)
-            here, trial, step = here[:, keep], trial[:, keep], step[:, keep]
-            energy, slope, fraction = energy[keep], slope[keep], fraction[keep]
-        accepted = _falls(evaluation, energy, slope * fraction) | done
-        new_step, new_slope = _downhill(local, evaluation)
-        if accepted.all():
-            here, energy, step, slope = trial, evaluation.energy, new_step, new_slope
-            fraction = np.ones(len(lanes))
-        else:
-            here, step = np.where(accepted, trial, here), np.where(accepted, new_step, step)
-            energy = np.where(accepted, evaluation.energy, energy)
-            slope = np.where(accepted, new_slope, slope)
-            fraction = np.where(accepted, 1.0, 0.5 * fraction)
-        trial = here + np.where(done, 0.0, fraction) * step
+        if walk.finished.mean() > LEFT_BEHIND:
+            final[:, lanes] = walk.here
+            keep = np.flatnonzero(~walk.finished)
+            lanes = lanes[keep]
+            walk, evaluation = walk.only(keep), _only(evaluation, keep)
+        walk.step_from(evaluation)
+    if len(lanes) == n_lanes and walk.accepted.all():
+        return _equilibrium(potential, walk.here, evaluation, iterations)
+    final[:, lanes] = walk.here
     return _equilibrium(potential, final, evaluate(potential, final), iterations)
+
+
+@dataclass
+class _Walk:
+    """Lanes on their way: where each stands, its energy there, and the point it tries next.
+
+    `fraction` of `step` is what is tried; `settled` says that the last accepted step was small.
+    """
+
+    potential: Potential
+    here: Array
+    trial: Array
+    energy: Array
+    step: Array
+    slope: Array
+    fraction: Array
+    settled: Flags
+    accepted: Flags
+    finished: Flags
+
+    @classmethod
+    def at(cls, potential: Potential, guess: Array) -> "_Walk":
+        """Lanes at their guesses, about to be looked at for the first time."""
+        n = guess.shape[1]
+        yes, no = np.ones(n, bool), np.zeros(n, bool)
+        infinite, zero, one = np.full(n, np.inf), np.zeros(n), np.ones(n)
+        return cls(potential, guess, guess, infinite, guess, zero, one, yes, yes, no)
+
+    def look(self, evaluation: Evaluation, tolerance: float) -> Flags:
+        """Accept trials whose energy fell; return the lanes that this finishes."""
+        accepted = self.finished | _falls(evaluation, self.energy, self.slope * self.fraction)
+        if accepted.all():
+            self.here, self.energy = self.trial, evaluation.energy
+        else:
+            self.here = np.where(accepted, self.trial, self.here)
+            self.energy = np.where(accepted, evaluation.energy, self.energy)
+        self.accepted = accepted
+        converged = _relative_residual(self.potential, evaluation.gradient) <= tolerance
+        stalled = ~accepted & (self.fraction < SMALLEST_FRACTION)
+        newly = ((accepted & converged & self.settled) | stalled) & ~self.finished
+        self.finished = self.finished | newly
+        return newly
+
+    def step_from(self, evaluation: Evaluation) -> None:
+        """Choose the next trial: a new step where the last was accepted, else half of it."""
+        step, slope, length = _downhill(self.potential, evaluation)
+        if self.accepted.all():
+            self.step, self.slope = step, slope
+            self.fraction, self.settled = np.ones(len(slope)), length <= SETTLED
+        else:
+            self.step = np.where(self.accepted, step, self.step)
+            self.slope = np.where(self.accepted, slope, self.slope)
+            self.fraction = np.where(self.accepted, 1.0, 0.5 * self.fraction)
+            self.settled = self.accepted & (length <= SETTLED)
+        self.trial = self.potential.moved(self.here, self.fraction * self.step)
+        if self.finished.any():
+            self.trial = np.where(self.finished, self.here, self.trial)
+
+    def only(self, keep: Indices) -> "_Walk":
+        """The walk of some lanes, the batch index still innermost in memory."""
+        arrays = [np.take(getattr(self, f.name), keep, axis=-1) for f in fields(self)[1:]]
+        return _Walk(self.potential.designs(keep), *arrays)
 
 
 def _falls(evaluation: Evaluation, energy: Array, expected: Array) -> Flags:
     """Whether the energy fell enough, given that it is known up to rounding only."""
-    total = sum(np.abs(part) for part in evaluation.energies.values())
-    allowed = energy + SUFFICIENT_DECREASE * expected + ROUNDING * total
+    magnitude = sum(np.abs(part) for part in evaluation.energies.values())
+    allowed = energy + SUFFICIENT_DECREASE * expected + ROUNDING * magnitude
     return np.asarray(evaluation.energy <= allowed)
 
 
-def _downhill(potential: Potential, evaluation: Evaluation) -> tuple[Array, Array]:
-    """The step and the slope of the energy along it; uses up the Hessian."""
+def _downhill(potential: Potential, evaluation: Evaluation) -> tuple[Array, Array, Array]:
+    """The step, the slope of the energy along it and its length over the cap; uses the Hessian."""
     factorization = factorize(evaluation.hessian, potential.reach)
     stiffness = np.maximum(np.abs(factorization.pivots), np.finfo(float).tiny)
     step = forward(factorization, -evaluation.gradient)
     step /= stiffness
     step = backward(factorization, step)
-    step /= np.maximum(1.0, _largest(step, potential.step_cap))
-    return step, total(evaluation.gradient * step)
+    length = _largest(step, potential.step_cap)
+    step /= np.maximum(1.0, length)
+    return step, total(evaluation.gradient * step), length
 
 
 def _relative_residual(potential: Potential, gradient: Array) -> Array:
@@ -113,14 +162,15 @@ def _relative_residual(potential: Potential, gradient: Array) -> Array:
 def _largest(values: Array, scale: Array) -> Array:
     """Max-norm over the coordinates of values / scale, shape (batch,)."""
     ratio = values / scale
-    return np.asarray(np.maximum(ratio.max(axis=0), -ratio.min(axis=0)))
+    largest = np.maximum(ratio.max(axis=0), -ratio.min(axis=0))
+    return np.asarray(np.abs(largest))  # no negative zero
 
 
-def _lanes_of(evaluation: Evaluation, keep: Indices) -> Evaluation:
+def _only(evaluation: Evaluation, keep: Indices) -> Evaluation:
     return Evaluation(
         {kind: part[keep] for kind, part in evaluation.energies.items()},
-        evaluation.gradient[:, keep],
-        evaluation.hessian[:, :, keep],
+        np.take(evaluation.gradient, keep, axis=-1),
+        np.take(evaluation.hessian, keep, axis=-1),
     )
 
 

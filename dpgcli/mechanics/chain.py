@@ -164,13 +164,13 @@ class Hinges:
         near_row, far_row = (_rows(self.finger.is_rigid)[name] for name in "ab")
         corner = 2.0 * self.finger.hinge_stiffness
         _, near, far, _ = internal(coordinates, self.finger.is_rigid)
-        energy = 0.0
+        energies = []
         for row, angle in ((near_row, near), (far_row, far)):
             response = laws.quadratic(angle, corner)
             gradient[row.offset :: row.stride] += response.force
             hessian[0, row.offset :: row.stride] += response.stiffness
-            energy = energy + total(response.energy)
-        return np.asarray(energy)
+            energies.append(total(response.energy))
+        return energies[0] + energies[1]
 
 
 @dataclass(frozen=True)
@@ -181,13 +181,13 @@ class Bars:
     kind: str = "bar"
 
     def add_to(self, coordinates: Array, gradient: Array, hessian: Array) -> Array:
-        energy = 0.0
+        energies = []
         for first in (0, 3):
             response = laws.quadratic(coordinates[first::4], self.finger.linear_stiffness)
             gradient[first::4] += response.force
             hessian[0, first::4] += response.stiffness
-            energy = energy + total(response.energy)
-        return np.asarray(energy)
+            energies.append(total(response.energy))
+        return energies[0] + energies[1]
 
 
 @dataclass(frozen=True)
@@ -237,6 +237,9 @@ class Chain:
 
     def designs(self, index: Indices) -> "Chain":
         return Chain(self.finger.designs(index))
+
+    def moved(self, coordinates: Array, step: Array) -> Array:
+        return coordinates + step
 
     def coordinates(self, shape: Internal) -> Array:
         finger = self.finger
@@ -289,7 +292,10 @@ class Chain:
         chord, near, far, strut = internal(jacobian, finger.is_rigid)
         for j in range(n):
             for k, angle in ((j, near), (j + 1, far)):  # turning about station k
-                angle[j, j:, 0], angle[j, j:, 1] = nodes.base_y[j:] - y0[k], x0[k] - nodes.base_x[j:]
+                angle[j, j:, 0], angle[j, j:, 1] = (
+                    nodes.base_y[j:] - y0[k],
+                    x0[k] - nodes.base_x[j:],
+                )
                 angle[j, j:, 2], angle[j, j:, 3] = nodes.top_y[j:] - y0[k], x0[k] - nodes.top_x[j:]
             if not finger.is_rigid:
                 chord[j, j:, 0::2], chord[j, j:, 1::2] = pose.chord_cos[j], pose.chord_sin[j]
@@ -315,4 +321,4 @@ def _pose(finger: Finger, coordinates: Array) -> _Pose:
     cos, sin = np.cos(direction), np.sin(direction)
     length = finger.segment_length + chord
     x, y = np.cumsum(length * cos, axis=0), np.cumsum(length * sin, axis=0)
-    return _Pose(x, y, cos, sin, -turned)
+    return _Pose(x, y, cos, sin, 0.0 - turned)  # no negative zero

@@ -6,6 +6,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 
+
 @dataclass(frozen=True)
 class Finger:
     """A batch of fingers with the same number of units.
@@ -63,7 +64,9 @@ class Finger:
 
     def designs(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
-        picked = {k: v if v.shape[1] == 1 else v[:, index] for k, v in self.arrays().items()}
+        picked = {
+            k: v if v.shape[1] == 1 else np.take(v, index, axis=1) for k, v in self.arrays().items()
+        }
         return Finger(self.n_units, **picked)
 
     def units(self, first: int, stop: int) -> "Finger":

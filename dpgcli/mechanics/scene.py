@@ -1,4 +1,4 @@
-"""What a spec describes, in the model's terms: a finger, perhaps twice, and where its numbers come from."""
+"""What a spec describes, in the model's terms, and where its numbers come from."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -18,7 +18,7 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True)
 class Source:
-    """One lattice value of some units: `units` as in the spec ("1-5", "4"), value in the key's unit."""
+    """One lattice value, in its key's unit, of some units, written as in the spec ("1-5", "4")."""
 
     key: str
     units: str
@@ -29,7 +29,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Two mirrored fingers: distance of their base stations B_0 (mm), outward tilt of each (rad)."""
+    """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad)."""
 
     base_spacing: float
     mounting_angle: float
@@ -37,7 +37,7 @@ class Gripper:
 
 @dataclass(frozen=True)
 class Scene:
-    """A finger, its gripper if it has one, and the thickness (mm) of its limiting layer if known."""
+    """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known."""
 
     finger: Finger
     sources: tuple[Source, ...]

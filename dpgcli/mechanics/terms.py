@@ -59,6 +59,9 @@ class Potential(Protocol):
     def designs(self, index: Indices) -> "Potential":
         """The same potential for the lanes at `index`."""
 
+    def moved(self, coordinates: Array, step: Array) -> Array:
+        """Where a step leads: coordinates + step, or better where that would strain bars."""
+
 
 def evaluate(potential: Potential, coordinates: Array) -> Evaluation:
     """Add up the terms at `coordinates`, shape (size, batch)."""

@@ -81,7 +81,9 @@ def named(columns: Sequence[Column], names: Sequence[str]) -> tuple[Column, ...]
 
 
 _STATES = (
-    Column("pattern", "", "activation pattern, unit 1 first, 1 = inverted", Group.STATES, Kind.PATTERN),
+    Column(
+        "pattern", "", "activation pattern, unit 1 first, 1 = inverted", Group.STATES, Kind.PATTERN
+    ),
     Column("status", "", "stable where certified, else why not", Group.STATES, Kind.STATUS),
     Column("tip_x_mm", "mm", "x of the tip, the last limiting-layer node", Group.STATES),
     Column("tip_y_mm", "mm", "y of the tip; negative is the inner side", Group.STATES),
@@ -89,7 +91,13 @@ _STATES = (
     Column("energy_mJ", "mJ", "potential energy of the state", Group.STATES),
     Column("residual_N", "N", "largest unbalanced force; moments over the lever H", Group.STATES),
     Column("tip_error_mm", "mm", "estimated numerical error of the tip position", Group.STATES),
-    Column("reached_pattern", "", "the pattern whose wells the units are in", Group.STATES, Kind.PATTERN),
+    Column(
+        "reached_pattern",
+        "",
+        "the pattern whose wells the units are in",
+        Group.STATES,
+        Kind.PATTERN,
+    ),
 )
 _EIGENVALUE = (
     Column(
@@ -100,13 +108,19 @@ _EIGENVALUE = (
     ),
 )
 _STIFFNESS = (
-    Column("tip_stiffness_min_N_per_mm", "N/mm", "tip force per travel, softest way", Group.STIFFNESS),
+    Column(
+        "tip_stiffness_min_N_per_mm", "N/mm", "tip force per travel, softest way", Group.STIFFNESS
+    ),
     Column("tip_stiffness_max_N_per_mm", "N/mm", "the same, stiffest way", Group.STIFFNESS),
     Column("tip_compliance_xx_mm_per_N", "mm/N", "tip x by a force along x", Group.STIFFNESS),
     Column("tip_compliance_xy_mm_per_N", "mm/N", "tip y by a force along x", Group.STIFFNESS),
     Column("tip_compliance_yy_mm_per_N", "mm/N", "tip y by a force along y", Group.STIFFNESS),
-    Column("tip_compliance_x_angle_rad_per_N", "rad/N", "tip angle by a force along x", Group.STIFFNESS),
-    Column("tip_compliance_y_angle_rad_per_N", "rad/N", "tip angle by a force along y", Group.STIFFNESS),
+    Column(
+        "tip_compliance_x_angle_rad_per_N", "rad/N", "tip angle by a force along x", Group.STIFFNESS
+    ),
+    Column(
+        "tip_compliance_y_angle_rad_per_N", "rad/N", "tip angle by a force along y", Group.STIFFNESS
+    ),
     Column(
         "tip_compliance_angle_rad_per_N_mm",
         "rad/(N mm)",

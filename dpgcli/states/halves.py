@@ -15,8 +15,7 @@ is known exactly at the shared strut, and every state is certified by it (our de
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,6 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward
 from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import evaluate
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.solve import (
@@ -36,6 +34,7 @@ from dpgcli.states.solve import (
     solve,
     tip,
 )
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -104,17 +103,18 @@ class Split:
     @property
     def n_solves(self) -> int:
         """Half-fingers solved for both tables."""
-        return 2 ** (self.n_inner + self.context) + 2 ** (self.n_outer + self.context)
+        return (1 << self.n_inner + self.context) + (1 << self.n_outer + self.context)
 
     def inner(self) -> Half:
         """Units 1 … n_inner, with context beyond them."""
-        own = slice(0, self.n_inner)
-        return _joined([self._inner(b, s) for b, s in self._solved(0, self.n_inner + self.context, own)])
+        solved = self._solved(0, self.n_inner + self.context, own=slice(0, self.n_inner))
+        return _joined([self._inner(batch, status) for batch, status in solved])
 
     def outer(self) -> Half:
         """Units n_inner + 1 … n, with context before them."""
-        own = slice(self.context, None)
-        return _joined([self._outer(b, s) for b, s in self._solved(self.n_inner - self.context, self.n_units, own)])
+        first = self.n_inner - self.context
+        solved = self._solved(first, self.n_units, own=slice(self.context, None))
+        return _joined([self._outer(batch, status) for batch, status in solved])
 
     def _solved(
         self, first: int, stop: int, own: slice
@@ -132,7 +132,9 @@ class Split:
         own = batch.equilibrium.coordinates[: len(chain.reach)]
         at_own = evaluate(chain, own)
         pose, jacobian = chain.tip(own)
-        whole, outer = (reach(f)[0] for f in (self.units.finger, self._cut(self.n_inner, self.n_units).finger))
+        whole, outer = (
+            reach(f)[0] for f in (self.units.finger, self._cut(self.n_inner, self.n_units).finger)
+        )
         joint = None
         if not chain.finger.is_rigid:
             factorization = factorize(at_own.hessian, chain.reach)
@@ -147,7 +149,9 @@ class Split:
                 np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * outer,
             )
         solved = reach(batch.formulation.finger)[0]
-        return self._half(batch, status, slice(0, self.n_inner), pose, at_own.energies, whole / solved, joint)
+        return self._half(
+            batch, status, slice(0, self.n_inner), pose, at_own.energies, whole / solved, joint
+        )
 
     def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
         chain = self._cut(self.n_inner, self.n_units)
@@ -168,7 +172,9 @@ class Split:
             forward(batch.equilibrium.factorization, answer)
             answer /= batch.equilibrium.factorization.pivots
             backward(batch.equilibrium.factorization, answer)
-            stiffness = 1.0 / answer[strut] - factorize(at_before.hessian, before.reach).pivots[strut]
+            stiffness = (
+                1.0 / answer[strut] - factorize(at_before.hessian, before.reach).pivots[strut]
+            )
             moved = total(jacobian * (answer[strut + 1 :] / answer[strut])[:, None])
             joint = Joint(coordinates[strut], pull, stiffness, np.hypot(moved[0], moved[1]))
             near = slice(strut + 1, strut + len(hold))
@@ -177,7 +183,9 @@ class Split:
                 _largest(hold[1:], batch.formulation.force_unit[near]),
                 _largest(hold[1:], batch.formulation.gradient_scale[near]),
             )
-        return self._half(batch, status, slice(self.context, None), pose, energies, 1.0, joint, held)
+        return self._half(
+            batch, status, slice(self.context, None), pose, energies, 1.0, joint, held
+        )
 
     def _half(
         self,
@@ -209,19 +217,18 @@ def _largest(forces: Array, scale: Array) -> Array:
 
 def _joined(parts: list[Half]) -> Half:
     """One table from consecutive chunks of it."""
-    return _concatenated(parts)
+    half: Half = _concatenated(parts)
+    return half
 
 
-T = TypeVar("T")
-
-
-def _concatenated(parts: list[T]) -> T:
-    """Concatenate, field by field, arrays and what holds arrays."""
+def _concatenated(parts: list[Any]) -> Any:
+    """Arrays end to end; records, dictionaries and nothing field by field."""
     first = parts[0]
     if first is None:
-        return first
+        return None
     if isinstance(first, np.ndarray):
         return np.concatenate(parts, axis=-1)
     if isinstance(first, dict):
-        return {k: _concatenated([p[k] for p in parts]) for k in first}
-    return type(first)(*(_concatenated([getattr(p, f.name) for p in parts]) for f in fields(first)))
+        return {key: _concatenated([part[key] for part in parts]) for key in first}
+    names = [field.name for field in fields(first)]
+    return type(first)(*(_concatenated([getattr(part, name) for part in parts]) for name in names))

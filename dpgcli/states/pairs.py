@@ -2,18 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.solve import MARGINAL_CURVATURE, States, Status
 
 STATES_AT_ONCE = 2**16
-Values = TypeVar("Values", bound=np.generic)
 
 
 def paired_states(split: Split) -> Iterator[States]:
@@ -34,21 +34,21 @@ class _Block:
     own nearest units.
     """
 
-    patterns: np.ndarray[tuple[int], np.dtype[np.int64]]
+    patterns: Indices
     n_outer: int
     context: int
 
-    def inner(self, table: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def inner(self, table: NDArray[Any]) -> NDArray[Any]:
         near = 2**self.context
         entries = table.reshape(*table.shape[:-1], -1, near, 1)
         return entries[..., self.patterns, :, :]
 
-    def outer(self, table: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def outer(self, table: NDArray[Any]) -> NDArray[Any]:
         near = 2**self.context
         entries = table.reshape(*table.shape[:-1], near, near, -1)
         return entries[..., self.patterns % near, :, :]
 
-    def flat(self, values: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def flat(self, values: NDArray[Any]) -> NDArray[Any]:
         near = 2**self.context
         shape = (len(self.patterns), near, 2**self.n_outer // near)
         lead = values.shape[:-3]

@@ -63,9 +63,7 @@ def select(globs: Sequence[str], n_units: int) -> Codes:
             )
     found = np.unique(np.concatenate([_matches(glob, n_units) for glob in globs]))
     if not len(found):
-        raise NothingSelectedError(
-            f"no pattern of {n_units} units matches {', '.join(globs)}"
-        )
+        raise NothingSelectedError(f"no pattern of {n_units} units matches {', '.join(globs)}")
     return found
 
 
@@ -93,8 +91,7 @@ def _matches(glob: str, n_units: int) -> Codes:
 def too_many(n_units: int, what: str) -> str:
     """Why so many states are refused, and what to do instead."""
     return (
-        f"{what} more than {MOST_SELECTED:,} of the 2^{n_units} states: "
-        "select fewer with --pattern"
+        f"{what} more than {MOST_SELECTED:,} of the 2^{n_units} states: select fewer with --pattern"
     )
 
 

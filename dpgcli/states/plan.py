@@ -25,8 +25,12 @@ DEFAULT_TOLERANCE = 1e-12
 SMALLEST_TOLERANCE = 1e-14  # of the forces in play; below, rounding decides
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
-MOST_STATES_WITH = {Group.EIGENVALUE: 2**10, Group.STIFFNESS: 2**16, Group.ENERGIES: 2**16,
-                    Group.OPENINGS: 2**16}
+MOST_STATES_WITH = {
+    Group.EIGENVALUE: 2**10,
+    Group.STIFFNESS: 2**16,
+    Group.ENERGIES: 2**16,
+    Group.OPENINGS: 2**16,
+}
 
 
 class Method(StrEnum):
@@ -61,7 +65,8 @@ class Omission:
 class Plan:
     """Decisions for one scene and request, and what they cost.
 
-    `codes` is None where all states are wanted. `bar_flexibility_mm` bounds how far the
+    `codes` is None where all states are wanted. `residual_limit` (N) is the largest residual
+    that a stable state may have, of the unit with the largest forces. `bar_flexibility` bounds (mm) how far the
     flexibility of bars moves the tip: what dropping them costs, or would cost.
     """
 
@@ -78,7 +83,8 @@ class Plan:
     n_finger_solves: int
     columns: tuple[Column, ...]
     omissions: tuple[Omission, ...]
-    bar_flexibility_mm: float
+    residual_limit: float
+    bar_flexibility: float
     expected_seconds: float
     expected_bytes: int
 
@@ -125,10 +131,15 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         n_finger_solves=n_solves,
         columns=columns,
         omissions=(*_omissions(scene, units, split, n_solves), *left_out),
-        bar_flexibility_mm=bar_flexibility(finger),
+        residual_limit=request.tolerance * _largest_force(formulation),
+        bar_flexibility=bar_flexibility(finger),
         expected_seconds=_seconds(request, split, n, n_states, {c.group for c in columns}),
         expected_bytes=_bytes(split, n, len(columns)),
     )
+
+
+def _largest_force(formulation: Formulation) -> float:
+    return float((formulation.gradient_scale / formulation.force_unit).max())
 
 
 def _check(scene: Scene, request: Request) -> None:
@@ -159,7 +170,8 @@ def _columns(
         wanted |= set(groups)
     elif "default" in names:
         cheap = [
-            g for g in groups
+            g
+            for g in groups
             if g is not Group.NODES and n_states <= MOST_STATES_WITH.get(g, n_states)
         ]
         left_out = tuple(
@@ -242,8 +254,8 @@ def _omissions(
         omissions.append(
             Omission(
                 f"{2**n - n_solves:,} of {2**n:,} finger solves",
-                f"states are pairs of {split.n_inner}- and {split.n_outer}-unit halves, each solved "
-                f"with {split.context} units of the other; every pair is certified",
+                f"states are pairs of {split.n_inner}- and {split.n_outer}-unit halves, each "
+                f"solved with {split.context} units of the other; every pair is certified",
             )
         )
     if scene.gripper is not None:

@@ -1,5 +1,7 @@
 """From certified states to the columns of a table, named as in `columns`."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,15 +13,15 @@ from dpgcli.states.gripper import grip
 from dpgcli.states.patterns import texts
 from dpgcli.states.solve import Batch, States, Status, Tip, min_eigenvalues
 
-Columns = dict[str, NDArray]  # type: ignore[type-arg]
+Columns = dict[str, NDArray[Any]]
 
 
-def as_text(column: Column, values: NDArray) -> NDArray:  # type: ignore[type-arg]
+def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
     """Patterns and statuses as strings; all else unchanged."""
     if column.kind is Kind.PATTERN:
-        return values.astype(str)
+        return np.asarray(values.astype(str))
     if column.kind is Kind.STATUS:
-        return np.array([status.text for status in Status])[values]
+        return np.asarray(np.array([status.text for status in Status])[values])
     return values
 
 

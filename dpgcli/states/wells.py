@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Internal
@@ -48,12 +47,12 @@ def inverted_wells(finger: Finger) -> Wells:
     """
     half_height = finger.stroke / (2.0 * finger.segment_height)
     hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
-    half_height, hinge, linearity = np.broadcast_arrays(
-        half_height, hinge, finger.force_linearity
-    )
+    half_height, hinge, linearity = np.broadcast_arrays(half_height, hinge, finger.force_linearity)
     widest = np.minimum(1.5, (1.0 - 1e-9) / half_height)
     well, from_above = _root(widest, half_height, hinge, linearity, descending=True)
-    barrier, from_below = _root(np.zeros_like(well), half_height, hinge, linearity, descending=False)
+    barrier, from_below = _root(
+        np.zeros_like(well), half_height, hinge, linearity, descending=False
+    )
     exists = from_above & from_below & (barrier < well)
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     extension = np.where(exists, well, np.minimum(1.0, widest)) * stroke
@@ -157,9 +156,7 @@ def _as_single_units(finger: Finger, shape: tuple[int, int]) -> Finger:
     return Finger(1, **arrays)
 
 
-def geometric_guess(
-    finger: Finger, inverted: Flags, unit: FirstOrder
-) -> Internal:
+def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Internal:
     """The shape of a pattern, (unit, batch), with each unit in its own well.
 
     Bars extend, and corners follow, to first order; the error left is of order (k_b/k_L)².

@@ -1,0 +1,137 @@
+"""`dpg explain`: what a scene needs and leaves out, before any work."""
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dpgcli.cli.options import (
+    ColumnNames,
+    FormulationName,
+    FormulationOption,
+    Nodes,
+    Patterns,
+    Settings,
+    SpecPath,
+    Tolerance,
+    request_of,
+)
+
+if TYPE_CHECKING:
+    from dpgcli.states.plan import Plan
+
+
+class PlanFormat(StrEnum):
+    """How the plan is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def explain(
+    spec: SpecPath,
+    settings: Settings = None,
+    patterns: Patterns = None,
+    columns: ColumnNames = "default",
+    nodes: Nodes = False,
+    formulation: FormulationOption = FormulationName.CHAIN,
+    tolerance: Tolerance = None,
+    printed_as: Annotated[
+        PlanFormat, typer.Option("--format", help="How to print the plan")
+    ] = PlanFormat.TEXT,
+) -> None:
+    """Say what a scene contains, what predict will do, and what it leaves out and why."""
+    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.states import plan
+
+    scene = scene_of(read_spec(spec, settings or ()))
+    made = plan.explain(scene, request_of(patterns, columns, nodes, formulation, tolerance))
+    if printed_as is PlanFormat.JSON:
+        import json
+
+        print(json.dumps(facts(made), indent=2))
+    else:
+        print("\n".join(_lines(str(spec), made)))
+
+
+def facts(plan: "Plan") -> dict[str, Any]:
+    """The plan as plain values, units in the names."""
+    return {
+        "n_units": plan.n_units,
+        "n_states": plan.n_states,
+        "method": plan.method.value,
+        "formulation": plan.request.formulation,
+        "terms": list(plan.terms),
+        "unknowns_per_solve": plan.unknowns,
+        "n_unit_solves": plan.n_unit_solves,
+        "n_finger_solves": plan.n_finger_solves,
+        "tolerance": plan.request.tolerance,
+        "residual_limit_N": plan.residual_limit,
+        "bar_flexibility_mm": plan.bar_flexibility,
+        "columns": [column.name for column in plan.columns],
+        "left_out": [{"what": o.what, "why": o.why} for o in plan.omissions],
+        "expected_seconds": plan.expected_seconds,
+        "expected_bytes": plan.expected_bytes,
+        "sources": [
+            {"key": s.key, "units": s.units, "value": s.value, "origin": s.origin, "rule": s.rule}
+            for s in plan.scene.sources
+        ],
+    }
+
+
+def _lines(name: str, plan: "Plan") -> list[str]:
+    return [
+        f"{name}: {_what(plan)}",
+        "",
+        "Values",
+        *(
+            f"  {s.key:<30} {s.value:<10.6g} units {s.units:<6} {s.origin:<13} {s.rule}"
+            for s in plan.scene.sources
+        ),
+        "",
+        "Kept",
+        f"  energy terms    {', '.join(plan.terms)} (published law: springs push and pull)",
+        f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
+        f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
+        f"  solves          {_count(plan.n_unit_solves, 'unit well')}, "
+        f"{_count(plan.n_finger_solves, 'finger')}",
+        f"  certificate     residual up to {plan.residual_limit:.1e} N "
+        f"({plan.request.tolerance:g} of the forces in play), positive pivots, "
+        "every unit in its own well",
+        f"  columns         {_column_names(plan)}",
+        "",
+        "Left out",
+        *(f"  {o.what}: {o.why}" for o in plan.omissions),
+        "",
+        "Error and cost",
+        f"  {_bar_error(plan)}",
+        f"  about {plan.expected_seconds:.1f} s on one core and "
+        f"{plan.expected_bytes / 2**20:.0f} MiB (rough: a factor of two either way)",
+    ]
+
+
+def _what(plan: "Plan") -> str:
+    alike = "equal" if plan.scene.finger.is_uniform else "graded"
+    finger = f"finger of {_count(plan.n_units, f'{alike} unit')}"
+    return (
+        f"a gripper of two mirrored fingers, each a {finger}"
+        if plan.scene.gripper
+        else f"a {finger}"
+    )
+
+
+def _bar_error(plan: "Plan") -> str:
+    bound = f"the tip by less than {plan.bar_flexibility:.2g} mm"
+    if plan.scene.finger.is_rigid:
+        return f"bars 1000 times as stiff as the stiffest spring would move {bound}"
+    return f"the bars' flexibility moves {bound}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'s' * (number != 1)}"
+
+
+def _column_names(plan: "Plan") -> str:
+    shown = [c.name for c in plan.columns[:9]]
+    more = len(plan.columns) - len(shown)
+    return ", ".join(shown) + (f" and {more} more (--format json lists all)" if more else "")

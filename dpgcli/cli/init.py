@@ -1,0 +1,29 @@
+"""`dpg init`: a commented spec to start from."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def init(
+    path: Annotated[Path, typer.Argument(help="File to write; - for standard output")] = Path(
+        "finger.yaml"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file")] = False,
+) -> None:
+    """Write a commented spec to start from."""
+    import sys
+
+    from dpgcli.errors import OutputError
+    from dpgcli.files.output import whole_file
+    from dpgcli.files.spec import starter
+
+    if path == Path("-"):
+        sys.stdout.write(starter())
+        return
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
+    with whole_file(path) as temporary:
+        temporary.write_text(starter(), encoding="utf-8")
+    print(f"wrote {path}; next: dpg predict {path}", file=sys.stderr)

@@ -1,0 +1,53 @@
+"""The `dpg` program."""
+
+import os
+from typing import Annotated
+
+import typer
+
+from dpgcli import __version__
+from dpgcli.cli import explain, init, predict, schema, validate
+from dpgcli.cli.exits import command
+
+# Small matrices gain nothing from threads; set before NumPy is loaded.
+for _library in ("OPENBLAS", "MKL", "OMP"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+app = typer.Typer(
+    name="dpg",
+    help="Stable shapes of multistable soft grippers, predicted by a lumped spring lattice.",
+    epilog="Exit codes: 0 done, 2 usage or spec, 3 internal error, 5 nothing selected, "
+    "130/143 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+for _function in (
+    predict.predict,
+    explain.explain,
+    validate.validate,
+    init.init,
+    schema.schema,
+):
+    app.command()(command(_function))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"dpg {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version")
+    ] = False,
+) -> None:
+    """Stable shapes of multistable soft grippers, predicted by a lumped spring lattice."""
+
+
+def main() -> None:
+    """Run the program."""
+    app()

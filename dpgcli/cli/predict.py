@@ -1,0 +1,181 @@
+"""`dpg predict`: every stable state of a finger or gripper, certified."""
+
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dpgcli.cli.options import (
+    ColumnNames,
+    FormulationName,
+    FormulationOption,
+    Nodes,
+    Patterns,
+    Quiet,
+    Settings,
+    SpecPath,
+    Tolerance,
+    request_of,
+)
+from dpgcli.cli.printing import ROWS_SHOWN, Format, Printer, print_csv, print_json, table_printer
+
+if TYPE_CHECKING:
+    from dpgcli.mechanics.scene import Scene
+    from dpgcli.states.predict import Prediction, Summary
+    from dpgcli.states.rows import Columns
+
+
+def predict(
+    spec: SpecPath,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+    ] = None,
+    printed_as: Annotated[
+        Format | None,
+        typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
+    ] = None,
+    patterns: Patterns = None,
+    settings: Settings = None,
+    columns: ColumnNames = "default",
+    nodes: Nodes = False,
+    formulation: FormulationOption = FormulationName.CHAIN,
+    tolerance: Tolerance = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Predict every stable state of a finger or gripper, each with its certificate."""
+    from dpgcli.files.output import check_writable
+    from dpgcli.files.spec import canonical_json, read_spec, scene_of
+    from dpgcli.states import predict as states
+
+    checked = read_spec(spec, settings or ())
+    scene = scene_of(checked)
+    request = request_of(patterns, columns, nodes, formulation, tolerance)
+    prediction = states.predict(scene, request)
+    if plot is not None:
+        _check_plot(plot, prediction.plan.n_states)
+    for path in (output, plot):
+        if path is not None:
+            check_writable(path)
+    rows = _progress(prediction, quiet)
+    if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
+        principal = columns == "default" and not nodes
+        rows = _printer(printed_as or Format.TABLE, principal)(prediction.plan.columns, rows)
+    if output is None:
+        for _ in rows:
+            pass
+    else:
+        _write(prediction, output, canonical_json(checked), rows)
+    if plot is not None:
+        _draw(scene, request.patterns, plot)
+    if not quiet:
+        sys.stdout.flush()
+        print(*_summary(prediction), sep="\n", file=sys.stderr)
+
+
+def _printer(printed_as: Format, principal: bool) -> Printer:
+    printers = {
+        Format.TABLE: table_printer(principal=principal),
+        Format.CSV: print_csv,
+        Format.JSON: print_json,
+    }
+    return printers[printed_as]
+
+
+def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
+    """Blocks, with progress on standard error where the work takes long."""
+    from time import monotonic
+
+    interactive = sys.stderr.isatty() and not quiet
+    period = 0.2 if interactive else 30.0
+    due = monotonic() + (1.0 if interactive else period)
+    total, shown = prediction.plan.n_states, False
+    for block in prediction.blocks():
+        yield block
+        if not quiet and monotonic() > due:
+            done = prediction.summary.n_states
+            line = f"{done:,} of {total:,} states ({100 * done // total} %)"
+            print(
+                f"\r{line}" if interactive else line,
+                end="" if interactive else "\n",
+                file=sys.stderr,
+                flush=True,
+            )
+            due, shown = monotonic() + period, interactive
+    if shown:
+        print("\r" + " " * 60, end="\r", file=sys.stderr, flush=True)
+
+
+def _write(
+    prediction: "Prediction", output: Path, spec_json: str, rows: Iterable["Columns"]
+) -> None:
+    import platform
+
+    from dpgcli.files.tables import write_run, write_states
+
+    write_states(prediction, output, spec_json, rows)
+    summary = prediction.summary
+    write_run(
+        output.with_suffix(".run.json"),
+        {
+            "table": output.name,
+            "states": {status.text: n for status, n in summary.statuses.items()},
+            "finger_solves": summary.n_finger_solves,
+            "worst_residual_N": summary.residual,
+            "worst_tip_error_mm": summary.tip_error,
+            "seconds": summary.seconds,
+            "cpu_seconds": summary.cpu_seconds,
+            "machine": platform.machine(),
+            "host": platform.node(),
+            "python": platform.python_version(),
+            "command": sys.argv,
+        },
+    )
+
+
+def _summary(prediction: "Prediction") -> Iterator[str]:
+    """States, error and time in one line; where values come from in another."""
+    summary, plan = prediction.summary, prediction.plan
+    counts = ", ".join(f"{n:,} {status.text}" for status, n in summary.statuses.items() if n)
+    yield (
+        f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); worst residual "
+        f"{summary.residual:.1e} N, worst tip error {summary.tip_error:.1e} mm (numerical; "
+        "not the model's)"
+    )
+    origins = Counter(source.origin.value for source in plan.scene.sources)
+    values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
+    yield f"values: {values} (dpg explain says which); published law, pushing and pulling"
+
+
+def _rate(summary: "Summary") -> str:
+    return f"{summary.n_states / max(summary.seconds, 1e-9):,.0f} states/s"
+
+
+def _check_plot(path: Path, n_states: int) -> None:
+    """Before any work: the extra, the suffix, and not more shapes than one can see."""
+    from importlib.util import find_spec
+
+    from dpgcli.errors import UsageError
+
+    if path.suffix not in (".svg", ".png"):
+        raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
+    if n_states > ROWS_SHOWN:
+        raise UsageError(
+            f"--plot draws at most {ROWS_SHOWN} states, not {n_states:,}: select with --pattern"
+        )
+    if find_spec("matplotlib") is None:
+        raise UsageError("--plot needs matplotlib: pip install 'dpgcli[plot]'")
+
+
+def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:
+    from dpgcli.report.figures import draw_states
+    from dpgcli.states.plan import Request
+    from dpgcli.states.predict import predict as predict_states
+
+    request = Request(patterns, columns=("pattern", "status", "nodes"))
+    draw_states(predict_states(scene, request), path)

@@ -1,0 +1,134 @@
+"""Rows on standard output, as they come: a table for people, CSV and JSON for programs."""
+
+import csv
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from dpgcli.states.columns import Column, Kind
+
+if TYPE_CHECKING:
+    from dpgcli.states.rows import Columns
+
+ROWS_SHOWN = 64
+PRINCIPAL = (
+    "pattern",
+    "status",
+    "tip_x_mm",
+    "tip_y_mm",
+    "tip_angle_rad",
+    "energy_mJ",
+    "aperture_mm",
+    "fingers_overlap",
+    "min_eigenvalue_N_per_mm",
+    "residual_N",
+    "tip_error_mm",
+)
+ROUNDED = {"residual_N": ".1e", "tip_error_mm": ".1e", "mm": ".6f", "rad": ".6f", "mJ": ".6f"}
+
+
+class Format(StrEnum):
+    """How rows are printed."""
+
+    TABLE = "table"
+    JSON = "json"
+    CSV = "csv"
+
+
+Printer = Callable[[tuple[Column, ...], Iterable["Columns"]], Iterator["Columns"]]
+
+
+def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
+    """Print and pass on; numbers in full, NaN where a pattern has no state."""
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow([column.name for column in columns])
+    for block in blocks:
+        writer.writerows(_rows(columns, block))
+        yield block
+
+
+def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
+    """Print one array of row objects and pass on; null for what is not a finite number."""
+    names = [column.name for column in columns]
+    separator = "[\n"
+    for block in blocks:
+        for row in _rows(columns, block):
+            finite = (None if isinstance(v, float) and not math.isfinite(v) else v for v in row)
+            text = json.dumps(dict(zip(names, finite, strict=True)))
+            sys.stdout.write(f"{separator}  {text}")
+            separator = ",\n"
+        yield block
+    sys.stdout.write("\n]\n")
+
+
+def table_printer(*, principal: bool) -> Printer:
+    """Print the first rows for reading; of many columns only the principal ones."""
+
+    def print_table(
+        columns: tuple[Column, ...], blocks: Iterable["Columns"]
+    ) -> Iterator["Columns"]:
+        first: list[list[Any]] = []
+        n_rows = 0
+        strays = False
+        for block in blocks:
+            first += _rows(columns, block, ROWS_SHOWN - len(first))
+            n_rows += len(block[columns[0].name])
+            strays |= bool((block["status"] != 0).any())
+            yield block
+        shown = [
+            place
+            for place, column in enumerate(columns)
+            if not principal
+            or column.name in PRINCIPAL
+            or (strays and column.name == "reached_pattern")
+        ]
+        _print_grid([columns[k] for k in shown], [[row[k] for k in shown] for row in first])
+        if n_rows > len(first):
+            print(
+                f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output",
+                file=sys.stderr,
+            )
+
+    return print_table
+
+
+def _rows(
+    columns: tuple[Column, ...], block: "Columns", limit: int | None = None
+) -> list[list[Any]]:
+    """Rows of plain values."""
+    from dpgcli.states.rows import as_text
+
+    listed = [as_text(column, block[column.name][:limit]).tolist() for column in columns]
+    return [list(row) for row in zip(*listed, strict=True)]
+
+
+def _print_grid(columns: list[Column], rows: list[list[Any]]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    interactive = sys.stdout.isatty()
+    table = Table(box=box.SIMPLE_HEAD if interactive else None, pad_edge=False)
+    for column in columns:
+        name = column.name.replace("_", "_\n") if interactive else column.name
+        right = column.kind in (Kind.NUMBER, Kind.FLAG)
+        table.add_column(name, justify="right" if right else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*map(_shown, columns, row))
+    # never cropped: where the terminal is narrower, its own line wrapping is the lesser evil
+    Console(
+        force_terminal=interactive, no_color=True, width=10_000, highlight=False, soft_wrap=True
+    ).print(table)
+
+
+def _shown(column: Column, value: Any) -> str:
+    if column.kind is Kind.FLAG:
+        return "yes" if value else "no"
+    if column.kind is not Kind.NUMBER:
+        return str(value)
+    if math.isnan(value):
+        return "-"
+    return format(value, ROUNDED.get(column.name) or ROUNDED.get(column.unit, ".6g"))

@@ -1,0 +1,81 @@
+"""`dpg validate`: check specs without solving."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.options import Settings
+from dpgcli.errors import Problem
+
+MOST_ANNOTATIONS = 9  # GitHub shows ten per step
+
+
+class ProblemFormat(StrEnum):
+    """How problems are listed."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+
+
+def validate(
+    specs: Annotated[list[Path], typer.Argument(metavar="SPEC...", help="YAML specs")],
+    settings: Settings = None,
+    listed_as: Annotated[
+        ProblemFormat, typer.Option("--format", help="How to list problems")
+    ] = ProblemFormat.TEXT,
+) -> None:
+    """Check specs without solving; every problem at once, exit code 2 if there is any."""
+    from dpgcli.errors import SpecError
+    from dpgcli.files.spec import read_spec
+
+    problems: list[Problem] = []
+    for path in specs:
+        try:
+            read_spec(path, settings or ())
+        except SpecError as error:
+            problems.extend(error.problems)
+        else:
+            if listed_as is ProblemFormat.TEXT:
+                print(f"{path}: ok")
+    {
+        ProblemFormat.TEXT: _print_text,
+        ProblemFormat.JSON: _print_json,
+        ProblemFormat.GITHUB: _print_github,
+    }[listed_as](problems)
+    if problems:
+        raise typer.Exit(ExitCode.USAGE)
+
+
+def _print_text(problems: list[Problem]) -> None:
+    for problem in problems:
+        print(problem)
+    if problems:
+        print(f"{len(problems)} problem{'s' * (len(problems) != 1)}")
+
+
+def _print_json(problems: list[Problem]) -> None:
+    import json
+    from dataclasses import asdict
+
+    print(json.dumps([asdict(problem) for problem in problems], indent=2))
+
+
+def _print_github(problems: list[Problem]) -> None:
+    """Workflow commands; property values and messages are escaped as GitHub asks."""
+    for problem in problems[:MOST_ANNOTATIONS]:
+        place = f"file={_escaped(problem.file, ':,')}"
+        place += f",line={problem.line}" if problem.line is not None else ""
+        place += f",col={problem.column}" if problem.column is not None else ""
+        print(f"::error {place}::{_escaped(str(problem))}")
+    if len(problems) > MOST_ANNOTATIONS:
+        print(f"::error ::and {len(problems) - MOST_ANNOTATIONS} more problems")
+
+
+def _escaped(text: str, also: str = "") -> str:
+    for character in "%\r\n" + also:
+        text = text.replace(character, f"%{ord(character):02X}")
+    return text

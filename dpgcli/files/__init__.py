@@ -1,0 +1,1 @@
+"""The only readers and writers: specs in YAML, tables of results."""

@@ -1,0 +1,244 @@
+"""Which rule gives a lattice value to a group of units, and what speaks against it.
+
+A value of the lattice section is taken as it is, but where the geometry fixes it too both must
+agree. The spring constants that are left out come from the published calibration, scaled to the
+geometry, and only if the spec asks for it: a calibrated value never moves silently to a dome or
+hinge other than its own.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dpgcli.files.spec.models import LARGEST, SMALLEST
+from dpgcli.files.spec.places import KeyPath
+from dpgcli.mechanics import geometry
+from dpgcli.mechanics.scene import Origin
+
+AGREEMENT = 1e-6
+
+
+class Issue(NamedTuple):
+    """A mistake between keys: the key to look at, and the words of a problem."""
+
+    path: KeyPath
+    expected: str
+    found: str
+    hint: str = ""
+
+
+class Value(NamedTuple):
+    """A lattice value of some units and how it came about."""
+
+    value: float
+    origin: Origin
+    rule: str
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """How geometry yields one lattice value; `origin` only where a calibration is behind it."""
+
+    key: str
+    needs: tuple[str, ...]
+    value: Callable[..., float]
+    rule: str
+    origin: Callable[..., Origin] | None = None
+
+
+SEGMENT_LENGTH = Derivation(
+    "segment_length_mm",
+    ("chamber_length_mm", "dome_thickness_mm", "unit_separation_mm"),
+    geometry.segment_length,
+    "chamber length + 2 dome thickness + unit separation (inferred rule)",
+)
+SEGMENT_HEIGHT = Derivation(
+    "segment_height_mm",
+    ("chamber_width_mm", "limiting_layer_thickness_mm"),
+    geometry.segment_height,
+    "chamber width / 2 + limiting layer thickness / 2 (inferred rule)",
+)
+STROKE = Derivation(
+    "stroke_mm",
+    ("dome_height_mm", "unit_separation_mm"),
+    geometry.stroke,
+    "dome height - unit separation (published rule)",
+)
+BISTABLE_STIFFNESS = Derivation(
+    "bistable_stiffness_N_per_mm",
+    ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa"),
+    geometry.bistable_stiffness,
+    "E t^2.8 h^-0.25 (finite-element scaling)",
+    geometry.dome_origin,
+)
+FORCE_LINEARITY = Derivation(
+    "force_linearity",
+    ("dome_height_mm", "dome_thickness_mm"),
+    lambda dome_height, dome_thickness: geometry.FORCE_LINEARITY,
+    "kept constant (finite-element scaling)",
+    geometry.dome_origin,
+)
+HINGE_STIFFNESS = Derivation(
+    "hinge_stiffness_N_mm_per_rad",
+    (
+        "elastic_modulus_MPa",
+        "channel_width_mm",
+        "limiting_layer_thickness_mm",
+        "unit_separation_mm",
+    ),
+    geometry.hinge_stiffness,
+    "E W_ch t_L^3 / s (inferred scaling)",
+    geometry.hinge_origin,
+)
+DERIVATIONS = (
+    SEGMENT_LENGTH,
+    SEGMENT_HEIGHT,
+    STROKE,
+    BISTABLE_STIFFNESS,
+    FORCE_LINEARITY,
+    HINGE_STIFFNESS,
+)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Units that share all values: what the spec gives them, and which of it an override gave."""
+
+    units: tuple[int, ...]
+    calibration: str | None
+    geometry: Mapping[str, float]
+    lattice: Mapping[str, float]
+    override: str | None = None
+    own_geometry: frozenset[str] = frozenset()
+    own_lattice: frozenset[str] = frozenset()
+
+    def path(self, section: str, key: str) -> KeyPath:
+        """Where the spec sets, or would set, a value of these units."""
+        own = self.own_geometry if section == "geometry" else self.own_lattice
+        if self.override is not None and key in own:
+            return ("finger", "overrides", self.override, section, key)
+        return ("finger", section, key)
+
+
+def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue:
+    """The lattice value of a group of units, or why there is none."""
+    if derivation.key in group.lattice:
+        return _given_value(derivation, group, base)
+    if derivation.origin is not None and group.calibration is None:
+        return _uncalibrated(derivation, group)
+    missing = [need for need in derivation.needs if need not in group.geometry]
+    if missing:
+        return _missing(derivation, group, missing)
+    derived = _derived(derivation, group)
+    if not SMALLEST <= derived <= LARGEST and derivation is not FORCE_LINEARITY:
+        return _impossible(derivation, group, derived)
+    if derivation.origin is None:
+        return Value(derived, Origin.DERIVED, derivation.rule)
+    origin = derivation.origin(*_dimensions(derivation, group))
+    return Value(derived, origin, _calibration_rule(derivation, origin))
+
+
+def _given_value(derivation: Derivation, group: Group, base: Group) -> Value | Issue:
+    """A value from the lattice section, if nothing in the geometry speaks against it."""
+    given = group.lattice[derivation.key]
+    is_checked = derivation.origin is None and set(derivation.needs) <= set(group.geometry)
+    if not is_checked:
+        changed = _changed(derivation, group, base)
+        return _moved(derivation, group, given, changed) if changed else _as_given(given)
+    derived = _derived(derivation, group)
+    if derivation is STROKE and derived <= 0:
+        return _impossible(derivation, group, derived)
+    if not agree(given, derived):
+        return _disagreement(derivation, group, given, derived)
+    return _as_given(given)
+
+
+def _as_given(value: float) -> Value:
+    return Value(value, Origin.GIVEN, "as given")
+
+
+def _changed(derivation: Derivation, group: Group, base: Group) -> list[str]:
+    """Dimensions that an override changes under a value given for the whole finger."""
+    if derivation is FORCE_LINEARITY or derivation.key in group.own_lattice:
+        return []
+    return [n for n in derivation.needs if group.geometry.get(n) != base.geometry.get(n)]
+
+
+def _dimensions(derivation: Derivation, group: Group) -> list[float]:
+    return [group.geometry[need] for need in derivation.needs]
+
+
+def _derived(derivation: Derivation, group: Group) -> float:
+    return derivation.value(*_dimensions(derivation, group))
+
+
+def _calibration_rule(derivation: Derivation, origin: Origin) -> str:
+    if origin is Origin.CALIBRATED:
+        return "published value at the reference geometry"
+    beyond = ", beyond its range" if origin is Origin.EXTRAPOLATED else ""
+    return f"published value, {derivation.rule}{beyond}"
+
+
+def _uncalibrated(derivation: Derivation, group: Group) -> Issue:
+    return Issue(
+        group.path("lattice", derivation.key),
+        "a value, or a calibration to take it from",
+        "neither",
+        f"give it, or set calibration: published with {listed(derivation.needs)}",
+    )
+
+
+def _missing(derivation: Derivation, group: Group, missing: list[str]) -> Issue:
+    return Issue(
+        group.path("lattice", derivation.key),
+        f"a value, or geometry with {listed(derivation.needs)}",
+        f"no {listed(missing)}",
+        derivation.rule,
+    )
+
+
+def _impossible(derivation: Derivation, group: Group, derived: float) -> Issue:
+    """A derived value that no finger can have."""
+    needs = [need for need in derivation.needs if need in group.own_geometry]
+    path = group.path("geometry", (needs or derivation.needs)[0])
+    found = f"{derivation.key} = {number(derived)}"
+    if derivation is STROKE and derived <= 0:
+        hint = "the dome never reaches its neighbor"
+        return Issue(path, "a dome height > the unit separation", found, hint)
+    return Issue(path, f"a derived value from {SMALLEST:g} to {LARGEST:g}", found, derivation.rule)
+
+
+def _disagreement(derivation: Derivation, group: Group, given: float, derived: float) -> Issue:
+    changed = [need for need in derivation.needs if need in group.own_geometry]
+    path = group.path("lattice", derivation.key)
+    if changed and derivation.key not in group.own_lattice:
+        path = group.path("geometry", changed[0])
+    found = f"{derivation.key} = {number(given)}"
+    return Issue(path, f"{number(derived)} as the geometry has it", found, derivation.rule)
+
+
+def _moved(derivation: Derivation, group: Group, given: float, changed: list[str]) -> Issue:
+    """A spring constant measured at one geometry that would be used at another."""
+    return Issue(
+        ("finger", "overrides", str(group.override), "lattice", derivation.key),
+        f"a value of its own for units with another {listed(tuple(changed))}",
+        f"only {number(given)} of the whole finger",
+        "give it here, or leave it to calibration: published everywhere",
+    )
+
+
+def agree(given: float, derived: float) -> bool:
+    """Whether a given value is the derived one, but for rounding by people."""
+    return math.isclose(given, derived, rel_tol=AGREEMENT)
+
+
+def number(value: float) -> str:
+    """A number as messages show it."""
+    return f"{value:.10g}"
+
+
+def listed(keys: tuple[str, ...] | list[str]) -> str:
+    """Keys of the geometry section as messages list them."""
+    named = ["chamber_width_mm or unit_cell_mm" if k == "chamber_width_mm" else k for k in keys]
+    return ", ".join(named)

@@ -1,0 +1,71 @@
+"""Where something stands in a file, and how problems with it are worded and put in order."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dpgcli.errors import Problem
+
+KeyPath = tuple[str | int, ...]
+
+MAX_SHOWN = 60
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something stands: line and column from 1, none for what is not in a file."""
+
+    file: str
+    line: int | None = None
+    column: int | None = None
+
+
+def located(place: Place, key: str, expected: str, found: str, hint: str = "") -> Problem:
+    """A problem at a place."""
+    return Problem(place.file, place.line, place.column, key, expected, found, hint)
+
+
+def in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
+    """Problems by line, each place and key once, those without a line last."""
+    first: dict[tuple[int | None, int | None, str, str], Problem] = {}
+    for problem in problems:
+        first.setdefault((problem.line, problem.column, problem.key, problem.expected), problem)
+    return tuple(sorted(first.values(), key=lambda p: (p.line is None, p.line or 0, p.column or 0)))
+
+
+def dotted(path: KeyPath) -> str:
+    """A key path as people write it: `finger.overrides.4-5`."""
+    return ".".join(shortened(str(part)) for part in path) or "document"
+
+
+def shortened(text: str, limit: int = MAX_SHOWN) -> str:
+    """Text fit for one line of a message: printable, and cut where it is long.
+
+    >>> shortened("a" * 100, 10)
+    'aaaaaaa...'
+    """
+    head = text[: limit + 1]
+    printable = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in head)
+    return printable if len(printable) <= limit else printable[: limit - 3] + "..."
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it, in the manner of YAML.
+
+    >>> shown(True), shown(float("inf")), shown("6.5"), shown(None)
+    ('true', '.inf', '"6.5"', 'nothing')
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return "a section"
+    if isinstance(value, list):
+        return "a list"
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value).replace("inf", ".inf").replace("nan", ".nan")
+    if isinstance(value, int) and abs(value) >= 10**MAX_SHOWN:
+        return "a number of more than 60 digits"
+    if isinstance(value, str):
+        return shortened(json.dumps(value[: 2 * MAX_SHOWN], ensure_ascii=False))
+    return shortened(json.dumps(value))

@@ -1,0 +1,214 @@
+"""From a spec to a scene: lattice values unit by unit, with the sources they come from."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.errors import SpecError
+from dpgcli.files.spec.derivations import (
+    DERIVATIONS,
+    SEGMENT_HEIGHT,
+    Group,
+    Issue,
+    Value,
+    agree,
+    number,
+    value_of,
+)
+from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
+from dpgcli.files.spec.places import KeyPath, Place, dotted, located
+from dpgcli.mechanics import geometry
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.scene import Gripper, Origin, Scene, Source
+
+
+@dataclass
+class Resolution:
+    """Lattice values by key and units, and the issues met on the way to them."""
+
+    values: dict[str, list[tuple[Group, Value]]] = field(default_factory=dict)
+    issues: list[Issue] = field(default_factory=list)
+
+
+def issues(spec: Spec) -> list[Issue]:
+    """Everything in a spec that is wrong between its keys."""
+    return [*range_issues(spec.model_dump()), *_resolved(spec.finger).issues]
+
+
+def scene_of(spec: Spec) -> Scene:
+    """The scene that a spec describes. Raises SpecError, without lines, if keys disagree."""
+    if found := issues(spec):
+        place = Place("spec")
+        raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
+    values = _resolved(spec.finger).values
+    return Scene(
+        finger=_finger(spec.finger, values),
+        sources=tuple(_sources(spec.finger, values)),
+        gripper=_gripper(spec),
+        layer_thickness=_given(spec.finger.geometry).get("limiting_layer_thickness_mm"),
+    )
+
+
+def _gripper(spec: Spec) -> Gripper | None:
+    if spec.gripper is None:
+        return None
+    angle = math.radians(spec.gripper.mounting_angle_deg)
+    return Gripper(spec.gripper.base_spacing_mm, angle)
+
+
+def range_issues(data: Any) -> list[Issue]:
+    """Malformed, foreign or overlapping unit ranges of overrides, in data not checked yet."""
+    finger = data.get("finger") if isinstance(data, dict) else None
+    overrides = finger.get("overrides") if isinstance(finger, dict) else None
+    if not isinstance(finger, dict) or not isinstance(overrides, dict):
+        return []
+    n_units = _unit_count(finger.get("units"))
+    found: list[Issue] = []
+    taken: dict[int, str] = {}
+    for text in map(str, overrides):
+        path = ("finger", "overrides", text)
+        units = unit_range(text)
+        if not units or units[0] < 1 or units[-1] > n_units:
+            hint = 'write "4" or "4-5"'
+            found.append(Issue(path, f"units within 1-{n_units}", dotted((text,)), hint))
+        elif overlap := [taken[unit] for unit in units if unit in taken]:
+            expected = "each unit in one override"
+            found.append(Issue(path, expected, f"units also in {dotted((overlap[0],))}"))
+        else:
+            taken.update(dict.fromkeys(units, text))
+    return found
+
+
+def _unit_count(value: object) -> int:
+    """The number of units, the largest allowed one as long as it is not known."""
+    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= MAX_UNITS:
+        return value
+    return MAX_UNITS
+
+
+def unit_range(text: str) -> tuple[int, ...]:
+    """The units that the key of an override names, empty if it names none.
+
+    >>> unit_range("4"), unit_range("4-6"), unit_range("6-4")
+    ((4,), (4, 5, 6), ())
+    """
+    match = UNIT_RANGE.fullmatch(text)
+    if match is None:
+        return ()
+    first = int(match[1])
+    return tuple(range(first, int(match[2] or first) + 1))
+
+
+def _resolved(finger: FingerSpec) -> Resolution:
+    resolution = Resolution()
+    base = _base(finger)
+    resolution.issues += _chamber_issues(finger)
+    groups = [group for group in (base, *_overridden(finger, base)) if group.units]
+    for derivation in DERIVATIONS:
+        chosen = [base] if derivation is SEGMENT_HEIGHT else groups
+        for group in chosen:
+            value = value_of(derivation, group, base)
+            if isinstance(value, Issue):
+                resolution.issues.append(value)
+            else:
+                resolution.values.setdefault(derivation.key, []).append((group, value))
+    return resolution
+
+
+def _base(finger: FingerSpec) -> Group:
+    """The units without an override."""
+    taken = {unit for text in finger.overrides or {} for unit in unit_range(text)}
+    units = tuple(unit for unit in range(1, finger.units + 1) if unit not in taken)
+    dimensions = _given(finger.geometry)
+    if "chamber_width_mm" not in dimensions and "unit_cell_mm" in dimensions:
+        width = geometry.chamber_width(dimensions["unit_cell_mm"])
+        dimensions["chamber_width_mm"] = width
+    return Group(units, finger.calibration, dimensions, _given(finger.lattice))
+
+
+def _overridden(finger: FingerSpec, base: Group) -> Iterator[Group]:
+    for text, override in (finger.overrides or {}).items():
+        dimensions = _given(override and override.geometry)
+        lattice = _given(override and override.lattice)
+        yield Group(
+            unit_range(text),
+            finger.calibration,
+            {**base.geometry, **dimensions},
+            {**base.lattice, **lattice},
+            text,
+            frozenset(dimensions),
+            frozenset(lattice),
+        )
+
+
+def _given(section: Any) -> dict[str, float]:
+    """The values that a section of the spec gives."""
+    return {} if section is None else {k: v for k, v in section if v is not None}
+
+
+def _chamber_issues(finger: FingerSpec) -> Iterator[Issue]:
+    """Contradictions between the widths of the unit cell and of the chamber."""
+    dimensions = _given(finger.geometry)
+    if "unit_cell_mm" not in dimensions:
+        return
+    derived = geometry.chamber_width(dimensions["unit_cell_mm"])
+    rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
+    if derived <= 0:
+        path: KeyPath = ("finger", "geometry", "unit_cell_mm")
+        yield Issue(path, "a length > 2 mm", number(dimensions["unit_cell_mm"]), rule)
+        return
+    given = dimensions.get("chamber_width_mm", derived)
+    if not agree(given, derived):
+        path = ("finger", "geometry", "chamber_width_mm")
+        yield Issue(path, f"{number(derived)} as unit_cell_mm has it", number(given), rule)
+
+
+def _finger(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Finger:
+    columns = {key: _column(spec.units, pairs) for key, pairs in values.items()}
+    return Finger(
+        spec.units,
+        segment_length=columns["segment_length_mm"],
+        segment_height=columns["segment_height_mm"],
+        stroke=columns["stroke_mm"],
+        bistable_stiffness=columns["bistable_stiffness_N_per_mm"],
+        force_linearity=columns["force_linearity"],
+        hinge_stiffness=columns["hinge_stiffness_N_mm_per_rad"],
+        linear_stiffness=np.array([[spec.linear_stiffness_N_per_mm]]),
+    )
+
+
+def _column(n_units: int, pairs: list[tuple[Group, Value]]) -> Array:
+    """Values by unit, shape (units, 1), or (1, 1) where all units share one."""
+    if len({value.value for _, value in pairs}) == 1:
+        return np.array([[pairs[0][1].value]])
+    by_unit = {unit: value.value for group, value in pairs for unit in group.units}
+    return np.array([[by_unit[unit]] for unit in range(1, n_units + 1)])
+
+
+def _sources(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Iterator[Source]:
+    """One source for each key and each set of units that got the same value the same way."""
+    everyone = tuple(range(1, spec.units + 1))
+    for key, pairs in values.items():
+        same: dict[Value, tuple[int, ...]] = {}
+        for group, value in pairs:
+            units = everyone if key == SEGMENT_HEIGHT.key else group.units
+            same[value] = (*same.get(value, ()), *units)
+        for value, units in sorted(same.items(), key=lambda item: min(item[1])):
+            yield Source(key, _ranges(units), *value)
+    key, stiffness = "linear_stiffness_N_per_mm", spec.linear_stiffness_N_per_mm
+    yield Source(key, _ranges(everyone), stiffness, Origin.GIVEN, "as given")
+
+
+def _ranges(units: tuple[int, ...]) -> str:
+    """Units as a spec writes them: `1-3`, `5`, `1-3,5`."""
+    runs: list[list[int]] = []
+    for unit in sorted(units):
+        if runs and unit == runs[-1][-1] + 1:
+            runs[-1][1:] = [unit]
+        else:
+            runs.append([unit])
+    return ",".join("-".join(map(str, run)) for run in runs)

@@ -1,0 +1,291 @@
+"""YAML read safely: plain data, where every key stands, and all problems of form."""
+
+import math
+import os
+import stat
+import sys
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ruamel.yaml import YAML
+from ruamel.yaml.composer import MaxDepthExceededError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.spec.places import (
+    MAX_SHOWN,
+    KeyPath,
+    Place,
+    dotted,
+    in_order,
+    located,
+    shortened,
+    shown,
+)
+
+MAX_BYTES = 256 * 1024
+MAX_NODES = 10_000
+MAX_DEPTH = 20
+
+_TAG = "tag:yaml.org,2002:"
+_MERGE = f"{_TAG}merge"
+_TYPED = frozenset(_TAG + name for name in ("null", "bool", "int", "float"))
+_TEXT = frozenset(_TAG + name for name in ("str", "timestamp", "value", "merge"))
+# What ruamel.yaml is known to let through on malformed input, besides its own errors.
+_LEAKS = (ValueError, LookupError, AttributeError, TypeError, AssertionError, OverflowError)
+
+
+@dataclass(frozen=True)
+class Document:
+    """The data of one YAML file, keys as text, with the place of each key and problems so far."""
+
+    file: str
+    data: dict[str, Any]
+    places: dict[KeyPath, Place]
+    problems: tuple[Problem, ...] = ()
+
+    def place(self, path: KeyPath) -> Place:
+        """Where the key stands, or the nearest section around it."""
+        for length in range(len(path), -1, -1):
+            if place := self.places.get(path[:length]):
+                return place
+        return Place(self.file)
+
+    def problem(self, path: KeyPath, expected: str, found: str, hint: str = "") -> Problem:
+        """A problem with the value at a key path, which may be missing."""
+        return located(self.place(path), dotted(path), expected, found, hint)
+
+
+def read_document(path: str | os.PathLike[str]) -> Document:
+    """Read a YAML file whose top level is a mapping; "-" reads standard input.
+
+    Problems that leave the rest of the file readable (repeated keys, foreign tags) are kept in the
+    document, the others raise SpecError.
+    """
+    name = os.fspath(path)
+    place = Place("<stdin>" if name == "-" else shortened(name, 4096))
+    return parse_document(place.file, _decoded(_content(name, place), place))
+
+
+def parse_document(file: str, text: str) -> Document:
+    """The document in a text; `file` is its name in messages."""
+    walk = _Walk(Place(file))
+    start, data = walk.read(text)
+    if not isinstance(data, dict):
+        wrong = located(start, "document", "a mapping of keys to values", shown(data))
+        raise SpecError(in_order([*walk.problems, wrong]))
+    return Document(file, data, {(): start, **walk.places}, in_order(walk.problems))
+
+
+def parse_value(text: str, place: Place) -> Any:
+    """One value, such as the right side of `--set key=value`, by the rules of the files."""
+    walk = _Walk(place)
+    _, data = walk.read(text)
+    if walk.problems:
+        raise SpecError(in_order(walk.problems))
+    return data
+
+
+def _content(name: str, place: Place) -> bytes:
+    """The bytes of a file, never more than the limit."""
+    try:
+        if name == "-":
+            return _bounded(sys.stdin.buffer, place)
+        status = Path(name).stat()
+        if stat.S_ISREG(status.st_mode) and status.st_size > MAX_BYTES:
+            raise _too_large(place, f"{status.st_size} bytes")
+        with Path(name).open("rb") as stream:
+            return _bounded(stream, place)
+    except IsADirectoryError:
+        raise SpecError((located(place, "file", "a YAML file", "a directory"),)) from None
+    except (OSError, ValueError) as error:
+        found = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
+
+
+def _bounded(stream: BinaryIO, place: Place) -> bytes:
+    content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise _too_large(place, "more")
+    return content
+
+
+def _too_large(place: Place, found: str) -> SpecError:
+    return SpecError((located(place, "file", "at most 256 KiB", found, "a spec is short text"),))
+
+
+def _decoded(content: bytes, place: Place) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = content[: error.start]
+        column = len(before) - (before.rfind(b"\n") + 1) + 1
+        here = Place(place.file, before.count(b"\n") + 1, column)
+        found = f"byte 0x{content[error.start]:02x}"
+        problem = located(here, "file", "text in UTF-8", found, "save the file as UTF-8")
+        raise SpecError((problem,)) from None
+
+
+@dataclass
+class _Walk:
+    """Turns the node graph of one text into plain data; cycles and alias bombs meet its limits."""
+
+    start: Place
+    places: dict[KeyPath, Place] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    n_visited: int = 0
+
+    def __post_init__(self) -> None:
+        self.yaml = YAML(typ="safe", pure=True)
+        self.yaml.max_depth = MAX_DEPTH + 1
+
+    def read(self, text: str) -> tuple[Place, Any]:
+        """Where the text's value starts, and the value; an empty text is None."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            node = self.composed(text)
+            if node is None:
+                return self.at(0, 0), None
+            return self.marked(node), self.value(node)
+
+    def marked(self, node: Node) -> Place:
+        """Where a node starts, if its text has lines of its own."""
+        return self.at(node.start_mark.line, node.start_mark.column)
+
+    def at(self, line: int, column: int) -> Place:
+        """A place in the text from line and column counted from 0."""
+        if self.start.file == "--set":
+            return self.start
+        return Place(self.start.file, line + 1, column + 1)
+
+    def composed(self, text: str) -> Node | None:
+        """The root node of a text, none if it is empty."""
+        try:
+            root: Node | None = self.yaml.compose(text)
+            return root
+        except (MaxDepthExceededError, RecursionError) as error:
+            raise SpecError((self.too_deep(_mark(error)),)) from None
+        except ReaderError as error:
+            raise SpecError((self.unprintable(text, error.position),)) from None
+        except (YAMLError, *_LEAKS) as error:
+            raise SpecError((self.malformed(error),)) from None
+
+    def too_deep(self, mark: Any) -> Problem:
+        place = self.at(mark.line, mark.column) if mark else self.start
+        return located(place, "document", f"at most {MAX_DEPTH} levels", "deeper nesting")
+
+    def unprintable(self, text: str, position: int) -> Problem:
+        before = text[:position]
+        place = self.at(before.count("\n"), position - (before.rfind("\n") + 1))
+        found = ascii(text[position : position + 1])
+        return located(place, "syntax", "printable characters", found)
+
+    def malformed(self, error: Exception) -> Problem:
+        """A syntax error in one line."""
+        mark = _mark(error)
+        place = self.at(mark.line, mark.column) if mark else self.start
+        parts = [getattr(error, "context", None), getattr(error, "problem", None)]
+        said = ", ".join(part for part in parts if part) or str(error) or type(error).__name__
+        return located(place, "syntax", "valid YAML", shortened(" ".join(said.split()), 120))
+
+    def value(self, node: Node, path: KeyPath = (), depth: int = 0) -> Any:
+        """The plain value of a node: dict, list, text, number, truth or None."""
+        self.n_visited += 1
+        if self.n_visited > MAX_NODES:
+            few = located(self.marked(node), dotted(path), f"at most {MAX_NODES} values", "more")
+            raise SpecError((*self.problems, few))
+        if depth > MAX_DEPTH:
+            raise SpecError((*self.problems, self.too_deep(node.start_mark)))
+        if isinstance(node, MappingNode) and node.tag == f"{_TAG}map":
+            return self.mapping(node, path, depth)
+        if isinstance(node, SequenceNode) and node.tag == f"{_TAG}seq":
+            return self.sequence(node, path, depth)
+        return self.scalar(node, path)
+
+    def sequence(self, node: SequenceNode, path: KeyPath, depth: int) -> list[Any]:
+        items = []
+        for index, item in enumerate(node.value):
+            self.places.setdefault((*path, index), self.marked(item))
+            items.append(self.value(item, (*path, index), depth + 1))
+        return items
+
+    def mapping(self, node: MappingNode, path: KeyPath, depth: int) -> dict[str, Any]:
+        """Own keys first, so that they win over merged ones in data and in places."""
+        lines: dict[str, Place] = {}
+        own: dict[str, Any] = {}
+        merged: Node | None = None
+        for key_node, value_node in node.value:
+            key = self.key(key_node, path)
+            if key is None or self.is_repeated(key, key_node, path, lines):
+                continue
+            if key_node.tag == _MERGE:
+                merged = value_node
+                continue
+            self.places.setdefault((*path, key), lines[key])
+            own[key] = self.value(value_node, (*path, key), depth + 1)
+        return own if merged is None else {**self.merged(merged, path, depth + 1), **own}
+
+    def merged(self, node: Node, path: KeyPath, depth: int) -> dict[str, Any]:
+        """The keys that `<<` brings in from one mapping or several, earlier ones winning."""
+        brought: dict[str, Any] = {}
+        for part in node.value if isinstance(node, SequenceNode) else [node]:
+            data = self.value(part, path, depth) if isinstance(part, MappingNode) else None
+            if isinstance(data, dict):
+                brought = {**data, **brought}
+            else:
+                place = self.marked(part)
+                self.wrong(place, (*path, "<<"), "mappings to merge", "something else")
+        return brought
+
+    def key(self, node: Node, path: KeyPath) -> str | None:
+        """A key as text; whole numbers in their plain form, so that 4 and "4" are one key."""
+        name = node.value if isinstance(node.value, str) else ""
+        if node.tag == f"{_TAG}int":
+            number = self.scalar(node, path)
+            name = str(number) if isinstance(number, int) and number < 10**9 else name
+        if not name or not name.isprintable() or len(name) > 10 * MAX_SHOWN:
+            found = shown(name) if name else "something else"
+            self.wrong(self.marked(node), path, "a name as key", found)
+            return None
+        return name
+
+    def is_repeated(self, key: str, node: Node, path: KeyPath, lines: dict[str, Place]) -> bool:
+        place = self.marked(node)
+        if key not in lines:
+            lines[key] = place
+            return False
+        first = lines[key]
+        found = f"it again, first on line {first.line}" if first.line else "it again"
+        self.problems.append(located(place, dotted((*path, key)), "each key once", found))
+        return True
+
+    def scalar(self, node: Node, path: KeyPath) -> Any:
+        """A number, truth, nothing or text; anything else is a foreign tag."""
+        place = self.places.get(path) or self.marked(node)
+        if isinstance(node.value, str) and node.tag in _TEXT:
+            return node.value
+        if not isinstance(node.value, str) or node.tag not in _TYPED:
+            self.wrong(place, path, "plain values", f"the tag {shortened(str(node.tag))}")
+            return None
+        try:
+            number = self.yaml.constructor.construct_object(node)
+        except (YAMLError, *_LEAKS):
+            self.wrong(place, path, f"a value that fits {node.tag}", shown(node.value))
+            return None
+        if isinstance(number, float) and math.isinf(number) and "inf" not in node.value.lower():
+            self.wrong(place, path, "a number below 1e308", shown(node.value))
+        return number
+
+    def wrong(self, place: Place, path: KeyPath, expected: str, found: str) -> None:
+        self.problems.append(located(place, dotted(path), expected, found))
+
+
+def _mark(error: Exception) -> Any:
+    """The place that an error of ruamel.yaml carries, none if it carries none."""
+    if not isinstance(error, MarkedYAMLError):
+        return None
+    return error.problem_mark or error.context_mark

@@ -1,0 +1,155 @@
+"""From the geometry of a molded finger to the constants of its lattice.
+
+Three kinds of rule, told apart because they deserve different trust: *published* ones are
+stated by the study of the reference finger, *inferred* ones are ours and reproduce its published
+numbers, and *finite-element* ones are power laws fitted to a grid of 3-D dome simulations.
+Lengths in mm, moduli in MPa = N/mm^2, stiffness in N/mm or N mm/rad.
+"""
+
+import math
+from dataclasses import dataclass
+
+from dpgcli.mechanics.scene import Origin
+
+WALL_THICKNESS = 1.0
+"""Thickness in mm of each of the two side walls of a unit cell (inferred)."""
+
+FORCE_LINEARITY = 0.043
+"""Published force linearity of the reference dome; kept at other geometries."""
+
+HULL = {"dome_height": (4.5, 7.5), "dome_thickness": (0.5, 1.0)}
+"""Range (mm) of the finite-element grid; beyond it the power laws are extrapolations."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The finger of the study, at which the springs were calibrated: mm, MPa, N/mm, N mm/rad."""
+
+    dome_height: float = 6.5
+    dome_thickness: float = 0.75
+    channel_width: float = 10.0
+    limiting_layer_thickness: float = 1.5
+    unit_separation: float = 3.0
+    elastic_modulus: float = 26.0
+    bistable_stiffness: float = 12.84
+    hinge_stiffness: float = 24.2
+
+
+REFERENCE = Reference()
+
+
+def stroke(dome_height: float, unit_separation: float) -> float:
+    """Opening d = h - s of the inverted dome, in mm. Published.
+
+    >>> stroke(6.5, 3.0)
+    3.5
+    """
+    return dome_height - unit_separation
+
+
+def chamber_width(unit_cell: float) -> float:
+    """Inner width W_c = UC - 2 mm of the chamber: the cell less its two walls. Inferred.
+
+    >>> chamber_width(22.0)
+    20.0
+    """
+    return unit_cell - 2 * WALL_THICKNESS
+
+
+def segment_height(chamber_width: float, limiting_layer_thickness: float) -> float:
+    """Height H = W_c/2 + t_L/2 in mm, from the middle of the layer to the dome axis. Inferred.
+
+    >>> segment_height(20.0, 1.5)
+    10.75
+    """
+    return chamber_width / 2 + limiting_layer_thickness / 2
+
+
+def segment_length(chamber_length: float, dome_thickness: float, unit_separation: float) -> float:
+    """Length L = L_c + 2 t + s of one segment, in mm: chamber, two walls, gap. Inferred.
+
+    >>> segment_length(9.0, 0.75, 3.0)
+    13.5
+    """
+    return chamber_length + 2 * dome_thickness + unit_separation
+
+
+def bistable_stiffness(dome_height: float, dome_thickness: float, elastic_modulus: float) -> float:
+    """Stiffness k_b in N/mm, proportional to E t^2.8 h^-0.25 from 12.84 at the reference.
+
+    The reference number is published. The exponents are from finite elements: the energy of the
+    inverted dome grows as t^2.8 h^1.75 and its opening as h.
+
+    >>> bistable_stiffness(6.5, 0.75, 26.0)
+    12.84
+    """
+    return (
+        REFERENCE.bistable_stiffness
+        * (elastic_modulus / REFERENCE.elastic_modulus)
+        * math.pow(dome_thickness / REFERENCE.dome_thickness, 2.8)
+        * math.pow(dome_height / REFERENCE.dome_height, -0.25)
+    )
+
+
+def hinge_stiffness(
+    elastic_modulus: float,
+    channel_width: float,
+    limiting_layer_thickness: float,
+    unit_separation: float,
+) -> float:
+    """Stiffness k_theta in N mm/rad of one hinge, proportional to E W_ch t_L^3 / s from 24.2.
+
+    The reference number is published. The scaling is inferred: a strip of the limiting layer bent
+    over the gap has E W_ch t_L^3 / (12 s) = 24.4 at the reference. It is no derivation, since
+    finite elements find much of the flexibility in the chamber floor.
+
+    >>> hinge_stiffness(26.0, 10.0, 1.5, 3.0)
+    24.2
+    """
+    return (
+        REFERENCE.hinge_stiffness
+        * (elastic_modulus / REFERENCE.elastic_modulus)
+        * (channel_width / REFERENCE.channel_width)
+        * (limiting_layer_thickness / REFERENCE.limiting_layer_thickness) ** 3
+        * (REFERENCE.unit_separation / unit_separation)
+    )
+
+
+def dome_origin(
+    dome_height: float, dome_thickness: float, elastic_modulus: float = REFERENCE.elastic_modulus
+) -> Origin:
+    """How far to trust the springs of a dome: at the reference, within the grid, or beyond it.
+
+    >>> dome_origin(6.5, 0.75).value, dome_origin(7.5, 0.75).value, dome_origin(8.0, 0.75).value
+    ('calibrated', 'scaled', 'extrapolated')
+    """
+    lowest_height, highest_height = HULL["dome_height"]
+    thinnest, thickest = HULL["dome_thickness"]
+    if not (
+        lowest_height <= dome_height <= highest_height and thinnest <= dome_thickness <= thickest
+    ):
+        return Origin.EXTRAPOLATED
+    dome = (dome_height, dome_thickness, elastic_modulus)
+    reference = (REFERENCE.dome_height, REFERENCE.dome_thickness, REFERENCE.elastic_modulus)
+    return Origin.CALIBRATED if dome == reference else Origin.SCALED
+
+
+def hinge_origin(
+    elastic_modulus: float,
+    channel_width: float,
+    limiting_layer_thickness: float,
+    unit_separation: float,
+) -> Origin:
+    """Calibrated at the reference hinge, scaled anywhere else (no grid bounds the scaling).
+
+    >>> hinge_origin(26.0, 10.0, 1.5, 3.0).value, hinge_origin(26.0, 10.0, 1.5, 4.0).value
+    ('calibrated', 'scaled')
+    """
+    hinge = (elastic_modulus, channel_width, limiting_layer_thickness, unit_separation)
+    reference = (
+        REFERENCE.elastic_modulus,
+        REFERENCE.channel_width,
+        REFERENCE.limiting_layer_thickness,
+        REFERENCE.unit_separation,
+    )
+    return Origin.CALIBRATED if hinge == reference else Origin.SCALED
