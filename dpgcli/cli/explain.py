@@ -40,7 +40,7 @@ def explain(
         PlanFormat, typer.Option("--format", help="How to print the plan")
     ] = PlanFormat.TEXT,
 ) -> None:
-    """Say what a scene contains, what predict will do, and what it leaves out and why."""
+    """Say what predict will do, and leave out, and why."""
     from dpgcli.files.spec import read_spec, scene_of
     from dpgcli.states import plan
 

@@ -48,7 +48,7 @@ def predict(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Predict every stable state of a finger or gripper, each with its certificate."""
+    """Predict and certify every stable state."""
     from dpgcli.files.output import check_writable
     from dpgcli.files.spec import canonical_json, read_spec, scene_of
     from dpgcli.states import predict as states
@@ -140,13 +140,16 @@ def _write(
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
     """States, error and time in one line; where values come from in another."""
+    from dpgcli.states.solve import Status
+
     summary, plan = prediction.summary, prediction.plan
     counts = ", ".join(f"{n:,} {status.text}" for status, n in summary.statuses.items() if n)
-    yield (
-        f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); worst residual "
-        f"{summary.residual:.1e} N, worst tip error {summary.tip_error:.1e} mm (numerical; "
-        "not the model's)"
+    worst = (
+        f"worst residual {summary.residual:.1e} N, worst tip error {summary.tip_error:.1e} mm "
+        "(numerical; not the model's)"
     )
+    worst = worst if summary.statuses[Status.STABLE] else "no stable state"
+    yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); published law, pushing and pulling"

@@ -1,6 +1,7 @@
 """Rows on standard output, as they come: a table for people, CSV and JSON for programs."""
 
 import csv
+import io
 import json
 import math
 import sys
@@ -27,7 +28,14 @@ PRINCIPAL = (
     "residual_N",
     "tip_error_mm",
 )
-ROUNDED = {"residual_N": ".1e", "tip_error_mm": ".1e", "mm": ".6f", "rad": ".6f", "mJ": ".6f"}
+ROUNDED = {
+    "residual_N": ".1e",
+    "tip_error_mm": ".1e",
+    "min_eigenvalue_N_per_mm": ".5f",
+    "mm": ".5f",
+    "rad": ".5f",
+    "mJ": ".5f",
+}
 
 
 class Format(StrEnum):
@@ -111,7 +119,12 @@ def _print_grid(columns: list[Column], rows: list[list[Any]]) -> None:
     from rich.table import Table
 
     interactive = sys.stdout.isatty()
-    table = Table(box=box.SIMPLE_HEAD if interactive else None, pad_edge=False)
+    table = Table(
+        box=box.SIMPLE_HEAD if interactive else None,
+        padding=(0, 1 if interactive else 2, 0, 0),
+        pad_edge=False,
+        show_edge=False,
+    )
     for column in columns:
         name = column.name.replace("_", "_\n") if interactive else column.name
         right = column.kind in (Kind.NUMBER, Kind.FLAG)
@@ -119,9 +132,9 @@ def _print_grid(columns: list[Column], rows: list[list[Any]]) -> None:
     for row in rows:
         table.add_row(*map(_shown, columns, row))
     # never cropped: where the terminal is narrower, its own line wrapping is the lesser evil
-    Console(
-        force_terminal=interactive, no_color=True, width=10_000, highlight=False, soft_wrap=True
-    ).print(table)
+    lines = io.StringIO()
+    Console(file=lines, width=10_000).print(table)
+    print("\n".join(line.rstrip() for line in lines.getvalue().splitlines()))
 
 
 def _shown(column: Column, value: Any) -> str:

@@ -2,7 +2,7 @@
 
 
 def schema() -> None:
-    """Print the JSON Schema of the spec, with which editors complete and check it."""
+    """Print the JSON Schema of the spec, for editors."""
     import json
 
     from dpgcli.files.spec import json_schema

@@ -28,7 +28,7 @@ def validate(
         ProblemFormat, typer.Option("--format", help="How to list problems")
     ] = ProblemFormat.TEXT,
 ) -> None:
-    """Check specs without solving; every problem at once, exit code 2 if there is any."""
+    """Check specs without solving."""
     from dpgcli.errors import SpecError
     from dpgcli.files.spec import read_spec
 

@@ -66,8 +66,8 @@ class Plan:
     """Decisions for one scene and request, and what they cost.
 
     `codes` is None where all states are wanted. `residual_limit` (N) is the largest residual
-    that a stable state may have, of the unit with the largest forces. `bar_flexibility` bounds (mm) how far the
-    flexibility of bars moves the tip: what dropping them costs, or would cost.
+    that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
+    bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
     """
 
     scene: Scene

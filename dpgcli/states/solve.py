@@ -7,7 +7,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags, total
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import forward
 from dpgcli.equilibrium.newton import Equilibrium, minimize
 from dpgcli.mechanics.finger import Finger
@@ -98,6 +98,12 @@ class Units:
     def of(cls, finger: Finger) -> "Units":
         wells = inverted_wells(finger)
         return cls(finger, wells, first_order(finger, wells))
+
+    def designs(self, index: Indices) -> "Units":
+        """One design for each lane, by index, so that designs and patterns share a batch."""
+        return Units(
+            self.finger.designs(index), self.wells.designs(index), self.first_order.designs(index)
+        )
 
 
 def solve(

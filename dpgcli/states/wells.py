@@ -7,11 +7,12 @@ barrier and well, and Newton's method from outside reaches each monotonically. r
 is positive. Our derivation; without the hinge the roots are u = [3β ± √(9β² − 8β)]/(4β).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Internal
@@ -21,7 +22,17 @@ MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
 
 
 @dataclass(frozen=True)
-class Wells:
+class ByDesign:
+    """Arrays of shape (unit or 1, design or 1)."""
+
+    def designs(self, index: Indices) -> Self:
+        """The designs at `index`, in its order; a design may repeat."""
+        arrays = (getattr(self, field.name) for field in fields(self))
+        return type(self)(*(v if v.shape[1] == 1 else np.take(v, index, axis=1) for v in arrays))
+
+
+@dataclass(frozen=True)
+class Wells(ByDesign):
     """The inverted well of each unit, arrays of shape (unit or 1, design).
 
     `exists` says whether there is one; `angle` is its corner angle m (rad), `extension` its
@@ -100,7 +111,7 @@ def _turn_over_sine(turn: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class FirstOrder:
+class FirstOrder(ByDesign):
     """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
 
     `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,

@@ -1,0 +1,99 @@
+"""How fast the kernels are: `pytest -m benchmark`. Nothing here asserts a time.
+
+Compare ratios within one run: states a second, and a map's time over the time that pyarrow
+alone takes to write such a table.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from dpgcli.arrays import keep_freed_memory
+from dpgcli.files.tables import write_states
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.predict import predict
+from dpgcli.states.solve import Status, Units, certify, lanes_at_once, solve, tip
+
+pytestmark = pytest.mark.benchmark
+REFERENCE = {
+    "segment_length": 13.5,
+    "segment_height": 10.75,
+    "stroke": 3.5,
+    "bistable_stiffness": 12.84,
+    "force_linearity": 0.043,
+    "hinge_stiffness": 24.2,
+    "linear_stiffness": 1e4,
+}
+
+
+def varied_designs(n_units: int, n_designs: int) -> Finger:
+    """Graded fingers, every value within 10 % of the reference."""
+    random = np.random.default_rng(1)
+    shared = ("segment_height", "linear_stiffness")
+    shape = {key: (1 if key in shared else n_units, n_designs) for key in REFERENCE}
+    arrays = {k: v * random.uniform(0.9, 1.1, shape[k]) for k, v in REFERENCE.items()}
+    return Finger(n_units, **arrays)
+
+
+def certified(units: Units, inverted: Any, formulation: Any) -> None:
+    batch = solve(units, formulation, inverted, 1e-12)
+    status = certify(batch, units.wells, 1e-12)
+    tip(batch, with_compliance=True)
+    assert (status == Status.STABLE).all()
+
+
+def note_rate(benchmark: Any, n_states: int) -> None:
+    benchmark.extra_info["states_per_second"] = round(n_states / benchmark.stats["median"])
+
+
+def test_all_states_of_many_five_unit_designs(benchmark: Any) -> None:
+    keep_freed_memory()
+    n_designs = lanes_at_once(5) // 32
+    finger = varied_designs(5, n_designs)
+    inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), n_designs)
+    designs = np.repeat(np.arange(n_designs), 32)
+    benchmark(lambda: certified(Units.of(finger).designs(designs), inverted, Chain))
+    note_rate(benchmark, inverted.shape[1])
+
+
+@pytest.mark.parametrize("formulation", [Chain, Lattice])
+def test_states_of_one_five_unit_finger(benchmark: Any, formulation: Any) -> None:
+    keep_freed_memory()
+    units = Units.of(uniform_finger(5, **REFERENCE))
+    inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), lanes_at_once(5) // 32)
+    benchmark(lambda: certified(units, inverted, formulation))
+    note_rate(benchmark, inverted.shape[1])
+
+
+def test_map_of_a_twenty_unit_finger_to_parquet(benchmark: Any, tmp_path: Path) -> None:
+    scene = Scene(uniform_finger(20, **REFERENCE), ())
+    path = tmp_path / "states.parquet"
+    benchmark.pedantic(lambda: write_states(predict(scene), path, "{}"), rounds=5, warmup_rounds=1)
+    note_rate(benchmark, 2**20)
+
+
+def test_floor_of_that_map_pyarrow_alone(benchmark: Any, tmp_path: Path) -> None:
+    path = tmp_path / "states.parquet"
+    write_states(predict(Scene(uniform_finger(20, **REFERENCE), ())), path, "{}")
+    table = pq.read_table(path)
+    floats = [f.name for f in table.schema if str(f.type) == "double"]
+    benchmark.pedantic(
+        lambda: pq.write_table(
+            table,
+            path,
+            compression="zstd",
+            compression_level=3,
+            use_dictionary=["status"],
+            use_byte_stream_split=floats,
+        ),
+        rounds=5,
+        warmup_rounds=1,
+    )
+    note_rate(benchmark, 2**20)

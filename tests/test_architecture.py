@@ -1,0 +1,71 @@
+"""The plan of the house, kept: modules import their own floor or a lower one."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import dpgcli
+
+PACKAGE = Path(dpgcli.__file__).parent
+FLOORS = {
+    "errors": 0,
+    "arrays": 0,
+    "mechanics": 1,
+    "equilibrium": 2,
+    "states": 3,
+    "files": 6,
+    "report": 6,
+    "cli": 7,
+}
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+
+
+def floor(module: str) -> int:
+    """Floor of a dotted module name of the package; the package itself is the ground."""
+    parts = module.split(".")
+    return FLOORS[parts[1]] if len(parts) > 1 else 0
+
+
+def imported(path: Path) -> list[str]:
+    """Every module of the package that a file imports, lazy imports included."""
+    names: list[str] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            is_package = node.module in ("dpgcli", "dpgcli.cli", "dpgcli.states")
+            names += [f"{node.module}.{a.name}" if is_package else node.module for a in node.names]
+    return [name for name in names if name.split(".")[0] == "dpgcli" and "__version__" not in name]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_go_down(path: Path) -> None:
+    own = floor(".".join(("dpgcli", *path.relative_to(PACKAGE).with_suffix("").parts)))
+    above = [name for name in imported(path) if floor(name) > own]
+    assert not above
+
+
+def test_the_solver_knows_no_finger() -> None:
+    known = {name for path in (PACKAGE / "equilibrium").glob("*.py") for name in imported(path)}
+    assert known <= {"dpgcli.arrays", "dpgcli.mechanics.terms", "dpgcli.equilibrium.banded"}
+
+
+@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states"])
+def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
+    for path in (PACKAGE / folder).glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        called = {
+            node.func.id
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        }
+        assert not called & {"print", "open", "exit", "input"}, path
+
+
+def test_no_function_is_longer_than_sixty_lines() -> None:
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                assert node.end_lineno is not None
+                assert node.end_lineno - node.lineno < 60, f"{path}: {node.name}"
