@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from enum import StrEnum
@@ -28,6 +29,7 @@ PRINCIPAL = (
     "residual_N",
     "tip_error_mm",
 )
+DROPPED_FIRST = ("min_eigenvalue_N_per_mm", "residual_N", "tip_error_mm")
 ROUNDED = {
     "residual_N": ".1e",
     "tip_error_mm": ".1e",
@@ -86,14 +88,14 @@ def table_printer(*, principal: bool) -> Printer:
             n_rows += len(block[columns[0].name])
             strays |= bool((block["status"] != 0).any())
             yield block
-        shown = [
-            place
+        shown = {
+            column.name: [_shown(column, row[place]) for row in first]
             for place, column in enumerate(columns)
             if not principal
             or column.name in PRINCIPAL
             or (strays and column.name == "reached_pattern")
-        ]
-        _print_grid([columns[k] for k in shown], [[row[k] for k in shown] for row in first])
+        }
+        _print_grid(columns, shown, may_drop=principal)
         if n_rows > len(first):
             print(
                 f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output",
@@ -113,28 +115,47 @@ def _rows(
     return [list(row) for row in zip(*listed, strict=True)]
 
 
-def _print_grid(columns: list[Column], rows: list[list[Any]]) -> None:
+def _print_grid(
+    columns: tuple[Column, ...], texts: dict[str, list[str]], *, may_drop: bool
+) -> None:
+    """Aligned columns; on a terminal with folded heads, and without some if it is narrow."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     interactive = sys.stdout.isatty()
+    heads = {name: name.replace("_", "_\n") if interactive else name for name in texts}
+    if interactive and may_drop:
+        _drop_to_fit(heads, texts)
     table = Table(
         box=box.SIMPLE_HEAD if interactive else None,
         padding=(0, 1 if interactive else 2, 0, 0),
         pad_edge=False,
         show_edge=False,
     )
-    for column in columns:
-        name = column.name.replace("_", "_\n") if interactive else column.name
-        right = column.kind in (Kind.NUMBER, Kind.FLAG)
-        table.add_column(name, justify="right" if right else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(_shown, columns, row))
-    # never cropped: where the terminal is narrower, its own line wrapping is the lesser evil
+    right = {column.name for column in columns if column.kind in (Kind.NUMBER, Kind.FLAG)}
+    for name, head in heads.items():
+        table.add_column(head, justify="right" if name in right else "left", no_wrap=True)
+    for row in zip(*(texts[name] for name in heads), strict=True):
+        table.add_row(*row)
     lines = io.StringIO()
-    Console(file=lines, width=10_000).print(table)
+    Console(file=lines, width=10_000).print(table)  # never cropped
     print("\n".join(line.rstrip() for line in lines.getvalue().splitlines()))
+
+
+def _drop_to_fit(heads: dict[str, str], texts: dict[str, list[str]]) -> None:
+    """Leave out what a narrow terminal has no room for, and say so."""
+    widths = {
+        name: max(map(len, [*head.split("\n"), *texts[name]])) for name, head in heads.items()
+    }
+    room = shutil.get_terminal_size().columns
+    dropped = []
+    for name in DROPPED_FIRST:
+        if name in heads and sum(widths[n] + 2 for n in heads) - 1 > room:
+            del heads[name]
+            dropped.append(name)
+    if dropped:
+        print(f"no room for {', '.join(dropped)}", file=sys.stderr)
 
 
 def _shown(column: Column, value: Any) -> str:

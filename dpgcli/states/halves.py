@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward
 from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import Evaluation, evaluate
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.solve import (
     Batch,
@@ -132,60 +132,26 @@ class Split:
         own = batch.equilibrium.coordinates[: len(chain.reach)]
         at_own = evaluate(chain, own)
         pose, jacobian = chain.tip(own)
-        whole, outer = (
-            reach(f)[0] for f in (self.units.finger, self._cut(self.n_inner, self.n_units).finger)
-        )
-        joint = None
+        energies, joint = at_own.energies, None
         if not chain.finger.is_rigid:
-            factorization = factorize(at_own.hessian, chain.reach)
-            following = np.zeros_like(own)
-            following[-1] = 1.0
-            backward(factorization, following)
-            moved = total(jacobian * following[:, None])
-            joint = Joint(
-                own[-1],
-                at_own.gradient[-1],
-                factorization.pivots[-1],
-                np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * outer,
-            )
-        solved = reach(batch.formulation.finger)[0]
-        return self._half(
-            batch, status, slice(0, self.n_inner), pose, at_own.energies, whole / solved, joint
-        )
+            beyond = reach(self._cut(self.n_inner, self.n_units).finger)[0]
+            joint = _inner_joint(chain, own, at_own, jacobian, beyond)
+        lever = reach(self.units.finger)[0] / reach(batch.formulation.finger)[0]
+        return self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
 
     def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
         chain = self._cut(self.n_inner, self.n_units)
         coordinates = batch.equilibrium.coordinates
-        own = coordinates[-len(chain.reach) :]
-        pose, jacobian = chain.tip(own)
+        pose, jacobian = chain.tip(coordinates[-len(chain.reach) :])
         energies, joint, held = batch.equilibrium.energies, None, None
         if not chain.finger.is_rigid:
-            before = self._cut(self.n_inner - self.context, self.n_inner)
-            strut = len(before.reach) - 1
-            at_before = evaluate(before, coordinates[: strut + 1])
-            energies = {k: e - at_before.energies[k] for k, e in energies.items()}
-            hold = evaluate(batch.formulation, coordinates).hessian[:, strut]
-            hold[0] -= at_before.hessian[0, strut]
-            pull = batch.equilibrium.gradient[strut] - at_before.gradient[strut]
-            answer = np.zeros_like(coordinates)
-            answer[strut] = 1.0
-            forward(batch.equilibrium.factorization, answer)
-            answer /= batch.equilibrium.factorization.pivots
-            backward(batch.equilibrium.factorization, answer)
-            stiffness = (
-                1.0 / answer[strut] - factorize(at_before.hessian, before.reach).pivots[strut]
-            )
-            moved = total(jacobian * (answer[strut + 1 :] / answer[strut])[:, None])
-            joint = Joint(coordinates[strut], pull, stiffness, np.hypot(moved[0], moved[1]))
-            near = slice(strut + 1, strut + len(hold))
-            held = Held(
-                hold[0],
-                _largest(hold[1:], batch.formulation.force_unit[near]),
-                _largest(hold[1:], batch.formulation.gradient_scale[near]),
-            )
-        return self._half(
-            batch, status, slice(self.context, None), pose, energies, 1.0, joint, held
-        )
+            context = self._cut(self.n_inner - self.context, self.n_inner)
+            at_context = evaluate(context, coordinates[: len(context.reach)])
+            energies = {k: e - at_context.energies[k] for k, e in energies.items()}
+            held = _held(batch, at_context)
+            joint = _outer_joint(batch, context, at_context, jacobian)
+        own = slice(self.context, None)
+        return self._half(batch, status, own, pose, energies, 1.0, joint, held)
 
     def _half(
         self,
@@ -209,6 +175,53 @@ class Split:
             joint,
             held,
         )
+
+
+def _inner_joint(
+    chain: Chain, own: Array, at_own: Evaluation, jacobian: Array, beyond: float
+) -> Joint:
+    """The strut is the last unknown: its pivot is the stiffness left once the rest follows."""
+    factorization = factorize(at_own.hessian, chain.reach)
+    following = np.zeros_like(own)
+    following[-1] = 1.0
+    moved = total(jacobian * backward(factorization, following)[:, None])
+    shift = np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * beyond
+    return Joint(own[-1], at_own.gradient[-1], factorization.pivots[-1], shift)
+
+
+def _outer_joint(batch: Batch, context: Chain, at_context: Evaluation, jacobian: Array) -> Joint:
+    """A unit force on the strut moves context and outer half: what the context takes is known.
+
+    Uses up the context's Hessian.
+    """
+    strut = len(context.reach) - 1
+    equilibrium = batch.equilibrium
+    answer = np.zeros_like(equilibrium.coordinates)
+    answer[strut] = 1.0
+    forward(equilibrium.factorization, answer)
+    answer /= equilibrium.factorization.pivots
+    backward(equilibrium.factorization, answer)
+    of_context = factorize(at_context.hessian, context.reach).pivots[strut]
+    moved = total(jacobian * (answer[strut + 1 :] / answer[strut])[:, None])
+    return Joint(
+        equilibrium.coordinates[strut],
+        equilibrium.gradient[strut] - at_context.gradient[strut],
+        1.0 / answer[strut] - of_context,
+        np.hypot(moved[0], moved[1]),
+    )
+
+
+def _held(batch: Batch, at_context: Evaluation) -> Held:
+    """The strut's column of the Hessian, without what the context adds on the diagonal."""
+    strut = len(at_context.gradient) - 1
+    column = evaluate(batch.formulation, batch.equilibrium.coordinates).hessian[:, strut]
+    on_strut = column[0] - at_context.hessian[0, strut]
+    near = slice(strut + 1, strut + len(column))
+    return Held(
+        on_strut,
+        _largest(column[1:], batch.formulation.force_unit[near]),
+        _largest(column[1:], batch.formulation.gradient_scale[near]),
+    )
 
 
 def _largest(forces: Array, scale: Array) -> Array:

@@ -60,11 +60,8 @@ def inverted_wells(finger: Finger) -> Wells:
     hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
     half_height, hinge, linearity = np.broadcast_arrays(half_height, hinge, finger.force_linearity)
     widest = np.minimum(1.5, (1.0 - 1e-9) / half_height)
-    well, from_above = _root(widest, half_height, hinge, linearity, descending=True)
-    barrier, from_below = _root(
-        np.zeros_like(well), half_height, hinge, linearity, descending=False
-    )
-    exists = from_above & from_below & (barrier < well)
+    (well, barrier), exists = _roots(widest, half_height, hinge, linearity)
+    exists &= barrier < well
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     extension = np.where(exists, well, np.minimum(1.0, widest)) * stroke
     return Wells(
@@ -75,29 +72,30 @@ def inverted_wells(finger: Finger) -> Wells:
     )
 
 
-def _root(
-    start: Array, half_height: Array, hinge: Array, linearity: Array, *, descending: bool
+def _roots(
+    widest: Array, half_height: Array, hinge: Array, linearity: Array
 ) -> tuple[Array, Flags]:
-    """Newton on r from outside its roots; false where the slope shows that there is none."""
-    relative = start.astype(float)
+    """Newton on r from above its roots and from below; false where a slope shows there is none."""
+    relative = np.stack((widest, np.zeros_like(widest)))
+    towards = np.array([1.0, -1.0])[:, None, None]  # the sign of the slope on the way
     beta = 1.0 - linearity
-    exists = np.ones(start.shape, bool)
-    running = exists.copy()
+    exists = np.ones(relative.shape, bool)
+    running = exists
     for _ in range(80):
-        sin = relative * half_height
-        turn = 2.0 * np.arcsin(sin)
-        ratio, slope = _turn_over_sine(turn)
+        turn = 2.0 * np.arcsin(relative * half_height)
+        ratio, ratio_slope = _turn_over_sine(turn)
         value = linearity + beta * (1.0 - relative) * (1.0 - 2.0 * relative) + hinge * ratio
-        slope = beta * (4.0 * relative - 3.0) + hinge * slope * 2.0 * half_height / np.cos(turn / 2)
-        outside = value > 0.0
-        exists &= ~running | ~outside | ((slope > 0.0) == descending) & (slope != 0.0)
-        running &= exists & outside
-        step = np.where(running, -value / np.where(slope == 0.0, 1.0, slope), 0.0)
-        running &= np.abs(step) > 2e-16 * np.abs(relative)
+        stretching = 2.0 * half_height / np.cos(0.5 * turn)
+        slope = beta * (4.0 * relative - 3.0) + hinge * ratio_slope * stretching
+        running = running & (value > 0.0)
+        exists = exists & ~(running & (slope * towards <= 0.0))
+        running = running & exists
+        step = np.where(running, value, 0.0) / np.where(running, slope, 1.0)
+        running = running & (np.abs(step) > 2e-16 * np.abs(relative))
         if not running.any():
             break
-        relative = relative + np.where(running, step, 0.0)
-    return relative, exists
+        relative = relative - step
+    return relative, np.asarray(exists.all(axis=0))
 
 
 def _turn_over_sine(turn: Array) -> tuple[Array, Array]:

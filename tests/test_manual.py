@@ -1,0 +1,92 @@
+"""The README is current: it names everything, and its sessions are what the program prints."""
+
+import inspect
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dpgcli.cli import explain, init, predict, schema, validate
+from dpgcli.cli.exits import ExitCode
+from dpgcli.files.spec import json_schema, read_spec
+from dpgcli.mechanics.scene import Origin
+from dpgcli.states.columns import Group, declared
+from dpgcli.states.solve import Status
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = (predict.predict, explain.explain, validate.validate, init.init, schema.schema)
+LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+
+
+def sessions() -> list[tuple[str, str]]:
+    """Commands of the console blocks with their output."""
+    found = []
+    for block in blocks("console"):
+        for part in block.split("$ ")[1:]:
+            command, _, output = part.partition("\n")
+            found.append((command, output))
+    return found
+
+
+@pytest.mark.parametrize(("command", "expected"), sessions(), ids=lambda text: text[:60])
+def test_a_session_prints_what_the_manual_shows(command: str, expected: str) -> None:
+    program, *arguments = shlex.split(command)
+    assert program == "dpg"
+    run = "from dpgcli.cli.main import main; main()"
+    result = subprocess.run(
+        [sys.executable, "-c", run, *arguments],
+        cwd=ROOT,
+        env={**os.environ, "NO_COLOR": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert LAST_DIGITS.sub("#", result.stdout) == LAST_DIGITS.sub("#", expected)
+
+
+def test_the_spec_shown_is_valid(tmp_path: Path) -> None:
+    path = tmp_path / "spec.yaml"
+    path.write_text(blocks("yaml")[0], encoding="utf-8")
+    assert read_spec(path).finger.units == 5
+
+
+def test_the_example_in_python_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    exec(blocks("python")[-1], {})
+    assert "'101' '111'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.__name__)
+def test_every_command_and_option_is_named(command: object) -> None:
+    name = getattr(command, "__name__", "")
+    assert f"`dpg {name}" in README
+    options = set()
+    for parameter in inspect.signature(command).parameters.values():  # type: ignore[arg-type]
+        for metadata in getattr(parameter.annotation, "__metadata__", ()):
+            options |= {o for o in getattr(metadata, "param_decls", ()) or () if o[:2] == "--"}
+    assert not {option for option in options if option not in README}
+
+
+def test_every_key_of_the_spec_is_named() -> None:
+    definitions = json_schema()["$defs"].values()
+    keys = {key for part in definitions for key in part.get("properties", {})}
+    assert not {key for key in keys if key not in README}
+
+
+def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
+    columns = declared(3, ("bistable", "hinge", "bar"), True)
+    named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
+    named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
+    assert not {name for name in named if f"`{name}" not in README}
+    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}
