@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
 
 
@@ -29,10 +30,13 @@ class Source:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad)."""
+    """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad).
 
-    base_spacing: float
-    mounting_angle: float
+    Numbers, or arrays by state where each state has a gripper of its own.
+    """
+
+    base_spacing: float | Array
+    mounting_angle: float | Array
 
 
 @dataclass(frozen=True)

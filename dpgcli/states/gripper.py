@@ -17,7 +17,7 @@ class Grip(NamedTuple):
     upper: Stations
 
 
-def grip(gripper: Gripper, layer_thickness: float, nodes: Stations) -> Grip:
+def grip(gripper: Gripper, layer_thickness: float | Array, nodes: Stations) -> Grip:
     """Place a finger, whose nodes are given in its own frame, as the upper of two.
 
     The contact surface is the limiting layer's face, half its thickness (mm) inside the B

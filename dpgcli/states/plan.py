@@ -17,6 +17,7 @@ from dpgcli.states.columns import Column, Group, declared, named
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import MOST_SELECTED, select, too_many
+from dpgcli.states.rows import Wanted
 from dpgcli.states.solve import Status, Units, lanes_at_once, reach
 from dpgcli.states.wells import FirstOrder
 
@@ -96,8 +97,16 @@ class Plan:
     def groups(self) -> frozenset[Group]:
         return frozenset(column.group for column in self.columns)
 
-    def formulate(self, finger: Finger) -> Formulation:
-        return FORMULATIONS[self.request.formulation](finger)
+    @property
+    def wanted(self) -> Wanted:
+        """The plan as far as batches of states need it."""
+        return Wanted(
+            FORMULATIONS[self.request.formulation],
+            self.request.tolerance,
+            self.groups,
+            self.scene.gripper,
+            self.scene.layer_thickness or 0.0,
+        )
 
 
 def explain(scene: Scene, request: Request | None = None) -> Plan:

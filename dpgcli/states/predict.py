@@ -8,12 +8,11 @@ import numpy as np
 
 from dpgcli.arrays import Codes, keep_freed_memory
 from dpgcli.mechanics.scene import Scene
-from dpgcli.states.columns import Group
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
-from dpgcli.states.rows import Columns, as_text, batch_columns, state_columns
-from dpgcli.states.solve import States, Status, certify, lanes_at_once, solve, tip
+from dpgcli.states.rows import Columns, as_text, solved_rows, state_columns
+from dpgcli.states.solve import Status, lanes_at_once
 
 
 @dataclass
@@ -117,18 +116,5 @@ def _batches(plan: Plan) -> Iterator[Codes]:
 
 def _solved(plan: Plan, codes: Codes, summary: Summary) -> Columns:
     """Rows of the states with these codes, each solved as a whole finger."""
-    inverted = inverted_units(codes, plan.n_units)
-    batch = solve(plan.units, plan.formulate, inverted, plan.request.tolerance)
     summary.n_finger_solves += len(codes)
-    status = certify(batch, plan.units.wells, plan.request.tolerance)
-    at_tip = tip(batch, with_compliance=Group.STIFFNESS in plan.groups)
-    states = States(
-        inverted,
-        batch.reached,
-        status,
-        at_tip.pose,
-        at_tip.error,
-        batch.equilibrium.energies,
-        batch.equilibrium.residual,
-    )
-    return state_columns(states) | batch_columns(plan.scene, plan.groups, batch, at_tip, status)
+    return solved_rows(plan.units, inverted_units(codes, plan.n_units), plan.wanted)

@@ -1,17 +1,30 @@
 """From certified states to the columns of a table, named as in `columns`."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.formulation import Stations
-from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.formulation import Formulation, Stations
+from dpgcli.mechanics.scene import Gripper
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.gripper import grip
 from dpgcli.states.patterns import texts
-from dpgcli.states.solve import Batch, States, Status, Tip, min_eigenvalues
+from dpgcli.states.solve import (
+    Batch,
+    States,
+    Status,
+    Tip,
+    Units,
+    certify,
+    min_eigenvalues,
+    solve,
+    tip,
+)
 
 Columns = dict[str, NDArray[Any]]
 
@@ -51,10 +64,43 @@ def state_columns(states: States) -> Columns:
     }
 
 
-def batch_columns(
-    scene: Scene, groups: frozenset[Group], batch: Batch, at_tip: Tip, status: NDArray[np.uint8]
-) -> Columns:
+@dataclass(frozen=True)
+class Wanted:
+    """What rows are to hold and how exactly: what `plan` decides for all batches of a scene.
+
+    The gripper's values and the layer's thickness (mm) are numbers, or arrays by lane.
+    """
+
+    formulate: Callable[[Finger], Formulation]
+    tolerance: float
+    groups: frozenset[Group]
+    gripper: Gripper | None = None
+    layer_thickness: float | Array = 0.0
+
+
+def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
+    """Rows of these patterns, (unit, state), each solved and certified as a whole finger.
+
+    The units have one design, or one for each state.
+    """
+    batch = solve(units, wanted.formulate, inverted, wanted.tolerance)
+    status = certify(batch, units.wells, wanted.tolerance)
+    at_tip = tip(batch, with_compliance=Group.STIFFNESS in wanted.groups)
+    states = States(
+        inverted,
+        batch.reached,
+        status,
+        at_tip.pose,
+        at_tip.error,
+        batch.equilibrium.energies,
+        batch.equilibrium.residual,
+    )
+    return state_columns(states) | _batch_columns(wanted, batch, at_tip, status)
+
+
+def _batch_columns(wanted: Wanted, batch: Batch, at_tip: Tip, status: NDArray[np.uint8]) -> Columns:
     """What only a solve of the whole finger knows, for the groups that are wanted."""
+    groups = wanted.groups
     columns: Columns = {}
     if Group.EIGENVALUE in groups:
         columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(batch)
@@ -65,7 +111,7 @@ def batch_columns(
         openings = batch.formulation.openings(coordinates)
         columns |= {f"opening_{i}_mm": x for i, x in enumerate(openings, start=1)}
     if Group.GRIPPER in groups or Group.NODES in groups:
-        columns |= _shape_columns(scene, batch.formulation.stations(coordinates))
+        columns |= _shape_columns(wanted, batch.formulation, coordinates)
     is_state = _is_state(status)
     return {
         name: values & is_state if values.dtype == bool else np.where(is_state, values, np.nan)
@@ -93,13 +139,12 @@ def _stiffness_columns(compliance: Array) -> Columns:
         }
 
 
-def _shape_columns(scene: Scene, stations: Stations) -> Columns:
+def _shape_columns(wanted: Wanted, formulation: Formulation, coordinates: Array) -> Columns:
     """Node positions with the clamped ones, of the finger or of the gripper's two."""
-    nodes = _with_base(stations, float(scene.finger.segment_height[0, 0]))
-    gripper = scene.gripper
-    if gripper is None:
+    nodes = _with_base(formulation.stations(coordinates), formulation.finger.segment_height)
+    if wanted.gripper is None:
         return _node_columns("", nodes, 1.0)
-    gripped = grip(gripper, scene.layer_thickness or 0.0, nodes)
+    gripped = grip(wanted.gripper, wanted.layer_thickness, nodes)
     upper = gripped.upper
     return {
         "aperture_mm": gripped.aperture,
@@ -113,13 +158,11 @@ def _shape_columns(scene: Scene, stations: Stations) -> Columns:
     }
 
 
-def _with_base(stations: Stations, height: float) -> Stations:
-    clamped = (0.0, 0.0, 0.0, height)
+def _with_base(stations: Stations, height: Array) -> Stations:
+    origin = np.zeros_like(stations.base_x[:1])
+    clamped = (origin, origin, origin, origin + height)
     return Stations(
-        *(
-            np.concatenate((np.full_like(rows[:1], value), rows))
-            for rows, value in zip(stations, clamped, strict=True)
-        )
+        *(np.concatenate((row, rows)) for row, rows in zip(clamped, stations, strict=True))
     )
 
 

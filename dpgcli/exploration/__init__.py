@@ -1,0 +1,1 @@
+"""Parameter spaces, executors and sweeps; knows no mechanics."""

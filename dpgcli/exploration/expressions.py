@@ -1,0 +1,149 @@
+"""Expressions over named numbers, evaluated without giving them Python.
+
+`dome_height_mm - unit_separation_mm >= 1 and units < 6`: numbers, names, arithmetic,
+comparisons, `and`, `or`, `not`, and a few functions. Names may be dotted. Arrays go
+through elementwise.
+"""
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+LONGEST = 500
+LARGEST = 1e300
+
+Values = Mapping[str, Any]
+
+_ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: np.divide,
+    ast.Pow: np.float_power,
+    ast.Mod: np.mod,
+}
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+_UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Not: np.logical_not,
+}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "log": np.log,
+    "exp": np.exp,
+    "min": lambda *values: reduce(np.minimum, values),
+    "max": lambda *values: reduce(np.maximum, values),
+}
+
+
+class ExpressionError(ValueError):
+    """The text is no expression of this language; the message says why."""
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A checked expression and the names it needs."""
+
+    text: str
+    names: frozenset[str]
+
+    def __call__(self, values: Values) -> Any:
+        """The value for these names, numbers or arrays; division by zero gives inf or NaN."""
+        with np.errstate(all="ignore"):
+            return _value(ast.parse(self.text, mode="eval").body, values)
+
+
+def expression(text: str) -> Expression:
+    """Check a text once.
+
+    >>> rule = expression("2 < a.b <= 4 and not c > 1")
+    >>> sorted(rule.names), bool(rule({"a.b": 3, "c": 0}))
+    (['a.b', 'c'], True)
+
+    Raises ExpressionError for anything but the language above.
+    """
+    if len(text) > LONGEST:
+        raise ExpressionError(f"longer than {LONGEST} characters")
+    try:
+        body = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ExpressionError(f"not an expression: {text!r}") from error
+    return Expression(text.strip(), frozenset(_names(body)))
+
+
+def _names(node: ast.expr) -> list[str]:
+    """Names in an expression; refuses every node that is not in the language."""
+    if (number := _number(node)) is not None:
+        if not abs(number) < LARGEST:
+            raise ExpressionError("a number beyond double precision")
+        return []
+    if name := _dotted(node):
+        return [name]
+    return [name for part in _parts(node) for name in _names(part)]
+
+
+def _parts(node: ast.expr) -> list[ast.expr]:
+    """Operands of a node of the language."""
+    if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC:
+        return [node.left, node.right]
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+        return [node.operand]
+    if isinstance(node, ast.BoolOp):
+        return node.values
+    if isinstance(node, ast.Compare) and all(type(op) in _COMPARISONS for op in node.ops):
+        return [node.left, *node.comparators]
+    if isinstance(node, ast.Call) and not node.keywords and isinstance(node.func, ast.Name):
+        if node.func.id in _FUNCTIONS and node.args:
+            return node.args
+        raise ExpressionError(f"unknown function {node.func.id}; known: {', '.join(_FUNCTIONS)}")
+    raise ExpressionError(f"not allowed here: {ast.unparse(node)[:40]}")
+
+
+def _number(node: ast.expr) -> int | float | None:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return None if isinstance(node.value, bool) else node.value
+    return None
+
+
+def _dotted(node: ast.expr) -> str:
+    """A name, its parts joined by dots; empty if the node is none."""
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        parent = _dotted(node.value)
+        return f"{parent}.{node.attr}" if parent else ""
+    return ""
+
+
+def _value(node: ast.expr, values: Values) -> Any:
+    if (number := _number(node)) is not None:
+        return float(number)
+    if name := _dotted(node):
+        return values[name]
+    parts = [_value(part, values) for part in _parts(node)]
+    if isinstance(node, ast.BinOp):
+        return _ARITHMETIC[type(node.op)](*parts)
+    if isinstance(node, ast.UnaryOp):
+        return _UNARY[type(node.op)](*parts)
+    if isinstance(node, ast.BoolOp):
+        joined = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
+        return reduce(joined, parts)
+    if isinstance(node, ast.Compare):
+        pairs = zip(node.ops, parts[:-1], parts[1:], strict=True)
+        return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
+    assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name), "checked before"
+    return _FUNCTIONS[node.func.id](*parts)
