@@ -17,7 +17,8 @@ FLOORS = {
     "exploration": 5,
     "files": 6,
     "report": 6,
-    "cli": 7,
+    "studies": 7,
+    "cli": 8,
 }
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 

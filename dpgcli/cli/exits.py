@@ -1,16 +1,17 @@
 """How a command ends: exit codes, and what becomes of each kind of error."""
 
 import functools
-import os
 import signal
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from enum import IntEnum
 from typing import NoReturn, ParamSpec
 
 import typer
 
+from dpgcli.cli.streams import discard, open_streams, say
 from dpgcli.errors import NothingSelectedError, OutputError, SpecError, UsageError
 
 P = ParamSpec("P")
@@ -28,7 +29,7 @@ class ExitCode(IntEnum):
 
 
 class Terminated(BaseException):
-    """SIGTERM, raised so that half-written files are cleaned up on the way out."""
+    """SIGTERM or SIGHUP, raised so that half-written files are cleaned up on the way out."""
 
 
 def command(function: Callable[P, None]) -> Callable[P, None]:
@@ -36,7 +37,6 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
     @functools.wraps(function)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        signal.signal(signal.SIGTERM, _terminate)
         try:
             function(*args, **kwargs)
             sys.stdout.flush()
@@ -50,7 +50,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))
         except BrokenPipeError:  # the reader, such as head, has had enough
-            _discard_output()
+            discard(sys.stdout)
             raise typer.Exit(ExitCode.DONE) from None
         except KeyboardInterrupt:
             fail(ExitCode.INTERRUPTED, "interrupted; nothing half-written is left")
@@ -58,8 +58,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             fail(ExitCode.TERMINATED, "terminated; nothing half-written is left")
         except OSError as error:
             if error.filename is None:  # what is left without a name is standard output
-                _discard_output()
-                fail(ExitCode.USAGE, f"cannot write the output: {error.strerror}")
+                fail(_no_output(error), "")
             _internal_error()
         except Exception:
             _internal_error()
@@ -70,19 +69,58 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 def fail(code: ExitCode, message: str) -> NoReturn:
     """Say why on standard error and end."""
     for line in message.splitlines():
-        print(line if ": expected " in line else f"dpg: {line}", file=sys.stderr)
+        say(line if ": expected " in line else f"dpg: {line}")
     raise typer.Exit(code)
+
+
+def run_and_exit(app: Callable[..., object]) -> NoReturn:
+    """Run the program and exit with its code, whatever state the streams are in."""
+    open_streams()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _terminate)
+    code = _code_of(app)
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        discard(sys.stdout)
+    except OSError as error:
+        code = _no_output(error)
+    with suppress(OSError):
+        sys.stderr.flush()
+        sys.exit(code)
+    discard(sys.stderr)
+    sys.exit(code)
+
+
+def _code_of(app: Callable[..., object]) -> int:
+    """The exit code of a run; what typer itself meets (usage, help, a closed pipe) included."""
+    try:
+        code = app(standalone_mode=False)
+    except typer.TyperException as error:
+        with suppress(OSError):
+            getattr(error, "show", traceback.print_exc)()
+        return error.exit_code
+    except SystemExit:  # typer's way to end when nobody reads its help
+        discard(sys.stdout)
+        return ExitCode.DONE
+    except OSError as error:
+        return _no_output(error)
+    except (KeyboardInterrupt, typer.Abort):
+        return ExitCode.INTERRUPTED
+    return code if isinstance(code, int) else ExitCode.DONE
+
+
+def _no_output(error: OSError) -> ExitCode:
+    discard(sys.stdout)
+    say(f"dpg: cannot write the output: {error.strerror}")
+    return ExitCode.USAGE
 
 
 def _terminate(*_: object) -> NoReturn:
     raise Terminated
 
 
-def _discard_output() -> None:
-    """Keep the interpreter from flushing into a closed pipe on its way out."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _internal_error() -> NoReturn:
-    traceback.print_exc()
+    with suppress(OSError):
+        traceback.print_exc()
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")

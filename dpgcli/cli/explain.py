@@ -56,6 +56,8 @@ def explain(
 
 def facts(plan: "Plan") -> dict[str, Any]:
     """The plan as plain values, units in the names."""
+    from dpgcli.files.spec import spelled
+
     return {
         "n_units": plan.n_units,
         "n_states": plan.n_states,
@@ -73,7 +75,13 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "expected_seconds": plan.expected_seconds,
         "expected_bytes": plan.expected_bytes,
         "sources": [
-            {"key": s.key, "units": s.units, "value": s.value, "origin": s.origin, "rule": s.rule}
+            {
+                "key": s.key,
+                "units": s.units,
+                "value": spelled(s.value),
+                "origin": s.origin,
+                "rule": s.rule,
+            }
             for s in plan.scene.sources
         ],
     }

@@ -13,6 +13,7 @@ def init(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file")] = False,
 ) -> None:
     """Write a commented spec to start from."""
+    import os
     import sys
 
     from dpgcli.errors import OutputError
@@ -22,7 +23,7 @@ def init(
     if path == Path("-"):
         sys.stdout.write(starter())
         return
-    if path.exists() and not force:
+    if os.path.lexists(path) and not force:
         raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
     with whole_file(path) as temporary:
         temporary.write_text(starter(), encoding="utf-8")

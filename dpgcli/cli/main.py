@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from dpgcli import __version__
-from dpgcli.cli import explain, init, predict, schema, validate
-from dpgcli.cli.exits import command
+from dpgcli.cli import explain, init, predict, schema, sweep, validate
+from dpgcli.cli.exits import command, run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
 for _library in ("OPENBLAS", "MKL", "OMP"):
@@ -26,6 +26,7 @@ app = typer.Typer(
 for _function in (
     predict.predict,
     explain.explain,
+    sweep.sweep,
     validate.validate,
     init.init,
     schema.schema,
@@ -50,4 +51,4 @@ def options(
 
 def main() -> None:
     """Run the program."""
-    app()
+    run_and_exit(app)

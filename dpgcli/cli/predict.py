@@ -21,6 +21,7 @@ from dpgcli.cli.options import (
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, Printer, print_csv, print_json, table_printer
+from dpgcli.cli.streams import patient_output, say
 
 if TYPE_CHECKING:
     from dpgcli.mechanics.scene import Scene
@@ -49,7 +50,6 @@ def predict(
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
-    from dpgcli.files.output import check_writable
     from dpgcli.files.spec import canonical_json, read_spec, scene_of
     from dpgcli.states import predict as states
 
@@ -59,9 +59,7 @@ def predict(
     prediction = states.predict(scene, request)
     if plot is not None:
         _check_plot(plot, prediction.plan.n_states)
-    for path in (output, plot):
-        if path is not None:
-            check_writable(path)
+    _check_outputs(spec, output, plot)
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
         principal = columns == "default" and not nodes
@@ -70,12 +68,13 @@ def predict(
         for _ in rows:
             pass
     else:
-        _write(prediction, output, canonical_json(checked), rows)
+        with patient_output():
+            _write(prediction, output, canonical_json(checked), rows)
     if plot is not None:
         _draw(scene, request.patterns, plot)
     if not quiet:
         sys.stdout.flush()
-        print(*_summary(prediction), sep="\n", file=sys.stderr)
+        say("\n".join(_summary(prediction)))
 
 
 def _printer(printed_as: Format, principal: bool) -> Printer:
@@ -111,6 +110,35 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
         print("\r" + " " * 60, end="\r", file=sys.stderr, flush=True)
 
 
+def _check_outputs(spec: Path, output: Path | None, plot: Path | None) -> None:
+    """Before any work: files that can be written, under names that are not taken."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.output import check_writable
+
+    written = [path for path in (output, plot) if path is not None]
+    for path in written:
+        check_writable(path)
+    if output is not None:
+        written.append(_run_file(output))
+        check_writable(written[-1])
+    for path in written:
+        if path.exists() and spec.exists() and path.samefile(spec):
+            raise UsageError(f"{path} is the spec itself: give another name")
+    if len({path.resolve() for path in written}) < len(written):
+        raise UsageError(f"--output {output} and --plot {plot}: expected two names")
+    if output is not None and output.suffix.lower() in (".csv", ".json", ".svg", ".png"):
+        raise UsageError(
+            f"--output {output}: writes Parquet; for {output.suffix} use --format with > FILE, "
+            "or --plot for figures"
+        )
+
+
+def _run_file(output: Path) -> Path:
+    """What differs between runs stands beside the table: states.parquet, states.run.json."""
+    stem = output.stem if output.suffix == ".parquet" else output.name
+    return output.with_name(f"{stem}.run.json")
+
+
 def _write(
     prediction: "Prediction", output: Path, spec_json: str, rows: Iterable["Columns"]
 ) -> None:
@@ -121,7 +149,7 @@ def _write(
     write_states(prediction, output, spec_json, rows)
     summary = prediction.summary
     write_run(
-        output.with_suffix(".run.json"),
+        _run_file(output),
         {
             "table": output.name,
             "states": {status.text: n for status, n in summary.statuses.items()},
@@ -165,7 +193,7 @@ def _check_plot(path: Path, n_states: int) -> None:
 
     from dpgcli.errors import UsageError
 
-    if path.suffix not in (".svg", ".png"):
+    if path.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
     if n_states > ROWS_SHOWN:
         raise UsageError(

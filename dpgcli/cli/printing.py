@@ -139,7 +139,8 @@ def _print_grid(
     for row in zip(*(texts[name] for name in heads), strict=True):
         table.add_row(*row)
     lines = io.StringIO()
-    Console(file=lines, width=10_000).print(table)  # never cropped
+    plain = Console(file=lines, width=10_000, color_system=None, force_terminal=False)
+    plain.print(table)  # never cropped
     print("\n".join(line.rstrip() for line in lines.getvalue().splitlines()))
 
 

@@ -1,5 +1,7 @@
 """`dpg validate`: check specs without solving."""
 
+import sys
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -41,11 +43,9 @@ def validate(
         else:
             if listed_as is ProblemFormat.TEXT:
                 print(f"{path}: ok")
-    {
-        ProblemFormat.TEXT: _print_text,
-        ProblemFormat.JSON: _print_json,
-        ProblemFormat.GITHUB: _print_github,
-    }[listed_as](problems)
+    with suppress(BrokenPipeError):  # the verdict stands when nobody reads on
+        _PRINTERS[listed_as](problems)
+        sys.stdout.flush()
     if problems:
         raise typer.Exit(ExitCode.USAGE)
 
@@ -73,6 +73,13 @@ def _print_github(problems: list[Problem]) -> None:
         print(f"::error {place}::{_escaped(str(problem))}")
     if len(problems) > MOST_ANNOTATIONS:
         print(f"::error ::and {len(problems) - MOST_ANNOTATIONS} more problems")
+
+
+_PRINTERS = {
+    ProblemFormat.TEXT: _print_text,
+    ProblemFormat.JSON: _print_json,
+    ProblemFormat.GITHUB: _print_github,
+}
 
 
 def _escaped(text: str, also: str = "") -> str:

@@ -16,8 +16,9 @@ from dpgcli.mechanics.terms import Evaluation, Potential, evaluate
 
 SUFFICIENT_DECREASE = 1e-4
 SMALLEST_FRACTION = 2.0**-40  # of a step; below it a lane has stalled
-SETTLED = 1e-6  # of the step cap: Newton's next step is then at rounding
+SETTLED = 1e-6  # of the step cap: the next step of a regular minimum is then at rounding
 LEFT_BEHIND = 0.25  # finished share of a batch from which on it is worth leaving
+PIVOT_ROUNDING = 32 * np.finfo(float).eps  # of the diagonal it came from
 ROUNDING = 64 * np.finfo(float).eps  # of the energies added up
 
 
@@ -26,9 +27,9 @@ class Equilibrium:
     """Where each lane stopped, evaluated and factorized there.
 
     `residual` is the max-norm of the gradient as a force, N; `relative_residual` the same
-    over the forces in play; `curvature` the smallest pivot over its own diagonal entry,
-    positive where the Hessian is positive definite. Shapes (batch,) but for
-    `coordinates` and `gradient`, (size, batch).
+    over the forces in play; `curvature` the smallest pivot over the stiffness it is measured
+    by, positive where the Hessian is positive definite and no pivot's sign in doubt. Shapes
+    (batch,) but for `coordinates` and `gradient`, (size, batch).
     """
 
     coordinates: Array
@@ -41,6 +42,7 @@ class Equilibrium:
     iterations: Indices
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # a lane's own trouble
 def minimize(
     potential: Potential, guess: Array, tolerance: float, max_iterations: int = 200
 ) -> Equilibrium:
@@ -61,6 +63,8 @@ def minimize(
         newly = walk.look(evaluation, tolerance)
         iterations[lanes[newly]] = count
         if walk.finished.all():
+            if len(lanes) == n_lanes and walk.accepted.all():
+                return _equilibrium(potential, walk.here, evaluation, iterations)
             break
         if walk.finished.mean() > LEFT_BEHIND:
             final[:, lanes] = walk.here
@@ -68,8 +72,6 @@ def minimize(
             lanes = lanes[keep]
             walk, evaluation = walk.only(keep), _only(evaluation, keep)
         walk.step_from(evaluation)
-    if len(lanes) == n_lanes and walk.accepted.all():
-        return _equilibrium(potential, walk.here, evaluation, iterations)
     final[:, lanes] = walk.here
     return _equilibrium(potential, final, evaluate(potential, final), iterations)
 
@@ -187,6 +189,13 @@ def _equilibrium(
         factorization,
         residual=_largest(gradient, potential.force_unit),
         relative_residual=_relative_residual(potential, gradient),
-        curvature=np.min(factorization.pivots / np.abs(diagonal), axis=0),
+        curvature=_curvature(factorization.pivots, diagonal, potential.stiffness_scale),
         iterations=iterations,
     )
+
+
+def _curvature(pivots: Array, diagonal: Array, scale: Array) -> Array:
+    """Smallest pivot over its scale; zero at best where rounding may have made its sign."""
+    certain = pivots > PIVOT_ROUNDING * np.abs(diagonal)
+    curvature = np.min(pivots / scale, axis=0)
+    return np.asarray(np.where(certain.all(axis=0), curvature, np.minimum(curvature, 0.0)))

@@ -42,12 +42,22 @@ def check_writable(path: Path) -> None:
 
 
 def _beside(path: Path) -> Path:
-    """An empty file in the same folder, with the permissions a new file gets."""
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-    mask = os.umask(0)
-    os.umask(mask)
-    os.fchmod(handle, 0o666 & ~mask)
-    os.close(handle)
+    """An empty file in the same folder, with the permissions a new file gets.
+
+    Renaming over a device or pipe would replace it, /dev/null for the whole machine.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(None, "is a device or pipe, not a file")
+    handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".tmp", dir=path.parent)
+    try:
+        mask = os.umask(0)
+        os.umask(mask)
+        os.fchmod(handle, 0o666 & ~mask)
+    except BaseException:
+        Path(name).unlink()
+        raise
+    finally:
+        os.close(handle)
     return Path(name)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dpgcli import __version__
 from dpgcli.files.output import whole_file
+from dpgcli.files.spec import spelled
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
@@ -23,10 +24,13 @@ from dpgcli.states.rows import Columns
 from dpgcli.states.solve import Status
 
 SCHEMA_VERSION = 1
+REPETITIVE = (Kind.STATUS, Kind.TEXT)
 ROWS_PER_GROUP = 2**17
 TYPES = {
     Kind.PATTERN: pa.string(),
     Kind.STATUS: pa.string(),
+    Kind.TEXT: pa.string(),
+    Kind.COUNT: pa.int64(),
     Kind.NUMBER: pa.float64(),
     Kind.FLAG: pa.bool_(),
 }
@@ -55,29 +59,53 @@ def schema(columns: tuple[Column, ...]) -> Any:
 def write_states(
     prediction: Prediction, path: Path, spec_json: str, blocks: Iterable[Columns] | None = None
 ) -> None:
-    """Write all rows, as they come; the same input gives the same bytes.
-
-    Raises OutputError, and leaves no half-written file whatever happens.
-    """
+    """Write all states of a prediction, as they come; see `write_table`."""
     columns = prediction.plan.columns
+    rows = prediction.blocks() if blocks is None else blocks
+    batches = (record_batch(columns, block) for block in rows)
+    write_table(path, columns, batches, _metadata(prediction.plan, spec_json))
+
+
+def write_table(
+    path: Path, columns: tuple[Column, ...], batches: Iterable[Any], metadata: dict[str, str]
+) -> None:
+    """Write record batches, as they come, to a Parquet file.
+
+    The same rows give the same bytes, however they are cut into batches. Raises OutputError,
+    and leaves no half-written file whatever happens.
+    """
     digest = hashlib.sha256()
-    described = schema(columns).with_metadata(_metadata(prediction.plan, spec_json))
     with (
         whole_file(path) as temporary,
+        temporary.open("wb") as stream,  # pyarrow takes no name that is not text
         pq.ParquetWriter(
-            temporary,
-            described,
+            stream,
+            schema(columns).with_metadata(metadata),
             compression="zstd",
             compression_level=3,
-            use_dictionary=[c.name for c in columns if c.kind is Kind.STATUS],
+            use_dictionary=[c.name for c in columns if c.kind in REPETITIVE],
             use_byte_stream_split=[c.name for c in columns if c.kind is Kind.NUMBER],
         ) as writer,
     ):
-        for rows in _row_groups(prediction.blocks() if blocks is None else blocks):
-            for column in columns:
-                digest.update(rows[column.name].tobytes())
-            writer.write_batch(record_batch(columns, rows), row_group_size=ROWS_PER_GROUP)
+        for group in _row_groups(batches, schema(columns)):
+            for column in group.columns:
+                _hash(digest, column)
+            writer.write_batch(group, row_group_size=ROWS_PER_GROUP)
         writer.add_key_value_metadata({"dpg.content_sha256": digest.hexdigest()})
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """The metadata of a table; empty if there is none to read."""
+    try:
+        found = pq.read_metadata(path).metadata or {}
+    except (OSError, pa.ArrowInvalid):
+        return {}
+    return {key.decode(): value.decode() for key, value in found.items()}
+
+
+def versions() -> str:
+    """Versions of what makes the numbers and the files, as JSON."""
+    return json.dumps({"dpg": __version__, "numpy": np.__version__, "pyarrow": pa.__version__})
 
 
 def write_run(path: Path, facts: dict[str, Any]) -> None:
@@ -98,50 +126,70 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
         "dpg.tolerance": repr(request.tolerance),
         "dpg.law": "published: the spring pushes and pulls",
         "dpg.sources": json.dumps(
-            [[s.key, s.units, s.value, s.origin, s.rule] for s in plan.scene.sources]
+            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),
-        "dpg.versions": json.dumps(
-            {"dpg": __version__, "numpy": np.__version__, "pyarrow": pa.__version__}
-        ),
+        "dpg.versions": versions(),
     }
 
 
-def _row_groups(blocks: Iterable[Columns]) -> Iterator[Columns]:
-    """Blocks gathered to row groups; small groups cost time and space."""
-    waiting: list[Columns] = []
+def _row_groups(batches: Iterable[Any], described: Any) -> Iterator[Any]:
+    """Batches joined and cut to row groups of one size; small groups cost time and space."""
+    waiting: list[Any] = []
     n_waiting = 0
-    for block in blocks:
-        waiting.append(block)
-        n_waiting += len(block["pattern"])
-        if n_waiting >= ROWS_PER_GROUP:
-            yield _concatenated(waiting)
-            waiting, n_waiting = [], 0
-    if waiting:
-        yield _concatenated(waiting)
+    for batch in batches:
+        waiting.append(batch)
+        n_waiting += batch.num_rows
+        while n_waiting >= ROWS_PER_GROUP:
+            joined = pa.Table.from_batches(waiting, described)
+            yield _one_batch(joined.slice(0, ROWS_PER_GROUP), described)
+            waiting = joined.slice(ROWS_PER_GROUP).to_batches()
+            n_waiting -= ROWS_PER_GROUP
+    yield _one_batch(pa.Table.from_batches(waiting, described), described)
 
 
-def _concatenated(blocks: list[Columns]) -> Columns:
-    if len(blocks) == 1:
-        return blocks[0]
-    return {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
+def _one_batch(table: Any, described: Any) -> Any:
+    batches = table.combine_chunks().to_batches()
+    return batches[0] if batches else pa.RecordBatch.from_pylist([], schema=described)
+
+
+def _hash(digest: Any, column: Any) -> None:
+    """Feed values, not their layout: what stands before a slice or after it does not count."""
+    buffers, start, stop = column.buffers(), column.offset, column.offset + len(column)
+    if pa.types.is_string(column.type):
+        ends = np.frombuffer(buffers[1], np.int32)[start : stop + 1]
+        digest.update(np.diff(ends).tobytes())
+        digest.update(memoryview(buffers[2])[ends[0] : ends[-1]] if len(column) else b"")
+    elif pa.types.is_boolean(column.type):
+        bits = np.unpackbits(np.frombuffer(buffers[1], np.uint8), bitorder="little")
+        digest.update(bits[start:stop].tobytes())
+    else:
+        digest.update(np.frombuffer(buffers[1], np.uint64)[start:stop].tobytes())
 
 
 def _array(column: Column, values: NDArray[Any]) -> Any:
     if column.kind is Kind.PATTERN:
         return _strings(values)
+    if column.kind is Kind.TEXT:
+        return _strings(np.char.encode(values, "utf-8"))
     if column.kind is Kind.STATUS:
         return _statuses(values)
     if column.kind is Kind.FLAG:
         bits = np.packbits(values, bitorder="little")
         return pa.Array.from_buffers(pa.bool_(), len(values), [None, pa.py_buffer(bits)])
-    buffer = pa.py_buffer(np.ascontiguousarray(values))
-    return pa.Array.from_buffers(pa.float64(), len(values), [None, buffer])
+    dtype = np.int64 if column.kind is Kind.COUNT else np.float64
+    buffer = pa.py_buffer(np.ascontiguousarray(values, dtype))
+    return pa.Array.from_buffers(TYPES[column.kind], len(values), [None, buffer])
 
 
 def _strings(values: NDArray[Any]) -> Any:
-    """Byte strings of one length as text."""
+    """Byte strings, padded to one length in the array, as text."""
+    content = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), -1)
     ends = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.itemsize)
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(np.ascontiguousarray(values))]
+    if not content.all():  # the padding is zeros
+        lengths = np.char.str_len(values)
+        ends = np.concatenate(([0], np.cumsum(lengths))).astype(np.int32)
+        content = content[np.arange(content.shape[1]) < lengths[:, None]]
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(content)]
     return pa.Array.from_buffers(pa.string(), len(values), buffers)
 
 

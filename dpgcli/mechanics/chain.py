@@ -20,7 +20,7 @@ import numpy as np
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal, Stations
+from dpgcli.mechanics.formulation import Internal, Springs, Stations
 from dpgcli.mechanics.terms import Term
 
 
@@ -231,6 +231,13 @@ class Chain:
         return self._rowwise(shared, scale * self.finger.segment_height)
 
     @cached_property
+    def stiffness_scale(self) -> Array:
+        finger = self.finger
+        soft = finger.force_scale / finger.stroke
+        stiff = soft if finger.is_rigid else soft + finger.linear_stiffness
+        return self._rowwise(stiff, soft * finger.segment_height**2)
+
+    @cached_property
     def step_cap(self) -> Array:
         stroke = 0.2 * self.finger.stroke
         return self._rowwise(stroke, np.minimum(stroke / self.finger.segment_height, 0.3))
@@ -251,11 +258,14 @@ class Chain:
         return coordinates.reshape(-1, batch)
 
     def openings(self, coordinates: Array) -> Array:
-        return cells(self.finger, coordinates).extension
+        return self.springs(coordinates).extension
 
-    def largest_angle(self, coordinates: Array) -> Array:
+    def springs(self, coordinates: Array) -> Springs:
+        cell = cells(self.finger, coordinates)
         _, near, far, _ = internal(coordinates, self.finger.is_rigid)
-        return np.asarray(np.maximum(np.abs(near), np.abs(far)).max(axis=0))
+        turned = np.maximum(np.abs(near), np.abs(far)).max(axis=0)
+        ahead = np.minimum(cell.along_near, cell.along_far).min(axis=0)
+        return Springs(cell.extension, np.asarray((turned >= 0.5 * np.pi) | (ahead <= 0.0)))
 
     def stations(self, coordinates: Array) -> Stations:
         pose = _pose(self.finger, coordinates)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Potential
 
@@ -18,6 +18,17 @@ class Internal(NamedTuple):
     near_angle: Array
     far_angle: Array
     strut: Array
+
+
+class Springs(NamedTuple):
+    """Extension x (mm) of every bistable spring, (unit, batch), and what is no finger, (batch,).
+
+    Folded through is a unit with a corner turned by 90° or more, or whose strut's opening
+    would shorten the spring: minima of the equations, but struts and dome would have crossed.
+    """
+
+    extension: Array
+    is_folded: Flags
 
 
 class Stations(NamedTuple):
@@ -43,8 +54,8 @@ class Formulation(Potential, Protocol):
     def openings(self, coordinates: Array) -> Array:
         """Extension x of every bistable spring, mm, (unit, batch)."""
 
-    def largest_angle(self, coordinates: Array) -> Array:
-        """Largest magnitude of a corner angle, rad, (batch,); π/2 and more is folded through."""
+    def springs(self, coordinates: Array) -> Springs:
+        """Extensions, and whether any unit is folded through."""
 
     def stations(self, coordinates: Array) -> Stations:
         """All node positions but the clamped ones, each (unit, batch)."""

@@ -21,7 +21,7 @@ from dpgcli.arrays import Array, Indices, total
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal, Stations
+from dpgcli.mechanics.formulation import Internal, Springs, Stations
 from dpgcli.mechanics.terms import Term
 
 FINEST_TOLERANCE = 1e-12  # the relative residual that `Lattice.gradient_scale` keeps in reach
@@ -295,6 +295,11 @@ class Lattice:
         return self._rowwise(shared + self.rounding_floor / FINEST_TOLERANCE)
 
     @cached_property
+    def stiffness_scale(self) -> Array:
+        """Of the springs and hinges, k_b + k_θ/H²: what a soft direction is measured by."""
+        return self._rowwise(self.finger.force_scale / self.finger.stroke)
+
+    @cached_property
     def step_cap(self) -> Array:
         """What a turn of the whole finger by 0.2 d/H, at most 0.3 rad, moves a node by."""
         turn = np.minimum(0.2 * self.finger.stroke / self.finger.segment_height, 0.3)
@@ -322,12 +327,15 @@ class Lattice:
         return nodes.reshape(-1, nodes.shape[2])
 
     def openings(self, coordinates: Array) -> Array:
-        top = vectors(self.finger, coordinates).top
-        return _extension(top, self.finger.segment_length, 0)
+        return self.springs(coordinates).extension
 
-    def largest_angle(self, coordinates: Array) -> Array:
-        near, far = corners(vectors(self.finger, coordinates))
-        return np.asarray(np.maximum(np.abs(near), np.abs(far)).max(axis=0))
+    def springs(self, coordinates: Array) -> Springs:
+        cell = vectors(self.finger, coordinates)
+        near, far = corners(cell)
+        turned = np.maximum(np.abs(near), np.abs(far)).max(axis=0)
+        ahead = np.minimum(_cross(cell.top, cell.near), _cross(cell.top, cell.far)).min(axis=0)
+        extension = _extension(cell.top, self.finger.segment_length, 0)
+        return Springs(extension, np.asarray((turned >= 0.5 * np.pi) | (ahead <= 0.0)))
 
     def stations(self, coordinates: Array) -> Stations:
         return Stations(*(coordinates[k::4] for k in range(4)))

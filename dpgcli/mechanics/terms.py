@@ -42,7 +42,8 @@ class Potential(Protocol):
     `reach` is the sparsity of the Hessian, column by column. `force_unit` (size, batch or 1)
     turns a component of the gradient into a force in N: 1 for a length, a lever for an
     angle. `gradient_scale` is the force in play at each coordinate, in the gradient's own unit,
-    and `step_cap` the largest change of a coordinate that one step may make.
+    `stiffness_scale` the stiffness that a coordinate's curvature is measured by, and `step_cap`
+    the largest change of a coordinate that one step may make.
     """
 
     @property
@@ -53,6 +54,8 @@ class Potential(Protocol):
     def force_unit(self) -> Array: ...
     @property
     def gradient_scale(self) -> Array: ...
+    @property
+    def stiffness_scale(self) -> Array: ...
     @property
     def step_cap(self) -> Array: ...
 

@@ -33,7 +33,7 @@ def draw_states(prediction: Prediction, path: Path) -> None:
         axes = figure.add_subplot(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
         axes.grid(visible=True, alpha=0.25)
         _draw_shapes(axes, shapes, prediction.plan.n_units)
-        kind = path.suffix.removeprefix(".")
+        kind = path.suffix.lower().removeprefix(".")
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         with whole_file(path) as temporary:
             figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)

@@ -8,10 +8,12 @@ from dpgcli.errors import UsageError
 
 
 class Kind(StrEnum):
-    """What a column holds: a pattern as bytes, a status code, a number or a truth."""
+    """What a column holds; patterns are bytes, statuses codes, counts whole numbers."""
 
     PATTERN = "pattern"
     STATUS = "status"
+    TEXT = "text"
+    COUNT = "count"
     NUMBER = "number"
     FLAG = "flag"
 

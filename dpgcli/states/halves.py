@@ -136,7 +136,7 @@ class Split:
         if not chain.finger.is_rigid:
             beyond = reach(self._cut(self.n_inner, self.n_units).finger)[0]
             joint = _inner_joint(chain, own, at_own, jacobian, beyond)
-        lever = reach(self.units.finger)[0] / reach(batch.formulation.finger)[0]
+        lever = reach(self.units.finger)[0]  # an error of the angle moves all that is beyond
         return self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
 
     def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
@@ -147,11 +147,11 @@ class Split:
         if not chain.finger.is_rigid:
             context = self._cut(self.n_inner - self.context, self.n_inner)
             at_context = evaluate(context, coordinates[: len(context.reach)])
-            energies = {k: e - at_context.energies[k] for k, e in energies.items()}
+            energies = {k: e - at_context.energies.get(k, 0.0) for k, e in energies.items()}
             held = _held(batch, at_context)
             joint = _outer_joint(batch, context, at_context, jacobian)
         own = slice(self.context, None)
-        return self._half(batch, status, own, pose, energies, 1.0, joint, held)
+        return self._half(batch, status, own, pose, energies, 0.0, joint, held)
 
     def _half(
         self,
@@ -164,6 +164,7 @@ class Split:
         joint: Joint | None,
         held: Held | None = None,
     ) -> Half:
+        at_tip = tip(batch, with_compliance=False)
         return Half(
             status,
             batch.reached[own],
@@ -171,7 +172,7 @@ class Split:
             energies,
             batch.equilibrium.residual,
             batch.equilibrium.relative_residual,
-            lever * tip(batch, with_compliance=False).error,
+            at_tip.error + lever * at_tip.angle_error,
             joint,
             held,
         )

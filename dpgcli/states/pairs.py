@@ -88,12 +88,17 @@ def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
         status=block.flat(status),
         pose=pose,
         tip_error=block.flat(fit.tip_error),
-        energies={
-            kind: block.flat(block.inner(part) + block.outer(outer.energies[kind]))
-            for kind, part in inner.energies.items()
-        },
+        energies=_added(inner, outer, block),
         residual=block.flat(fit.residual),
     )
+
+
+def _added(inner: Half, outer: Half, block: _Block) -> dict[str, Array]:
+    """Energies of the pair by kind; a half may lack a kind that the other has."""
+    parts = {kind: block.inner(part) for kind, part in inner.energies.items()}
+    for kind, part in outer.energies.items():
+        parts[kind] = parts.get(kind, 0.0) + block.outer(part)
+    return {kind: block.flat(part) for kind, part in parts.items()}
 
 
 def _fit(split: Split, inner: Half, outer: Half, block: _Block) -> _Fit:

@@ -19,7 +19,6 @@ from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import MOST_SELECTED, select, too_many
 from dpgcli.states.rows import Wanted
 from dpgcli.states.solve import Status, Units, lanes_at_once, reach
-from dpgcli.states.wells import FirstOrder
 
 FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
 DEFAULT_TOLERANCE = 1e-12
@@ -226,17 +225,9 @@ def bar_flexibility(finger: Finger) -> float:
     if finger.is_rigid:
         stiffness = 1e3 * finger.bistable_stiffness.max(axis=0, keepdims=True)
         finger = Finger(finger.n_units, **{**finger.arrays(), "linear_stiffness": stiffness})
-    return float(2.0 * _first_order_motion(Units.of(finger).first_order, reach(finger)[0], finger))
-
-
-def _first_order_motion(unit: FirstOrder, length: float, finger: Finger) -> float:
-    strut = 2.0 * np.abs(unit.strut).max()
-    turned = 2.0 * (
-        np.abs(unit.by_chord * unit.chord)
-        + (np.abs(unit.by_near_strut) + np.abs(unit.by_far_strut)) * strut
-    )
-    per_unit = np.abs(unit.chord) + length * turned
-    return float(np.broadcast_to(per_unit, (finger.n_units, 1)).sum())
+    unit = Units.of(finger).first_order
+    per_unit = np.abs(unit.chord) + reach(finger)[0] * unit.turn
+    return float(2.0 * np.broadcast_to(per_unit, (finger.n_units, 1)).sum())
 
 
 def _omissions(

@@ -101,7 +101,8 @@ def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
         if len(unfit):  # a pair that did not fit is solved as a whole
             solved = _solved(plan, codes_of(states.inverted[:, unfit]), summary)
             for name, values in columns.items():
-                values[unfit] = solved[name]
+                columns[name] = values.copy()
+                columns[name][unfit] = solved[name]
         yield columns
 
 

@@ -104,8 +104,8 @@ def _batch_columns(wanted: Wanted, batch: Batch, at_tip: Tip, status: NDArray[np
     columns: Columns = {}
     if Group.EIGENVALUE in groups:
         columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(batch)
-    if at_tip.compliance is not None:
-        columns |= _stiffness_columns(at_tip.compliance)
+    if at_tip.compliance is not None and at_tip.stiffness is not None:
+        columns |= _stiffness_columns(at_tip.compliance, at_tip.stiffness)
     coordinates = batch.equilibrium.coordinates
     if Group.OPENINGS in groups:
         openings = batch.formulation.openings(coordinates)
@@ -119,24 +119,18 @@ def _batch_columns(wanted: Wanted, batch: Batch, at_tip: Tip, status: NDArray[np
     }
 
 
-def _stiffness_columns(compliance: Array) -> Columns:
-    """Compliances as they are; stiffnesses are 1/eigenvalues of the 2×2 of the position."""
-    xx, xy, yy, xa, ya, aa = compliance
-    mean, split = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    softest = mean + split
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # the small eigenvalue as determinant over the large one: mean − split cancels
-        stiffest = softest / np.maximum(xx * yy - xy * xy, 0.0)
-        return {
-            "tip_stiffness_min_N_per_mm": 1.0 / softest,
-            "tip_stiffness_max_N_per_mm": stiffest,
-            "tip_compliance_xx_mm_per_N": xx,
-            "tip_compliance_xy_mm_per_N": xy,
-            "tip_compliance_yy_mm_per_N": yy,
-            "tip_compliance_x_angle_rad_per_N": xa,
-            "tip_compliance_y_angle_rad_per_N": ya,
-            "tip_compliance_angle_rad_per_N_mm": aa,
-        }
+def _stiffness_columns(compliance: Array, stiffness: Array) -> Columns:
+    xx, xy, yy, x_angle, y_angle, angle = compliance
+    return {
+        "tip_stiffness_min_N_per_mm": stiffness[0],
+        "tip_stiffness_max_N_per_mm": stiffness[1],
+        "tip_compliance_xx_mm_per_N": xx,
+        "tip_compliance_xy_mm_per_N": xy,
+        "tip_compliance_yy_mm_per_N": yy,
+        "tip_compliance_x_angle_rad_per_N": x_angle,
+        "tip_compliance_y_angle_rad_per_N": y_angle,
+        "tip_compliance_angle_rad_per_N_mm": angle,
+    }
 
 
 def _shape_columns(wanted: Wanted, formulation: Formulation, coordinates: Array) -> Columns:

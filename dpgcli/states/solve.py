@@ -22,7 +22,7 @@ from dpgcli.states.wells import (
 )
 
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))
-TIP_ROUNDING = 4.0 * np.finfo(float).eps
+TIP_ROUNDING = 8.0 * np.finfo(float).eps
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
 COMPLIANCE_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
@@ -60,13 +60,14 @@ _MEANINGS = {
 class Batch:
     """States of one finger (or one per lane), each at an equilibrium, shape (…, batch).
 
-    `reached` says which wells the units ended in.
+    `reached` says which wells the units ended in, `is_folded` which lanes are no finger.
     """
 
     formulation: Formulation
     equilibrium: Equilibrium
     inverted: Flags
     reached: Flags
+    is_folded: Flags
 
 
 @dataclass(frozen=True)
@@ -125,8 +126,9 @@ def solve(
     else:
         guess = stroke_guess(units.finger, inverted, strokes)
     equilibrium = minimize(formulation, formulation.coordinates(guess), tolerance)
-    reached = formulation.openings(equilibrium.coordinates) > units.wells.barrier
-    return Batch(formulation, equilibrium, inverted, reached)
+    springs = formulation.springs(equilibrium.coordinates)
+    reached = springs.extension > units.wells.barrier
+    return Batch(formulation, equilibrium, inverted, reached, springs.is_folded)
 
 
 def certify(
@@ -144,7 +146,7 @@ def certify(
         (~(equilibrium.curvature > MARGINAL_CURVATURE), Status.MARGINAL),
         (elsewhere, Status.ANOTHER_PATTERN),
         (elsewhere & (inverted & ~exists).any(axis=0), Status.NOT_BISTABLE),
-        (batch.formulation.largest_angle(equilibrium.coordinates) >= 0.5 * np.pi, Status.FOLDED),
+        (batch.is_folded, Status.FOLDED),
         (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),
     )
     status = np.full(inverted.shape[1], Status.STABLE, np.uint8)
@@ -155,33 +157,63 @@ def certify(
 
 @dataclass(frozen=True)
 class Tip:
-    """Tip x, y (mm) and angle (rad), shape (3, batch), an estimate of its error (mm), and
-    the compliance by `COMPLIANCE_PAIRS`, shape (6, batch), in mm/N, rad/N and rad/(N mm)."""
+    """The tip and how far it is known, shapes (…, batch).
+
+    Pose x, y (mm) and angle (rad); estimated errors of its position (mm) and angle (rad); the
+    compliance by `COMPLIANCE_PAIRS` in mm/N, rad/N and rad/(N mm), and the softest and the
+    stiffest stiffness of its position (N/mm), if asked for.
+    """
 
     pose: Array
     error: Array
-    compliance: Array | None
+    angle_error: Array
+    compliance: Array | None = None
+    stiffness: Array | None = None
 
 
 def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     """Pose, error and compliance C = J H⁻¹ Jᵀ of the tip from the factorization at hand.
 
     The error is the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a few
-    units in the last place of the finger's reach, more where the curvature is small.
+    units in the last place, more for many units and where the curvature is small.
     """
     equilibrium = batch.equilibrium
+    finger = batch.formulation.finger
     pose, jacobian = batch.formulation.tip(equilibrium.coordinates)
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
     sides = forward(equilibrium.factorization, sides)
-    scaled = sides / equilibrium.factorization.pivots[:, None]
-    step = [total(sides[:, p] * scaled[:, 3]) for p in (0, 1)]
-    finger = batch.formulation.finger
-    softness = (finger.stroke / finger.segment_height).max(axis=0) / equilibrium.curvature
-    error = np.hypot(*step) + TIP_ROUNDING * reach(finger) * (1.0 + softness)
-    compliance = None
-    if with_compliance:
+    with np.errstate(divide="ignore", invalid="ignore"):  # a mechanism has zero pivots
+        scaled = sides / equilibrium.factorization.pivots[:, None]
+        step = [total(sides[:, p] * scaled[:, 3]) for p in range(3)]
+        slenderness = (finger.stroke / finger.segment_height).max(axis=0)
+        softness = slenderness / equilibrium.curvature
+        rounding = TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + np.abs(softness))
+        error = np.hypot(step[0], step[1]) + rounding * reach(finger)
+        angle_error = np.abs(step[2]) + rounding
+        if not with_compliance:
+            return Tip(pose, error, angle_error)
         compliance = np.stack([total(sides[:, p] * scaled[:, q]) for p, q in COMPLIANCE_PAIRS])
-    return Tip(pose, error, compliance)
+        roots = np.sqrt(equilibrium.factorization.pivots)
+        stiffness = _principal_stiffness(sides[:, 0] / roots, sides[:, 1] / roots)
+    return Tip(pose, error, angle_error, compliance, stiffness)
+
+
+def _principal_stiffness(x: Array, y: Array) -> Array:
+    """Softest and stiffest 1/eigenvalue of the compliance [x·x, x·y; x·y, y·y], (2, batch).
+
+    The determinant is that of the longer column and what of the shorter is perpendicular to
+    it, so that it does not cancel; below rounding it is zero, and the stiffness infinite.
+    """
+    is_longer = total(x * x) >= total(y * y)
+    longer, shorter = np.where(is_longer, x, y), np.where(is_longer, y, x)
+    square, product = total(longer * longer), total(longer * shorter)
+    beside = shorter - product / square * longer
+    apart = total(beside * beside)
+    smallest = 16.0 * np.finfo(float).eps * np.sqrt(total(shorter * shorter))
+    determinant = square * np.where(np.sqrt(apart) > smallest, apart, 0.0)
+    mean = 0.5 * (square + total(shorter * shorter))
+    softest = mean + np.sqrt(np.maximum(mean * mean - determinant, 0.0))
+    return np.stack((1.0 / softest, softest / determinant))
 
 
 def lanes_at_once(n_units: int) -> int:

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Internal
@@ -94,7 +95,7 @@ def _roots(
         running = running & (np.abs(step) > 2e-16 * np.abs(relative))
         if not running.any():
             break
-        relative = relative - step
+        relative = np.clip(relative - step, 0.0, widest)  # beyond only where there is no root
     return relative, np.asarray(exists.all(axis=0))
 
 
@@ -108,14 +109,36 @@ def _turn_over_sine(turn: Array) -> tuple[Array, Array]:
     return ratio, np.where(small, turn / 3.0 + 7.0 * turn**3 / 90.0, slope)
 
 
+def barriers(finger: Finger, wells: Wells) -> Array:
+    """Smallest barrier (mJ) that keeps a unit of each design in its well, shape (design,).
+
+    To snap or to reset, hinge included, bars rigid: e(barrier) less e of the well, 0 where a
+    unit has but one well.
+    """
+    top, bottom = (_rigid_energy(finger, x) for x in (wells.barrier, wells.extension))
+    lowest = np.where(wells.exists, np.minimum(top, top - bottom), 0.0)
+    return np.asarray(lowest.min(axis=0))
+
+
+def _rigid_energy(finger: Finger, extension: Array) -> Array:
+    """Spring and hinge of a unit with rigid bars, E(x) + ½ k_θ φ² with x = 2H sin(φ/2)."""
+    spring = laws.bistable(
+        extension, finger.bistable_stiffness, finger.force_linearity, finger.stroke
+    )
+    turn = 2.0 * np.arcsin(extension / (2.0 * finger.segment_height))
+    return spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
+
+
 @dataclass(frozen=True)
 class FirstOrder(ByDesign):
     """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
 
     `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,
     a strut's by one of its two units; `by_chord`, `by_near_strut`, `by_far_strut` the answer of
-    the near corner to those, rad/mm (of the far corner: near and far exchanged). Shapes as in
-    `Wells`; a ground unit carries no force and has all of them zero.
+    the near corner to those, rad/mm (of the far corner: near and far exchanged). A ground unit
+    carries no force and has all of them zero. Close to the loss of bistability, and without a
+    hinge, the answers grow without bound: they are then scaled down to a tenth of m. `turn` is
+    what both corners may turn by in any pattern (rad), not scaled down. Shapes as in `Wells`.
     """
 
     rigid_angle: Array
@@ -124,6 +147,7 @@ class FirstOrder(ByDesign):
     by_chord: Array
     by_near_strut: Array
     by_far_strut: Array
+    turn: Array
 
 
 def first_order(finger: Finger, wells: Wells) -> FirstOrder:
@@ -134,29 +158,47 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     """
     zero = np.zeros_like(wells.angle)
     if finger.is_rigid:
-        return FirstOrder(wells.angle, zero, zero, zero, zero, zero)
+        return FirstOrder(wells.angle, zero, zero, zero, zero, zero, zero)
     units, designs = wells.angle.shape
     flat = _as_single_units(finger, (units, designs))
     angle = wells.angle.reshape(1, -1)
     rest = np.zeros_like(angle)
     chain = Chain(flat)
     at_well = evaluate(chain, chain.coordinates(Internal(rest, angle, angle, rest)))
+    stiffness = np.broadcast_to(finger.linear_stiffness, (units, designs))
     # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
     band, gradient = at_well.hessian, at_well.gradient
-    corner, mixed = band[0, 1], band[1, 1]
-    determinant = corner * corner - mixed * mixed
-    chord_near, strut_near, strut_far = band[1, 0], band[2, 1], band[1, 2]
-    shape = (units, designs)
-    stiffness = np.broadcast_to(finger.linear_stiffness, shape)
-    return FirstOrder(
-        wells.angle,
-        -gradient[0].reshape(shape) / stiffness,
-        -gradient[3].reshape(shape) / stiffness,
-        -(chord_near / (corner + mixed)).reshape(shape),
-        # by mirror symmetry the near strut acts on the near corner as the far on the far
-        -((corner * strut_far - mixed * strut_near) / determinant).reshape(shape),
-        -((corner * strut_near - mixed * strut_far) / determinant).reshape(shape),
+    chord, strut = (-gradient[row].reshape(units, designs) / stiffness for row in (0, 3))
+    answers = [part.reshape(units, designs) for part in _corner_answers(band)]
+    by_chord, by_near_strut, by_far_strut = answers
+    turn = 2.0 * (
+        np.abs(by_chord * chord)
+        + (np.abs(by_near_strut) + np.abs(by_far_strut)) * 2.0 * np.abs(strut).max(axis=0)
     )
+    # `turn` is of both corners, and may be infinite
+    scale = np.minimum(1.0, 0.2 * wells.angle / np.maximum(turn, np.finfo(float).tiny))
+    scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
+    by_chord, by_near_strut, by_far_strut = scaled
+    return FirstOrder(wells.angle, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+
+
+def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
+    """−A⁻¹C for the near corner, by chord, near and far strut; infinite where A is singular."""
+    corner, mixed = band[0, 1], band[1, 1]
+    chord_near, strut_near, strut_far = band[1, 0], band[2, 1], band[1, 2]
+    opening, leaning = corner + mixed, corner - mixed  # the eigenvalues of A
+    smallest = np.finfo(float).eps * corner
+    is_singular = (np.abs(opening) <= smallest) | (np.abs(leaning) <= smallest)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        determinant = np.where(is_singular, 0.0, opening * leaning)
+        answers = (
+            -chord_near / np.where(is_singular, 0.0, opening),
+            # by mirror symmetry the near strut acts on the near corner as the far on the far
+            -(corner * strut_far - mixed * strut_near) / determinant,
+            -(corner * strut_near - mixed * strut_far) / determinant,
+        )
+    by_chord, by_near, by_far = (np.where(is_singular, np.inf, part) for part in answers)
+    return by_chord, by_near, by_far
 
 
 def _as_single_units(finger: Finger, shape: tuple[int, int]) -> Finger:

@@ -2,18 +2,30 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.problems import checked
 from dpgcli.files.spec.scenes import scene_of
-from dpgcli.files.spec.settings import with_settings
-from dpgcli.files.spec.source import read_document
+from dpgcli.files.spec.settings import changed, with_settings
+from dpgcli.files.spec.source import Document, read_document
+from dpgcli.mechanics.scene import Scene
 
-__all__ = ["Spec", "canonical_json", "json_schema", "read_spec", "scene_of", "starter"]
+__all__ = [
+    "Spec",
+    "canonical_json",
+    "json_schema",
+    "read_spec",
+    "scene_of",
+    "spelled",
+    "starter",
+    "variant",
+]
 
 
 def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
@@ -23,6 +35,18 @@ def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
     Raises SpecError with all problems at once, those of content after those of form are mended.
     """
     return checked(with_settings(read_document(path), settings))
+
+
+def variant(data: Mapping[str, Any], changes: Mapping[str, float]) -> Scene:
+    """The scene of a spec's plain data with some keys ("a.b.c") changed.
+
+    Raises SpecError where the changed spec is wrong.
+    """
+    document = changed(Document("design", dict(data), {}), changes)
+    try:
+        return scene_of(Spec.model_validate(document.data))
+    except ValidationError:
+        return scene_of(checked(document))
 
 
 def json_schema() -> dict[str, Any]:
@@ -46,6 +70,9 @@ def starter() -> str:
 def _canonical(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _canonical(item) for key, item in value.items()}
-    if isinstance(value, float):
-        return ".inf" if math.isinf(value) else value + 0.0
-    return value
+    return spelled(value) if isinstance(value, float) else value
+
+
+def spelled(value: float) -> float | str:
+    """A number as JSON can say it: infinity is the text ".inf", as in a spec."""
+    return ".inf" if math.isinf(value) else value + 0.0

@@ -50,7 +50,7 @@ EXPECTED = {
 }
 
 HINTS = {
-    "units": "no decimal point: 5, not 5.0",
+    "units": "a whole number without quotes or decimal point",
     "stroke_mm": "stroke is dome height minus unit separation",
     "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
@@ -106,12 +106,24 @@ def _expected(path: KeyPath) -> str:
 def _hint(key: str, error: Any) -> str:
     """What to do, by the kind of mistake before the kind of key."""
     value = error["input"]
+    if error["type"] == "model_type":
+        return "keys below it, indented"
     if isinstance(value, str) and key != "calibration":
         return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if is_number and value > 0 and key not in BOUNDED:
         return OUT_OF_RANGE
     return HINTS.get(key, "")
+
+
+def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
+    """Expected, found and hint if no spec can have a number at this path."""
+    parent = _pattern(path[:-1])
+    if parent not in SECTIONS:
+        return "a known key", dotted(path), _nearest(str(path[-1]), list(SECTIONS[()].model_fields))
+    if str(path[-1]) not in SECTIONS[parent].model_fields:
+        return _unknown(path)
+    return None
 
 
 def _unknown(path: KeyPath) -> tuple[str, str, str]:

@@ -41,10 +41,12 @@ def issues(spec: Spec) -> list[Issue]:
 
 def scene_of(spec: Spec) -> Scene:
     """The scene that a spec describes. Raises SpecError, without lines, if keys disagree."""
-    if found := issues(spec):
+    resolution = _resolved(spec.finger)
+    ranges = range_issues(spec.model_dump()) if spec.finger.overrides else []
+    if found := [*ranges, *resolution.issues]:
         place = Place("spec")
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
-    values = _resolved(spec.finger).values
+    values = resolution.values
     return Scene(
         finger=_finger(spec.finger, values),
         sources=tuple(_sources(spec.finger, values)),

@@ -1,6 +1,6 @@
 """Changes to a spec from the command line: `--set key.path=value`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dpgcli.errors import Problem, SpecError
@@ -37,6 +37,14 @@ def with_settings(document: Document, settings: Sequence[str]) -> Document:
             places.setdefault(path[:length], SETTING)
         places[path] = SETTING
     return Document(document.file, data, places, in_order(problems))
+
+
+def changed(document: Document, changes: Mapping[str, Any]) -> Document:
+    """The document with values put at dotted keys. Raises SpecError where that cannot be."""
+    data = _copied(document.data)
+    for key, value in changes.items():
+        _put(data, tuple(key.split(".")), value)
+    return Document(document.file, data, document.places, document.problems)
 
 
 def _parsed(text: str) -> tuple[KeyPath, Any]:

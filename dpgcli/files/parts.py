@@ -1,0 +1,115 @@
+"""Results of chunks on disk, so that an interrupted sweep can go on.
+
+A part holds the states and the designs of a range of designs as two Arrow streams. Its name is
+its range and the SHA-256 of its bytes: a part that does not match its name does not count.
+"""
+
+import hashlib
+import re
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+
+from dpgcli.files.output import whole_file
+from dpgcli.files.tables import record_batch
+from dpgcli.states.columns import Column
+from dpgcli.states.rows import Columns
+
+NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
+LENGTH = struct.Struct("<Q")
+
+
+def encoded(
+    state_columns: tuple[Column, ...],
+    states: Columns,
+    design_columns: tuple[Column, ...],
+    designs: Columns,
+) -> bytes:
+    """The bytes of a part."""
+    first = _stream(record_batch(state_columns, states))
+    return LENGTH.pack(len(first)) + first + _stream(record_batch(design_columns, designs))
+
+
+def _stream(batch: Any) -> bytes:
+    sink = pa.BufferOutputStream()
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_stream(sink, batch.schema, options=options) as writer:
+        writer.write_batch(batch)
+    content: bytes = sink.getvalue().to_pybytes()
+    return content
+
+
+class Part(NamedTuple):
+    """A part on disk and the designs start … stop − 1 that it holds."""
+
+    start: int
+    stop: int
+    path: Path
+
+
+@dataclass(frozen=True)
+class PartStore:
+    """The parts of one sweep in a folder."""
+
+    folder: Path
+
+    def write(self, start: int, stop: int, content: bytes) -> None:
+        """Store a part, whole or not at all."""
+        digest = hashlib.sha256(content).hexdigest()[:16]
+        with whole_file(self.folder / f"{start:010d}-{stop:010d}-{digest}.part") as temporary:
+            temporary.write_bytes(content)
+
+    def say(self, said: str) -> None:
+        """Keep what the sweep is about beside its parts."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / "sweep.json"
+        if not path.exists():
+            with whole_file(path) as temporary:
+                temporary.write_text(said, encoding="utf-8")
+
+    def parts(self) -> list[Part]:
+        """Parts in order of their designs."""
+        matches = ((NAME.fullmatch(path.name), path) for path in self.folder.glob("*.part"))
+        return sorted(Part(int(m[1]), int(m[2]), path) for m, path in matches if m)
+
+    def remove_damaged(self) -> None:
+        """Remove parts whose bytes do not match their name."""
+        for part in self.parts():
+            if hashlib.sha256(part.path.read_bytes()).hexdigest()[:16] not in part.path.name:
+                part.path.unlink()
+
+    def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+        """What of these ranges no part covers."""
+        parts, gaps = self.parts(), []
+        for start, stop in ranges:
+            here = start
+            for part in parts:
+                if here < part.stop and part.start < stop:
+                    if part.start > here:
+                        gaps.append((here, part.start))
+                    here = part.stop
+            if here < stop:
+                gaps.append((here, stop))
+        return gaps
+
+    def states(self) -> Iterator[Any]:
+        """Record batches of states, in order."""
+        for part in self.parts():
+            yield from _batches(part.path, 0)
+
+    def designs(self) -> Iterator[Any]:
+        """Record batches of designs, in order."""
+        for part in self.parts():
+            yield from _batches(part.path, 1)
+
+
+def _batches(path: Path, which: int) -> Iterator[Any]:
+    content = path.read_bytes()
+    (length,) = LENGTH.unpack_from(content)
+    middle = LENGTH.size + length
+    stream = content[LENGTH.size : middle] if which == 0 else content[middle:]
+    yield from pa.ipc.open_stream(stream)

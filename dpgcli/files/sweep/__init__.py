@@ -1,0 +1,255 @@
+"""The file of a sweep: a base spec and a space around it, read and checked."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from dpgcli.errors import Problem, SpecError
+from dpgcli.exploration.expressions import Expression, ExpressionError, expression
+from dpgcli.exploration.space import (
+    Axis,
+    Range,
+    Space,
+    linear,
+    listed,
+    logarithmic,
+    sampled,
+)
+from dpgcli.files.spec import Spec, canonical_json
+from dpgcli.files.spec.places import KeyPath, in_order, shown
+from dpgcli.files.spec.problems import checked, unknown_key
+from dpgcli.files.spec.settings import with_settings
+from dpgcli.files.spec.source import Document, read_document
+from dpgcli.files.sweep.models import (
+    MANY_KEYS,
+    ONE_KEY,
+    AxisSpec,
+    Between,
+    Sample,
+    SampleRange,
+    SweepSpec,
+)
+
+__all__ = ["Sweep", "read_sweep"]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What to compute: the base spec with its plain data, the space, constraints, files read.
+
+    `said` is the space as the file says it, `digests` the SHA-256 of the tables it names.
+    """
+
+    base: Spec
+    base_data: dict[str, Any]
+    space: Space
+    constraints: tuple[Expression, ...]
+    files: tuple[Path, ...]
+    said: dict[str, Any]
+    digests: tuple[str, ...]
+
+    def canonical_json(self) -> str:
+        """One line of JSON, the same for sweeps that say the same."""
+        said = {"base": canonical_json(self.base), "space": self.said, "tables": self.digests}
+        return json.dumps(said, sort_keys=True, separators=(",", ":"))
+
+
+def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
+    """Read and check a sweep; `settings` change its base spec.
+
+    Raises SpecError with all problems.
+    """
+    document = read_document(path)
+    spec, problems = _validated(document)
+    if spec is None:
+        raise SpecError(in_order([*document.problems, *problems]))
+    base_path = path.parent / spec.base
+    base_document = with_settings(read_document(base_path), settings)
+    base = checked(base_document)
+    reader = _SpaceReader(document, path.parent)
+    axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
+    rules = [
+        reader.constraint(place, text, base_document.data)
+        for place, text in enumerate(spec.constraints or ())
+    ]
+    if problems := [*document.problems, *reader.problems]:
+        raise SpecError(in_order(problems))
+    return Sweep(
+        base,
+        base_document.data,
+        Space(tuple(axis for axis in axes if axis is not None)),
+        tuple(rule for rule in rules if rule is not None),
+        (path, base_path, *reader.tables),
+        spec.model_dump(exclude_none=True, exclude={"base"}),
+        tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
+    )
+
+
+def _validated(document: Document) -> tuple[SweepSpec | None, list[Problem]]:
+    try:
+        return SweepSpec.model_validate(document.data), []
+    except ValidationError as error:
+        return None, [_problem(document, e) for e in error.errors(include_url=False)]
+
+
+def _problem(document: Document, error: Any) -> Problem:
+    """One finding of the models as a problem with a place."""
+    path: KeyPath = error["loc"]
+    section, field = _model_at(path)
+    if error["type"] == "extra_forbidden":
+        known = [f.alias or name for name, f in section.model_fields.items()]
+        close = get_close_matches(str(path[-1]), known, n=1)
+        hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
+        return document.problem(path, "a known key", shown(path[-1]), hint)
+    found = "nothing" if error["type"] == "missing" else shown(error["input"])
+    return document.problem(path, field or "a mapping of keys", found)
+
+
+def _model_at(path: KeyPath) -> tuple[type[BaseModel], str]:
+    """The section that a key path stands in, and what its key describes."""
+    section: type[BaseModel] = SweepSpec
+    described = ""
+    sections: dict[str, type[BaseModel]] = {
+        "space": AxisSpec,
+        "linear": Between,
+        "log": Between,
+        "sample": Sample,
+    }
+    for part in path:
+        if isinstance(part, str):
+            by_alias = {f.alias or name: f for name, f in section.model_fields.items()}
+            if part in by_alias:
+                described = by_alias[part].description or ""
+            if part in sections and part != path[-1]:
+                section = sections[part]
+            elif part == "ranges":
+                section = SampleRange
+    return section, described
+
+
+@dataclass
+class _SpaceReader:
+    """Makes axes from what a file says; what is wrong gathers in `problems`."""
+
+    document: Document
+    folder: Path
+
+    def __post_init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.tables: list[Path] = []
+        self.keys: set[str] = set()
+
+    def wrong(self, path: KeyPath, expected: str, found: str, hint: str = "") -> None:
+        self.problems.append(self.document.problem(path, expected, found, hint))
+
+    def axis(self, place: int, said: AxisSpec) -> Axis | None:
+        """The axis, or None with a problem."""
+        path: KeyPath = ("space", place)
+        kinds = [k for k in (*ONE_KEY, *MANY_KEYS) if getattr(said, k) is not None]
+        if len(kinds) != 1:
+            every = ", ".join((*ONE_KEY, *MANY_KEYS))
+            self.wrong(path, f"exactly one of {every}", ", ".join(kinds) or "none")
+            return None
+        if (kinds[0] in ONE_KEY) != (said.key is not None):
+            needs = "a key beside" if said.key is None else "no key beside"
+            self.wrong(path, f"{needs} {kinds[0]}", shown(said.key))
+            return None
+        made = self.made(path, said, kinds[0])
+        if made is not None:
+            self.check_keys((*path, "key" if said.key else kinds[0]), list(made.values))
+        return made
+
+    def made(self, path: KeyPath, said: AxisSpec, kind: str) -> Axis | None:
+        if said.key is not None and said.values is not None:
+            return listed(said.key, said.values)
+        if said.key is not None and (between := said.linear or said.log):
+            return self.spaced((*path, kind), said.key, between, is_log=said.log is not None)
+        if said.paired is not None:
+            return self.paired((*path, kind), said.paired)
+        if said.sample is not None:
+            return self.sampled((*path, kind), said.sample)
+        return self.tabulated((*path, kind), said.table or "")
+
+    def spaced(self, path: KeyPath, key: str, between: Between, *, is_log: bool) -> Axis | None:
+        if is_log and min(between.first, between.last) <= 0:
+            self.wrong(path, "bounds above zero", f"{between.first:g} and {between.last:g}")
+            return None
+        make = logarithmic if is_log else linear
+        return make(key, between.first, between.last, between.count)
+
+    def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
+        lengths = {key: len(values) for key, values in columns.items()}
+        if len(set(lengths.values())) > 1:
+            self.wrong(path, "lists of one length", ", ".join(map(str, lengths.values())))
+            return None
+        return Axis({key: np.asarray(values) for key, values in columns.items()})
+
+    def sampled(self, path: KeyPath, sample: Sample) -> Axis | None:
+        for key, bounds in sample.ranges.items():
+            if bounds.scale == "log" and min(bounds.first, bounds.last) <= 0:
+                self.wrong((*path, "ranges", key), "bounds above zero", "zero or less")
+                return None
+        ranges = {k: Range(r.first, r.last, r.scale == "log") for k, r in sample.ranges.items()}
+        return sampled(sample.method, ranges, sample.count, sample.seed)
+
+    def tabulated(self, path: KeyPath, name: str) -> Axis | None:
+        """Columns of a CSV or Parquet file; pandas reads both."""
+        import pandas as pd
+
+        table = self.folder / name
+        try:
+            reader = pd.read_parquet if table.suffix == ".parquet" else pd.read_csv
+            frame = reader(table)
+        except (OSError, ValueError) as error:
+            self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
+            return None
+        columns = {str(key): frame[key].to_numpy() for key in frame.columns}
+        numeric = all(c.dtype.kind in "if" and np.isfinite(c).all() for c in columns.values())
+        if frame.empty or not numeric:
+            self.wrong(path, "rows of finite numbers", f"{len(frame)} rows", "no text, no gaps")
+            return None
+        self.tables.append(table)
+        return Axis(columns)
+
+    def check_keys(self, path: KeyPath, keys: list[str]) -> None:
+        """Keys must be known to the spec, and vary on one axis only."""
+        for key in keys:
+            if unknown := unknown_key(tuple(key.split("."))):
+                self.wrong(path, *unknown)
+            if key in self.keys:
+                self.wrong(path, "each key on one axis", f"{key} again")
+            self.keys.add(key)
+
+    def constraint(self, place: int, text: str, data: dict[str, Any]) -> Expression | None:
+        """The rule, with names that are keys of the space or of the base spec."""
+        path: KeyPath = ("constraints", place)
+        try:
+            rule = expression(text)
+        except ExpressionError as error:
+            self.wrong(path, "an expression over keys", shown(text), str(error))
+            return None
+        known = self.keys | set(flattened(data))
+        short = {name.rsplit(".", 1)[-1] for name in known}
+        if unknown := sorted(rule.names - known - short):
+            close = get_close_matches(unknown[0], [*known, *short], n=1)
+            hint = f"did you mean {close[0]}?" if close else ""
+            self.wrong(path, "keys of the space or the base", ", ".join(unknown), hint)
+        return rule
+
+
+def flattened(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested data by dotted key."""
+    flat: dict[str, Any] = {}
+    for key, value in data.items():
+        if isinstance(value, dict):
+            flat |= flattened(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat

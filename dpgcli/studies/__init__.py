@@ -1,0 +1,1 @@
+"""Whole studies, composed of a space, an evaluation, an executor and files."""

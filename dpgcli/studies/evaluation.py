@@ -1,0 +1,247 @@
+"""Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import keep_freed_memory
+from dpgcli.errors import Problem, SpecError
+from dpgcli.exploration.expressions import Expression
+from dpgcli.exploration.space import Space
+from dpgcli.files.spec import variant
+from dpgcli.files.sweep import flattened
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.scene import Origin, Scene
+from dpgcli.states.columns import Column, Group, Kind, declared
+from dpgcli.states.designs import DESIGN_COLUMNS, design_states
+from dpgcli.states.rows import Columns
+
+Numbers = NDArray[Any]
+
+GRAVEST_FIRST = (Origin.EXTRAPOLATED, Origin.SCALED, Origin.CALIBRATED, Origin.GIVEN)
+
+
+class DesignStatus(StrEnum):
+    """What became of a design."""
+
+    STABLE = "stable"
+    PARTLY_STABLE = "partly_stable"
+    INVALID = "invalid"
+    EXCLUDED = "excluded"
+    FAILED = "failed"
+
+
+DESIGN_STATUS_MEANINGS = {
+    DesignStatus.STABLE: "every pattern has its certified state",
+    DesignStatus.PARTLY_STABLE: "some patterns have none",
+    DesignStatus.INVALID: "no such finger can exist; `reason` says why",
+    DesignStatus.EXCLUDED: "a constraint is not met",
+    DesignStatus.FAILED: "evaluating it killed its worker, twice",
+}
+
+
+class Tables(NamedTuple):
+    """Rows of states and of designs."""
+
+    states: Columns
+    designs: Columns
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Evaluates designs around a base spec, given the values of its keys that change.
+
+    `values` are the columns of those keys, by key.
+    """
+
+    base_data: Mapping[str, Any]
+    values: Mapping[str, Column]
+    constraints: tuple[Expression, ...]
+    tolerance: float
+    is_gripper: bool
+
+    @property
+    def groups(self) -> frozenset[Group]:
+        gripper = {Group.GRIPPER} if self.is_gripper else set()
+        return frozenset({Group.STATES, Group.STIFFNESS, *gripper})
+
+    @property
+    def state_columns(self) -> tuple[Column, ...]:
+        """Columns of the table of states: the design, its values, what `predict` gives."""
+        rows = (c for c in declared(1, (), self.is_gripper) if c.group in self.groups)
+        return (DESIGN, *self.values.values(), CALIBRATION, *rows)
+
+    @property
+    def design_columns(self) -> tuple[Column, ...]:
+        """Columns of the table of designs."""
+        metrics = (c for c in DESIGN_COLUMNS if c.group in self.groups)
+        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics)
+
+    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Tables:
+        """Rows of designs numbered from `start` on, with these values by key."""
+        keep_freed_memory()
+        n_designs = len(next(iter(values.values())))
+        scenes: dict[int, Scene] = {}
+        reasons: dict[int, str] = {}
+        allowed = self._allowed(values, n_designs)
+        for place in np.flatnonzero(allowed).tolist():
+            changes = {key: column[place].item() for key, column in values.items()}
+            try:
+                scenes[place] = variant(self.base_data, changes)
+            except SpecError as error:
+                reasons[place] = "; ".join(map(_reason, error.problems))
+        solved = [self._solved(places, scenes) for places in _alike(scenes)]
+        described = {
+            **self._described(start, values),
+            "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)]),
+        }
+        return Tables(
+            self._state_rows(described, solved),
+            self._design_rows(described, solved, allowed, reasons),
+        )
+
+    def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
+        """The rows of one design that cannot be evaluated at all."""
+        described = {**self._described(design, values), "calibration": np.array([""])}
+        rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
+        rows["status"] = np.array([DesignStatus.FAILED.value])
+        return Tables(self._state_rows(described, []), rows)
+
+    def _described(self, start: int, values: Mapping[str, Numbers]) -> Columns:
+        numbers = np.arange(start, start + len(next(iter(values.values()))))
+        return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
+
+    def _allowed(self, values: Mapping[str, Numbers], n_designs: int) -> NDArray[np.bool_]:
+        """Which designs meet all constraints; names may be dotted keys or their last part."""
+        known: dict[str, Any] = flattened(dict(self.base_data)) | dict(values)
+        short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
+        allowed = np.ones(n_designs, bool)
+        for rule in self.constraints:
+            allowed &= np.broadcast_to(rule({**short, **known}), n_designs).astype(bool)
+        return allowed
+
+    def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "_Solved":
+        group = [scenes[place] for place in places]
+        rows, metrics = design_states(group, Chain, self.tolerance, self.groups)
+        return _Solved(np.array(places), rows, metrics)
+
+    def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
+        """Rows of all groups, brought back into the order of the designs."""
+        if not solved:
+            return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.state_columns}
+        repeats = [len(part.rows["pattern"]) // len(part.places) for part in solved]
+        owner = np.concatenate(
+            [np.repeat(part.places, n) for part, n in zip(solved, repeats, strict=True)]
+        )
+        order = np.argsort(owner, kind="stable")
+        owner = owner[order]
+        return {
+            column.name: described[column.name][owner]
+            if column.name in described
+            else np.concatenate([part.rows[column.name] for part in solved])[order]
+            for column in self.state_columns
+        }
+
+    def _design_rows(
+        self,
+        described: Columns,
+        solved: "list[_Solved]",
+        allowed: NDArray[np.bool_],
+        reasons: Mapping[int, str],
+    ) -> Columns:
+        n_designs = len(described["design"])
+        status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("U16")
+        rows = dict(described)
+        for column in self.design_columns[len(described) + 2 :]:
+            values = np.full(n_designs, 0 if column.kind is Kind.COUNT else np.nan)
+            values = values.astype(_dtype(column.kind))
+            for part in solved:
+                values[part.places] = part.metrics[column.name]
+            rows[column.name] = values
+        for part in solved:
+            complete = part.metrics["n_stable"] == part.metrics["n_states"]
+            status[part.places] = np.where(
+                complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE
+            )
+        rows["status"] = status
+        rows["reason"] = np.array([reasons.get(place, "") for place in range(n_designs)])
+        return {column.name: rows[column.name] for column in self.design_columns}
+
+
+DESIGN = Column("design", "", "number in the order of the space", Group.STATES, Kind.COUNT)
+CALIBRATION = Column(
+    "calibration", "", "gravest origin of a spring constant", Group.STATES, Kind.TEXT
+)
+STATUS = Column("status", "", "what became of the design", Group.STATES, Kind.TEXT)
+REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TEXT)
+
+
+class _Solved(NamedTuple):
+    """Designs at some places of a chunk: rows of their states, and metrics."""
+
+    places: Numbers
+    rows: Columns
+    metrics: Columns
+
+
+def value_columns(space: Space) -> dict[str, Column]:
+    """A column for each key of a space: named by its last part where that is enough."""
+    last = [key.rsplit(".", 1)[-1] for key in space.keys]
+    first = space.designs(0, 1)
+    return {
+        key: Column(
+            short if last.count(short) == 1 else key,
+            _unit_of(key),
+            f"value of {key}",
+            Group.STATES,
+            Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
+        )
+        for key, short in zip(space.keys, last, strict=True)
+    }
+
+
+def _alike(scenes: Mapping[int, Scene]) -> list[list[int]]:
+    """Places of scenes that can share a batch."""
+    groups: dict[tuple[int, bool], list[int]] = {}
+    for place, scene in scenes.items():
+        kind = (scene.finger.n_units, scene.finger.is_rigid)
+        groups.setdefault(kind, []).append(place)
+    return list(groups.values())
+
+
+def _calibration(scene: Scene | None) -> str:
+    if scene is None:
+        return ""
+    origins = {source.origin for source in scene.sources}
+    return next(str(origin) for origin in GRAVEST_FIRST if origin in origins)
+
+
+def _reason(problem: Problem) -> str:
+    hint = f" ({problem.hint})" if problem.hint else ""
+    return f"{problem.key}: expected {problem.expected}, found {problem.found}{hint}"
+
+
+def _unit_of(key: str) -> str:
+    suffixes = {
+        "_N_mm_per_rad": "N mm/rad",
+        "_N_per_mm": "N/mm",
+        "_mm": "mm",
+        "_MPa": "MPa",
+        "_deg": "°",
+    }
+    return next((unit for suffix, unit in suffixes.items() if key.endswith(suffix)), "")
+
+
+def _dtype(kind: Kind) -> str:
+    types = {
+        Kind.PATTERN: "S1",
+        Kind.STATUS: "u1",
+        Kind.TEXT: "U1",
+        Kind.COUNT: "i8",
+        Kind.FLAG: "?",
+    }
+    return types.get(kind, "f8")

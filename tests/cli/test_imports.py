@@ -1,0 +1,70 @@
+"""Nothing heavy is loaded before it is needed."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SCRIPT = """
+import sys
+from pathlib import Path
+from dpgcli.cli.main import main
+report = Path(sys.argv.pop(1))
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+report.write_text(" ".join({name.partition(".")[0] for name in sys.modules}))
+"""
+AT_START = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "pydantic", "numba"}
+PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba"}
+
+
+Loaded = Callable[..., set[str]]
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> Loaded:
+    """Names of the top-level modules that a run has loaded."""
+
+    def modules(*arguments: str) -> set[str]:
+        report = tmp_path / "modules.txt"
+        command = [sys.executable, "-c", SCRIPT, str(report), *arguments]
+        subprocess.run(command, capture_output=True, check=True)
+        return set(report.read_text(encoding="utf-8").split())
+
+    return modules
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_the_start_loads_nothing_heavy(loaded: Loaded, option: str) -> None:
+    assert loaded(option) & AT_START == set()
+
+
+@pytest.mark.parametrize("name", ["predict", "validate", "init"])
+def test_help_of_a_command_loads_no_numerics(loaded: Loaded, name: str) -> None:
+    assert loaded(name, "--help") & (AT_START - {"pydantic"}) == set()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("predict", str(CONFIGS / "three_unit.yaml")),
+        ("predict", str(CONFIGS / "three_unit.yaml"), "--format", "json", "--columns", "all"),
+        ("predict", str(CONFIGS / "gripper.yaml"), "--format", "csv"),
+        ("explain", str(CONFIGS / "twenty_unit.yaml")),
+        ("validate", str(CONFIGS / "three_unit.yaml")),
+    ],
+)
+def test_predicting_loads_neither_tables_nor_figures(
+    loaded: Loaded, arguments: tuple[str, ...]
+) -> None:
+    assert loaded(*arguments) & PREDICTING == set()
+
+
+def test_writing_a_table_loads_no_pandas(loaded: Loaded, tmp_path: Path) -> None:
+    table = str(tmp_path / "states.parquet")
+    assert "pandas" not in loaded("predict", str(CONFIGS / "three_unit.yaml"), "-o", table)

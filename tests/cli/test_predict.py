@@ -1,0 +1,334 @@
+"""Rows as they are printed and written, options that change them, and files."""
+
+import csv
+import io
+import json
+import math
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+Call = Callable[..., Any]
+FIRST = [
+    "pattern",
+    "status",
+    "tip_x_mm",
+    "tip_y_mm",
+    "tip_angle_rad",
+    "energy_mJ",
+    "min_eigenvalue_N_per_mm",
+    "residual_N",
+]
+ONE_WELL = ("-s", "finger.lattice.force_linearity=0.2")
+
+
+def rows_of(call: Call, *arguments: str) -> list[dict[str, Any]]:
+    result = call("predict", "-q", *arguments, "--format", "json")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+    def refused(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    rows: list[dict[str, Any]] = json.loads(result.stdout, parse_constant=refused)
+    return rows
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "parquet"])
+def test_the_first_columns_are_fixed(call: Call, folder: Path, form: str) -> None:
+    if form == "parquet":
+        call("predict", "-q", "three_unit.yaml", "-o", "states.parquet")
+        names = pq.read_schema(folder / "states.parquet").names
+    else:
+        text = call("predict", "-q", "three_unit.yaml", "--format", form).stdout
+        head = text.splitlines()[0]
+        names = list(json.loads(text)[0]) if form == "json" else head.replace(",", " ").split()
+    assert names[: len(FIRST)] == FIRST
+
+
+@pytest.mark.parametrize("changes", [(), ONE_WELL, ("--nodes",)])
+@pytest.mark.parametrize("spec", ["three_unit.yaml", "gripper.yaml"])
+def test_all_formats_hold_the_same_values(
+    call: Call, folder: Path, spec: str, changes: tuple[str, ...]
+) -> None:
+    expected = rows_of(call, spec, *changes)
+    text = call("predict", "-q", spec, *changes, "--format", "csv").stdout
+    call("predict", "-q", spec, *changes, "-o", "states.parquet")
+    for got in (
+        [list(row.items()) for row in csv.DictReader(io.StringIO(text))],
+        [list(row.items()) for row in pq.read_table(folder / "states.parquet").to_pylist()],
+        [
+            list(row.items())
+            for row in pd.read_parquet(folder / "states.parquet").to_dict("records")
+        ],
+    ):
+        assert len(got) == len(expected)
+        for row, wanted in zip(got, expected, strict=True):
+            assert [name for name, _ in row] == list(wanted)
+            for (_, value), target in zip(row, wanted.values(), strict=True):
+                if target is None:
+                    assert math.isnan(float(value))
+                elif isinstance(target, float):
+                    assert float(value) == target
+                else:
+                    assert str(value) == str(target)
+
+
+def test_a_table_of_one_state_reads_as_the_manual_says(call: Call) -> None:
+    result = call("predict", "three_unit.yaml", "--pattern", "101")
+    names, values = (line.split() for line in result.stdout.splitlines())
+    row = dict(zip(names, values, strict=True))
+    assert (row["pattern"], row["status"]) == ("101", "stable")
+    assert float(row["tip_x_mm"]) == pytest.approx(38.3598, abs=1e-3)
+
+
+def test_the_summary_is_on_standard_error(call: Call) -> None:
+    result = call("predict", "three_unit.yaml")
+    assert "8 stable" in result.stderr
+    assert "residual" in result.stderr
+    assert " s (" in result.stderr
+    assert "residual " not in result.stdout.replace("residual_N", "")
+
+
+def test_quiet_is_quiet(call: Call) -> None:
+    assert call("predict", "-q", "three_unit.yaml").stderr == ""
+    assert call("predict", "--quiet", "three_unit.yaml").stderr == ""
+
+
+def test_lines_of_a_table_end_without_blanks(call: Call) -> None:
+    text = call("predict", "-q", "three_unit.yaml", *ONE_WELL).stdout
+    assert [line for line in text.splitlines() if line != line.rstrip()] == []
+
+
+def test_only_the_first_rows_of_a_long_table_are_printed(call: Call) -> None:
+    result = call("predict", "three_unit.yaml", "-s", "finger.units=8")
+    assert len(result.stdout.splitlines()) == 65
+    assert "256 rows" in result.stderr
+    whole = call("predict", "-q", "three_unit.yaml", "-s", "finger.units=8", "--format", "csv")
+    assert len(whole.stdout.splitlines()) == 257
+
+
+def test_a_pattern_without_a_state_says_why(call: Call) -> None:
+    rows = rows_of(call, "three_unit.yaml", *ONE_WELL)
+    assert [row["status"] for row in rows] == ["stable", *["not_bistable"] * 7]
+    for row in rows[1:]:
+        assert row["tip_x_mm"] is row["energy_mJ"] is row["min_eigenvalue_N_per_mm"] is None
+        assert row["reached_pattern"] == "000"
+    table = call("predict", "three_unit.yaml", *ONE_WELL)
+    assert "reached_pattern" in table.stdout
+    assert "7 not_bistable" in table.stderr
+    alone = call("predict", "three_unit.yaml", *ONE_WELL, "--pattern", "1*")
+    assert (alone.exit_code, "no stable state" in alone.stderr) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("globs", "found"),
+    [
+        (["101"], ["101"]),
+        (["1*1"], ["101", "111"]),
+        (["1??"], ["100", "101", "110", "111"]),
+        (["111", "000"], ["000", "111"]),
+        (["1*", "1*1"], ["100", "101", "110", "111"]),
+    ],
+)
+def test_patterns_select(call: Call, globs: list[str], found: list[str]) -> None:
+    words = [word for glob in globs for word in ("--pattern", glob)]
+    rows = rows_of(call, "three_unit.yaml", *words)
+    assert [row["pattern"] for row in rows] == found
+    whole = {row["pattern"]: row for row in rows_of(call, "three_unit.yaml")}
+    assert rows == [whole[pattern] for pattern in found]
+
+
+def test_settings_are_typed_as_in_a_file_and_the_last_wins(call: Call) -> None:
+    settings = ("-s", "finger.units=4", "--set", "finger.units=2")
+    assert len(rows_of(call, "three_unit.yaml", *settings)) == 4
+    stiff = rows_of(call, "three_unit.yaml", "-s", "finger.linear_stiffness_N_per_mm=1e6")
+    assert stiff[7]["tip_y_mm"] != rows_of(call, "three_unit.yaml")[7]["tip_y_mm"]
+    graded = ("-s", "finger.overrides.2.geometry.dome_height_mm=7")
+    assert rows_of(call, "three_unit.yaml", *graded)[2] != rows_of(call, "three_unit.yaml")[2]
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("finger.units=five", ["finger.units", '"five"']),
+        ("finger.units=5.0", ["finger.units", "5.0"]),
+        ("finger.units='5'", ["finger.units", '"5"']),
+        ("finger.units=", ["finger.units", "nothing"]),
+        ("finger.units=[1", ["finger.units", "YAML"]),
+        ("finger.unis=5", ["unis", "did you mean units?"]),
+        ("units=5", ["units", "did you mean finger.units?"]),
+        ("finger.lattice.strok_mm=3", ["did you mean stroke_mm?"]),
+        ("finger.units", ["key.path=value"]),
+        ("=5", ["key.path=value"]),
+        ("finger.units.deeper=5", ["finger.units"]),
+    ],
+)
+def test_a_wrong_setting_is_a_problem(call: Call, setting: str, words: list[str]) -> None:
+    result = call("predict", "three_unit.yaml", "-s", setting)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("--set: ")
+    assert [word for word in words if word not in result.stderr] == []
+
+
+def test_wrong_settings_are_listed_together(call: Call) -> None:
+    settings = ("-s", "finger.unis=5", "-s", "gripper.bogus=1", "-s", "finger.units=0")
+    lines = call("predict", "three_unit.yaml", *settings).stderr.splitlines()
+    assert len([line for line in lines if ": expected " in line]) >= 3
+
+
+def test_a_section_that_is_none_gets_no_hint_about_numbers(call: Call) -> None:
+    result = call("predict", "three_unit.yaml", "-s", "finger=3")
+    assert "a section of keys" in result.stderr
+    assert "1e12" not in result.stderr
+
+
+def test_columns_are_chosen(call: Call) -> None:
+    rows = rows_of(call, "three_unit.yaml", "--columns", "energy_mJ, openings")
+    names = ["pattern", "status", "energy_mJ", *(f"opening_{i}_mm" for i in (1, 2, 3))]
+    assert list(rows[0]) == names
+    nodes = rows_of(call, "three_unit.yaml", "--nodes")[0]
+    assert {"B0_x_mm", "T3_y_mm"} < set(nodes)
+    assert nodes["B3_x_mm"] == nodes["tip_x_mm"]
+
+
+def test_unknown_columns_are_named_with_what_there_is(call: Call) -> None:
+    result = call("predict", "three_unit.yaml", "--columns", "tip_x,energies")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "tip_x" in result.stderr
+    assert "tip_x_mm" in result.stderr
+
+
+def test_both_formulations_agree(call: Call) -> None:
+    chain = rows_of(call, "three_unit.yaml")
+    lattice = rows_of(call, "three_unit.yaml", "--formulation", "lattice")
+    for one, other in zip(chain, lattice, strict=True):
+        assert other["tip_x_mm"] == pytest.approx(one["tip_x_mm"], abs=1e-6)
+        assert other["tip_y_mm"] == pytest.approx(one["tip_y_mm"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "target", ["missing/states.parquet", "folder", "three_unit.yaml/states.parquet", "", ".."]
+)
+@pytest.mark.parametrize("option", ["--output", "--plot"])
+def test_a_place_that_cannot_be_written_is_found_before_the_work(
+    call: Call, folder: Path, option: str, target: str
+) -> None:
+    (folder / "folder").mkdir()
+    before = sorted(folder.rglob("*"))
+    result = call("predict", "three_unit.yaml", option, target)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "Traceback" not in result.stderr
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_the_run_file_too_is_tried_before_the_work(call: Call, folder: Path) -> None:
+    (folder / "states.run.json").mkdir()
+    result = call("predict", "three_unit.yaml", "-o", "states.parquet")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert not (folder / "states.parquet").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("predict", "-q", "three_unit.yaml", "-o", "pipe.svg"),
+        ("predict", "-q", "three_unit.yaml", "--plot", "pipe.svg"),
+        ("init", "--force", "pipe.svg"),
+    ],
+)
+def test_what_is_no_plain_file_is_never_replaced(
+    run: Any, folder: Path, arguments: tuple[str, ...]
+) -> None:
+    """A pipe here; renaming over a device such as /dev/null would harm the whole machine."""
+    os.mkfifo(folder / "pipe.svg")
+    result = run(*arguments)
+    assert stat.S_ISFIFO((folder / "pipe.svg").stat().st_mode)
+    assert result.returncode == 2
+    assert "pipe.svg" in result.stderr
+
+
+def test_the_spec_is_not_overwritten_by_its_table(call: Call, folder: Path) -> None:
+    before = (folder / "three_unit.yaml").read_bytes()
+    result = call("predict", "three_unit.yaml", "-o", "three_unit.yaml")
+    assert (folder / "three_unit.yaml").read_bytes() == before
+    assert result.exit_code == 2
+
+
+def test_table_and_figure_need_two_names(call: Call, folder: Path) -> None:
+    result = call("predict", "three_unit.yaml", "-o", "states.svg", "--plot", "states.svg")
+    assert result.exit_code == 2
+    assert not (folder / "states.svg").exists()
+
+
+def test_a_table_comes_with_its_run(call: Call, folder: Path) -> None:
+    assert call("predict", "-q", "three_unit.yaml", "-o", "states.parquet").exit_code == 0
+    facts = json.loads((folder / "states.run.json").read_text(encoding="utf-8"))
+    assert facts["table"] == "states.parquet"
+    assert facts["states"]["stable"] == 8
+    assert facts["seconds"] > 0
+    assert sorted(p.name for p in folder.glob("*states*")) == ["states.parquet", "states.run.json"]
+
+
+def test_files_get_the_permissions_of_new_files(run: Any, folder: Path) -> None:
+    for mask, mode in ((0o077, 0o600), (0o022, 0o644)):
+        result = run("predict", "-q", "three_unit.yaml", "-o", "states.parquet", umask=mask)
+        assert result.returncode == 0
+        for name in ("states.parquet", "states.run.json"):
+            assert stat.S_IMODE((folder / name).stat().st_mode) == mode
+
+
+@pytest.mark.parametrize(
+    ("spec", "name"),
+    [
+        ("twenty_unit.yaml", "states.parquet"),
+        ("three_unit.yaml", "states.svg"),
+    ],
+)
+def test_two_runs_write_the_same_bytes(run: Any, folder: Path, spec: str, name: str) -> None:
+    option = "-o" if name.endswith("parquet") else "--plot"
+    contents = []
+    for _ in range(2):
+        assert run("predict", "-q", spec, option, name).returncode == 0
+        contents.append((folder / name).read_bytes())
+        (folder / name).unlink()
+    assert contents[0] == contents[1]
+
+
+def test_a_figure_names_its_states(call: Call, folder: Path) -> None:
+    assert call("predict", "-q", "gripper.yaml", "--plot", "states.svg").exit_code == 0
+    assert call("predict", "-q", "three_unit.yaml", "--plot", "three.svg").exit_code == 0
+    text = (folder / "three.svg").read_text(encoding="utf-8")
+    assert text.startswith("<?xml")
+    assert all(f">{pattern}<" in text for pattern in ("000", "101", "111"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("three_unit.yaml", "--plot", "states.pdf"), [".svg", ".png"]),
+        (("three_unit.yaml", "--plot", "states"), [".svg", ".png"]),
+        (("twenty_unit.yaml", "--plot", "states.svg"), ["64", "--pattern"]),
+    ],
+)
+def test_a_figure_that_cannot_be_drawn_is_refused_at_once(
+    call: Call, folder: Path, arguments: tuple[str, ...], words: list[str]
+) -> None:
+    result = call("predict", *arguments)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert [word for word in words if word not in result.stderr] == []
+    assert not list(folder.glob("states*"))
+
+
+def test_without_matplotlib_it_says_what_to_install(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    result = call("predict", "three_unit.yaml", "--plot", "states.svg")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "dpgcli[plot]" in result.stderr

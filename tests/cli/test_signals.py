@@ -1,0 +1,117 @@
+"""Ctrl-C, SIGTERM and a closed terminal, at any time: no broken file, a plain message."""
+
+import resource
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+
+SIGNALS = [
+    (signal.SIGINT, ExitCode.INTERRUPTED, "interrupted"),
+    (signal.SIGTERM, ExitCode.TERMINATED, "terminated"),
+]
+WRITING = ("predict", "twenty_unit.yaml", "-o", "states.parquet")
+
+
+def wait_until(happened: Callable[[], bool], process: "subprocess.Popen[bytes]") -> None:
+    end = time.monotonic() + 30
+    while not happened():
+        assert process.poll() is None, "ended too early"
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def is_writing(folder: Path) -> Callable[[], bool]:
+    """Whether the table is being written; the trial before the work stays empty."""
+
+    def happened() -> bool:
+        sizes = []
+        for path in folder.glob(".states.parquet.*.tmp"):
+            try:
+                sizes.append(path.stat().st_size)
+            except FileNotFoundError:
+                continue
+        return any(sizes)
+
+    return happened
+
+
+@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+def test_an_interrupt_while_writing_leaves_nothing(
+    start: Any, folder: Path, number: int, code: int, word: str
+) -> None:
+    process = start(*WRITING)
+    wait_until(is_writing(folder), process)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == code
+    assert errors.decode().splitlines() == [f"dpg: {word}; nothing half-written is left"]
+    assert not list(folder.glob("*states*")) + list(folder.glob(".states*"))
+
+
+@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+def test_an_interrupt_leaves_the_old_table_as_it_was(
+    start: Any, folder: Path, number: int, code: int, word: str
+) -> None:
+    (folder / "states.parquet").write_bytes(b"old")
+    process = start(*WRITING)
+    wait_until(is_writing(folder), process)
+    process.send_signal(number)
+    process.communicate(timeout=30)
+    assert process.returncode == code
+    assert (folder / "states.parquet").read_bytes() == b"old"
+    assert not list(folder.glob(".states*"))
+
+
+def test_a_closed_terminal_leaves_nothing(start: Any, folder: Path) -> None:
+    process = start(*WRITING)
+    wait_until(is_writing(folder), process)
+    process.send_signal(signal.SIGHUP)
+    process.communicate(timeout=30)
+    assert process.returncode != 0
+    assert not list(folder.glob(".states*"))
+
+
+@pytest.mark.parametrize("form", ["json", "csv"])
+def test_an_interrupt_while_printing(start: Any, form: str) -> None:
+    process = start("predict", "twenty_unit.yaml", "--format", form)
+    assert process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == ExitCode.INTERRUPTED
+    assert b"dpg: interrupted" in errors
+    assert b"Traceback" not in errors
+
+
+def limited(n_bytes: int) -> Callable[[], None]:
+    """Files of the child end at so many bytes, as on a full disk."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, n_bytes))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "n_bytes"),
+    [
+        (("predict", "-q", "twenty_unit.yaml", "-o", "states.parquet"), "states.parquet", 100_000),
+        (("predict", "-q", "three_unit.yaml", "-o", "states.parquet"), "states.parquet", 0),
+        (("predict", "-q", "three_unit.yaml", "-o", "states.parquet"), "states.parquet", 1000),
+        (("predict", "-q", "three_unit.yaml", "--plot", "states.svg"), "states.svg", 2000),
+        (("init", "--force", "states.yaml"), "states.yaml", 1000),
+    ],
+)
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(
+    run: Any, folder: Path, arguments: tuple[str, ...], name: str, n_bytes: int
+) -> None:
+    (folder / name).write_bytes(b"old")
+    result = run(*arguments, preexec_fn=limited(n_bytes))
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr.startswith(f"dpg: cannot write {name}: ")
+    assert "Traceback" not in result.stderr
+    assert (folder / name).read_bytes() == b"old"
+    assert [p.name for p in folder.glob("*states*")] == [name]
+    assert not list(folder.glob(".states*"))
