@@ -183,7 +183,7 @@ def _array(column: Column, values: NDArray[Any]) -> Any:
 
 def _strings(values: NDArray[Any]) -> Any:
     """Byte strings, padded to one length in the array, as text."""
-    content = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), -1)
+    content = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), values.itemsize)
     ends = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.itemsize)
     if not content.all():  # the padding is zeros
         lengths = np.char.str_len(values)

@@ -103,18 +103,18 @@ class BistableSprings:
             "b": cell.far_strut * cell.along_far,
         }
         across = {
-            "a": -cell.near_strut * cell.across_near,
-            "b": -cell.far_strut * cell.across_far,
+            "a": cell.near_strut * cell.across_near,
+            "b": cell.far_strut * cell.across_far,
         }
         # second derivatives of x beyond the two outer products
-        bend = {"aa": cell.near_strut * cell.across_near, "bb": -cell.far_strut * cell.across_far}
+        bend = {"aa": across["a"], "bb": -across["b"]}
         if not finger.is_rigid:
             along |= {"e": cell.along_chord, "s": cell.across_far}
-            across |= {"e": -cell.across_chord, "s": cell.along_far}
+            across |= {"e": cell.across_chord, "s": -cell.along_far}
             bend["bs"] = cell.along_far
         if not finger.is_rigid and finger.n_units > 1:
             along["near"] = -cell.across_near
-            across["near"] = -cell.along_near
+            across["near"] = cell.along_near
             bend["neara"] = cell.along_near
         rows = _rows(finger.is_rigid)
         tension = force / cell.length

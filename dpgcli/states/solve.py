@@ -23,6 +23,7 @@ from dpgcli.states.wells import (
 
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))
 TIP_ROUNDING = 8.0 * np.finfo(float).eps
+CANCELLED = 1e-3  # of the product: below it the determinant is found without cancellation
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
 COMPLIANCE_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
@@ -183,7 +184,7 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
     sides = forward(equilibrium.factorization, sides)
     with np.errstate(divide="ignore", invalid="ignore"):  # a mechanism has zero pivots
-        scaled = sides / equilibrium.factorization.pivots[:, None]
+        scaled = sides * (1.0 / equilibrium.factorization.pivots)[:, None]
         step = [total(sides[:, p] * scaled[:, 3]) for p in range(3)]
         slenderness = (finger.stroke / finger.segment_height).max(axis=0)
         softness = slenderness / equilibrium.curvature
@@ -193,27 +194,36 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
         if not with_compliance:
             return Tip(pose, error, angle_error)
         compliance = np.stack([total(sides[:, p] * scaled[:, q]) for p, q in COMPLIANCE_PAIRS])
-        roots = np.sqrt(equilibrium.factorization.pivots)
-        stiffness = _principal_stiffness(sides[:, 0] / roots, sides[:, 1] / roots)
+        stiffness = _principal_stiffness(compliance, sides, equilibrium.factorization.pivots)
     return Tip(pose, error, angle_error, compliance, stiffness)
 
 
-def _principal_stiffness(x: Array, y: Array) -> Array:
-    """Softest and stiffest 1/eigenvalue of the compliance [x·x, x·y; x·y, y·y], (2, batch).
+def _principal_stiffness(compliance: Array, sides: Array, pivots: Array) -> Array:
+    """Softest and stiffest 1/eigenvalue of the position's compliance, (2, batch)."""
+    xx, xy, yy = compliance[:3]
+    determinant = xx * yy - xy * xy
+    cancelling = np.flatnonzero(~(determinant > CANCELLED * xx * yy))
+    if len(cancelling):
+        x, y = (np.take(sides[:, axis], cancelling, axis=-1) for axis in (0, 1))
+        roots = np.sqrt(np.take(pivots, cancelling, axis=-1))
+        determinant[cancelling] = _determinant(x / roots, y / roots)
+    mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    return np.stack((1.0 / (mean + half), (mean + half) / determinant))
 
-    The determinant is that of the longer column and what of the shorter is perpendicular to
-    it, so that it does not cancel; below rounding it is zero, and the stiffness infinite.
+
+def _determinant(x: Array, y: Array) -> Array:
+    """Of the matrix [x·x, x·y; x·y, y·y], without cancellation; zero below rounding.
+
+    It is the square of the longer vector times that of what is perpendicular to it in the
+    other; vectors of shape (size, batch).
     """
     is_longer = total(x * x) >= total(y * y)
     longer, shorter = np.where(is_longer, x, y), np.where(is_longer, y, x)
-    square, product = total(longer * longer), total(longer * shorter)
-    beside = shorter - product / square * longer
+    square = total(longer * longer)
+    beside = shorter - total(longer * shorter) / square * longer
     apart = total(beside * beside)
     smallest = 16.0 * np.finfo(float).eps * np.sqrt(total(shorter * shorter))
-    determinant = square * np.where(np.sqrt(apart) > smallest, apart, 0.0)
-    mean = 0.5 * (square + total(shorter * shorter))
-    softest = mean + np.sqrt(np.maximum(mean * mean - determinant, 0.0))
-    return np.stack((1.0 / softest, softest / determinant))
+    return np.asarray(square * np.where(np.sqrt(apart) > smallest, apart, 0.0))
 
 
 def lanes_at_once(n_units: int) -> int:
