@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from dpgcli import __version__
-from dpgcli.cli import explain, init, predict, schema, sweep, validate
+from dpgcli.cli import explain, init, merge, predict, schema, sweep, validate
 from dpgcli.cli.exits import command, run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
@@ -27,6 +27,7 @@ for _function in (
     predict.predict,
     explain.explain,
     sweep.sweep,
+    merge.merge,
     validate.validate,
     init.init,
     schema.schema,

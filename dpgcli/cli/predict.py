@@ -21,6 +21,7 @@ from dpgcli.cli.options import (
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, Printer, print_csv, print_json, table_printer
+from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import patient_output, say
 
 if TYPE_CHECKING:
@@ -87,27 +88,12 @@ def _printer(printed_as: Format, principal: bool) -> Printer:
 
 
 def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
-    """Blocks, with progress on standard error where the work takes long."""
-    from time import monotonic
-
-    interactive = sys.stderr.isatty() and not quiet
-    period = 0.2 if interactive else 30.0
-    due = monotonic() + (1.0 if interactive else period)
-    total, shown = prediction.plan.n_states, False
+    """Blocks, with progress where the work takes long."""
+    line = ProgressLine(prediction.plan.n_states, "states", quiet=quiet)
     for block in prediction.blocks():
         yield block
-        if not quiet and monotonic() > due:
-            done = prediction.summary.n_states
-            line = f"{done:,} of {total:,} states ({100 * done // total} %)"
-            print(
-                f"\r{line}" if interactive else line,
-                end="" if interactive else "\n",
-                file=sys.stderr,
-                flush=True,
-            )
-            due, shown = monotonic() + period, interactive
-    if shown:
-        print("\r" + " " * 60, end="\r", file=sys.stderr, flush=True)
+        line.show(prediction.summary.n_states)
+    line.clear()
 
 
 def _check_outputs(spec: Path, output: Path | None, plot: Path | None) -> None:

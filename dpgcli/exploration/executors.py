@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
@@ -60,16 +61,14 @@ class Result(Generic[T]):
 
 @dataclass
 class Runner(Generic[T]):
-    """Runs a function of each chunk's arguments on executors of `n_workers` made by `make`.
+    """Runs a function of each chunk's arguments at a workplace.
 
     `deaths` gathers the chunks that were under way when a worker died.
     """
 
-    make: Callable[[int], Executor]
-    n_workers: int
+    workplace: "Workplace"
     function: Callable[..., T]
     arguments: Arguments
-    broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
     deaths: list[Chunk] = field(default_factory=list)
 
     def run(self, chunks: Iterable[Chunk]) -> Iterator[Result[T]]:
@@ -82,28 +81,30 @@ class Runner(Generic[T]):
 
     def _run_until_broken(self, waiting: deque[Chunk]) -> Generator[Result[T], None, list[Chunk]]:
         """Work off `waiting`; return the chunks that were under way when a worker died."""
-        executor = self.make(self.n_workers)
+        executor = self.workplace.make(self.workplace.n_workers)
         under_way: dict[Future[T], Chunk] = {}
         try:
             while waiting or under_way:
-                while waiting and len(under_way) < UNDER_WAY_PER_WORKER * self.n_workers:
+                while waiting and len(under_way) < UNDER_WAY_PER_WORKER * self.workplace.n_workers:
                     future = executor.submit(self.function, *self.arguments(waiting[0]))
                     under_way[future] = waiting.popleft()
                 for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                     value = future.result()
                     yield Result(under_way.pop(future), value)
-        except self.broken:
+        except self.workplace.broken:
             self.deaths += under_way.values()
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
+            for future in under_way:
+                future.cancel()
+            executor.shutdown(wait=False)
         return list(under_way.values())
 
     def _run_alone(self, chunk: Chunk) -> Iterator[Result[T]]:
         """A chunk that may be to blame, in a pool of its own; halved if it is."""
-        executor = self.make(1)
+        executor = self.workplace.make(1)
         try:
             value = executor.submit(self.function, *self.arguments(chunk)).result()
-        except self.broken:
+        except self.workplace.broken:
             if chunk.is_single:
                 yield Result(chunk, None)
                 return
@@ -112,7 +113,36 @@ class Runner(Generic[T]):
         else:
             yield Result(chunk, value)
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
+            executor.shutdown(wait=False)
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where to run: how to make an executor of n workers, how many, and how it says it broke."""
+
+    make: Callable[[int], Executor]
+    n_workers: int
+    broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+
+def serial() -> Workplace:
+    """This process."""
+    return Workplace(lambda _: SerialExecutor(), 1)
+
+
+def processes(n_workers: int) -> Workplace:
+    """A pool of processes on this machine."""
+    return Workplace(process_pool, n_workers)
+
+
+def dask_cluster(scheduler: str) -> Workplace:
+    """The workers of a Dask cluster; raises OSError where no scheduler answers."""
+    from distributed import Client, KilledWorker
+
+    client = Client(scheduler, timeout=10, set_as_default=False)
+    n_threads = sum(client.nthreads().values())
+    executor = partial(client.get_executor, pure=False)
+    return Workplace(lambda _: executor(), max(n_threads, 1), (BrokenExecutor, KilledWorker))
 
 
 class SerialExecutor(Executor):

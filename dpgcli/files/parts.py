@@ -5,6 +5,7 @@ its range and the SHA-256 of its bytes: a part that does not match its name does
 """
 
 import hashlib
+import json
 import re
 import struct
 from collections.abc import Iterable, Iterator
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
+from dpgcli.errors import OutputError
 from dpgcli.files.output import whole_file
 from dpgcli.files.tables import record_batch
 from dpgcli.states.columns import Column
@@ -21,6 +23,7 @@ from dpgcli.states.rows import Columns
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
 LENGTH = struct.Struct("<Q")
+SAID = "sweep.json"
 
 
 def encoded(
@@ -50,6 +53,20 @@ class Part(NamedTuple):
     stop: int
     path: Path
 
+    def batches(self, which: int) -> Iterator[Any]:
+        """Record batches of its states (0) or designs (1)."""
+        yield from self._stream(which)
+
+    def schema(self, which: int) -> Any:
+        """Columns of its states (0) or designs (1)."""
+        return self._stream(which).schema
+
+    def _stream(self, which: int) -> Any:
+        content = self.path.read_bytes()
+        (length,) = LENGTH.unpack_from(content)
+        middle = LENGTH.size + length
+        return pa.ipc.open_stream(content[LENGTH.size : middle] if which == 0 else content[middle:])
+
 
 @dataclass(frozen=True)
 class PartStore:
@@ -63,13 +80,20 @@ class PartStore:
         with whole_file(self.folder / f"{start:010d}-{stop:010d}-{digest}.part") as temporary:
             temporary.write_bytes(content)
 
-    def say(self, said: str) -> None:
+    def say(self, said: dict[str, str]) -> None:
         """Keep what the sweep is about beside its parts."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / "sweep.json"
-        if not path.exists():
-            with whole_file(path) as temporary:
-                temporary.write_text(said, encoding="utf-8")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
+        if not (self.folder / SAID).exists():
+            with whole_file(self.folder / SAID) as temporary:
+                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
+
+    def said(self) -> dict[str, str]:
+        """What the sweep is about."""
+        said: dict[str, str] = json.loads((self.folder / SAID).read_text(encoding="utf-8"))
+        return said
 
     def parts(self) -> list[Part]:
         """Parts in order of their designs."""
@@ -95,21 +119,3 @@ class PartStore:
             if here < stop:
                 gaps.append((here, stop))
         return gaps
-
-    def states(self) -> Iterator[Any]:
-        """Record batches of states, in order."""
-        for part in self.parts():
-            yield from _batches(part.path, 0)
-
-    def designs(self) -> Iterator[Any]:
-        """Record batches of designs, in order."""
-        for part in self.parts():
-            yield from _batches(part.path, 1)
-
-
-def _batches(path: Path, which: int) -> Iterator[Any]:
-    content = path.read_bytes()
-    (length,) = LENGTH.unpack_from(content)
-    middle = LENGTH.size + length
-    stream = content[LENGTH.size : middle] if which == 0 else content[middle:]
-    yield from pa.ipc.open_stream(stream)

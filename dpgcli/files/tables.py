@@ -24,7 +24,7 @@ from dpgcli.states.rows import Columns
 from dpgcli.states.solve import Status
 
 SCHEMA_VERSION = 1
-REPETITIVE = (Kind.STATUS, Kind.TEXT)
+DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten
 ROWS_PER_GROUP = 2**17
 TYPES = {
     Kind.PATTERN: pa.string(),
@@ -63,11 +63,11 @@ def write_states(
     columns = prediction.plan.columns
     rows = prediction.blocks() if blocks is None else blocks
     batches = (record_batch(columns, block) for block in rows)
-    write_table(path, columns, batches, _metadata(prediction.plan, spec_json))
+    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
 
 
 def write_table(
-    path: Path, columns: tuple[Column, ...], batches: Iterable[Any], metadata: dict[str, str]
+    path: Path, described: Any, batches: Iterable[Any], metadata: dict[str, str]
 ) -> None:
     """Write record batches, as they come, to a Parquet file.
 
@@ -80,14 +80,16 @@ def write_table(
         temporary.open("wb") as stream,  # pyarrow takes no name that is not text
         pq.ParquetWriter(
             stream,
-            schema(columns).with_metadata(metadata),
+            described.with_metadata(metadata),
             compression="zstd",
             compression_level=3,
-            use_dictionary=[c.name for c in columns if c.kind in REPETITIVE],
-            use_byte_stream_split=[c.name for c in columns if c.kind is Kind.NUMBER],
+            use_dictionary=[
+                f.name for f in described if pa.types.is_string(f.type) and f.name not in DISTINCT
+            ],
+            use_byte_stream_split=[f.name for f in described if pa.types.is_floating(f.type)],
         ) as writer,
     ):
-        for group in _row_groups(batches, schema(columns)):
+        for group in _row_groups(batches, described):
             for column in group.columns:
                 _hash(digest, column)
             writer.write_batch(group, row_group_size=ROWS_PER_GROUP)

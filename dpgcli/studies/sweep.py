@@ -1,17 +1,16 @@
-"""A sweep: every design of a space, evaluated on an executor, resumable, into two tables."""
+"""A sweep: every design of a space, evaluated at a workplace, resumable, into two tables."""
 
 import hashlib
 import json
 import shutil
-from collections.abc import Callable
-from concurrent.futures import Executor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
 from dpgcli.errors import UsageError
-from dpgcli.exploration.executors import Chunk, Runner, chunked
+from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.exploration.space import Space
 from dpgcli.files.parts import PartStore, encoded
 from dpgcli.files.sweep import Sweep
@@ -21,7 +20,8 @@ from dpgcli.studies.evaluation import Evaluation, Numbers, Tables, value_columns
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
-STATES, DESIGNS = "states.parquet", "designs.parquet"
+STATES, DESIGNS, RUN = "states.parquet", "designs.parquet", "run.json"
+PARTS = ".parts"
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,20 @@ class Shard:
 
 @dataclass
 class Progress:
-    """How far a sweep is; handed to whoever watches after every chunk."""
+    """How far a sweep is; handed to whoever watches after every chunk.
+
+    Seconds are wall time but for `core_seconds`, the workers' CPU time; `failures` are designs
+    whose worker died twice, `deaths` how many chunks were under way when a worker died.
+    """
 
     n_designs: int
-    n_done: int = 0
-    n_resumed: int = 0
-    n_failed: int = 0
+    n_done: int
+    n_resumed: int
     seconds: float = 0.0
-    seconds_writing: float = 0.0
-    cpu_seconds_core: float = 0.0
+    writing_seconds: float = 0.0
+    core_seconds: float = 0.0
     failures: list[int] = field(default_factory=list)
+    deaths: int = 0
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,7 @@ class Study:
 
     @property
     def evaluation(self) -> Evaluation:
+        """The function of each chunk."""
         return Evaluation(
             self.sweep.base_data,
             value_columns(self.sweep.space),
@@ -65,14 +70,23 @@ class Study:
         )
 
     @property
-    def fingerprint(self) -> str:
-        """SHA-256 of all that the results depend on."""
-        text = json.dumps([self.sweep.canonical_json(), self.tolerance, SCHEMA_VERSION, versions()])
-        return hashlib.sha256(text.encode()).hexdigest()
+    def metadata(self) -> dict[str, str]:
+        """All that the results depend on, and its SHA-256 as the fingerprint."""
+        said = {
+            "dpg.sweep": self.sweep.canonical_json(),
+            "dpg.tolerance": repr(self.tolerance),
+            "dpg.designs": str(self.sweep.space.size),
+            "dpg.schema_version": str(SCHEMA_VERSION),
+            "dpg.law": "published: the spring pushes and pulls",
+            "dpg.versions": versions(),
+        }
+        digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        return {**said, "dpg.fingerprint": digest}
 
     @property
     def store(self) -> PartStore:
-        return PartStore(self.folder / ".parts" / self.fingerprint[:16])
+        """Where the parts of just this sweep are kept."""
+        return PartStore(self.folder / PARTS / self.metadata["dpg.fingerprint"][:16])
 
     @property
     def chunk_size(self) -> int:
@@ -81,7 +95,10 @@ class Study:
 
     @property
     def most_units(self) -> int:
-        return max([self.sweep.base.finger.units, *_values(self.sweep.space, "finger.units")])
+        """Units of the longest finger in the space."""
+        key = "finger.units"
+        swept = [int(n) for axis in self.sweep.space.axes for n in axis.values.get(key, ())]
+        return max([self.sweep.base.finger.units, *swept])
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""
@@ -92,8 +109,9 @@ class Study:
     @property
     def is_up_to_date(self) -> bool:
         """Whether both tables are there and were made from just this."""
+        fingerprint = self.metadata["dpg.fingerprint"]
         return all(
-            read_metadata(self.folder / name).get("dpg.fingerprint") == self.fingerprint
+            read_metadata(self.folder / name).get("dpg.fingerprint") == fingerprint
             for name in (STATES, DESIGNS)
         )
 
@@ -110,73 +128,81 @@ class Study:
             )
 
     def check_unfinished(self) -> None:
-        """Refuse to leave an unfinished sweep of other content behind; raises UsageError."""
-        for said in sorted(self.store.folder.parent.glob("*/sweep.json")):
-            if said.parent != self.store.folder:
-                changes = _changes(json.loads(said.read_text()), json.loads(self._said()))
+        """Refuse to go on beside an unfinished sweep of other content; raises UsageError."""
+        for store in stores(self.folder):
+            if store.folder != self.store.folder:
+                changed = ", ".join(differences(store.said(), self.metadata))
                 raise UsageError(
-                    f"{self.folder} holds an unfinished sweep that differs in "
-                    f"{', '.join(changes) or 'versions'}: finish it as it was, take another "
-                    "--output, or drop it with --restart"
+                    f"{self.folder} holds an unfinished sweep that differs in {changed}: "
+                    "finish it as it was, take another --output, or drop it with --restart"
                 )
 
     def drop_unfinished(self) -> None:
         """Remove what unfinished sweeps left in the folder."""
-        shutil.rmtree(self.store.folder.parent, ignore_errors=True)
-
-    def _said(self) -> str:
-        said = json.loads(self.sweep.canonical_json())
-        said["base"] = json.loads(said["base"])
-        return json.dumps({**said, "tolerance": self.tolerance, "versions": versions()})
+        shutil.rmtree(self.folder / PARTS, ignore_errors=True)
 
     def compute(
-        self,
-        make: Callable[[int], Executor],
-        n_workers: int,
-        watch: Callable[[Progress], None],
-        shard: Shard | None = None,
-        broken: tuple[type[BaseException], ...] = (),
+        self, workplace: Workplace, watch: Callable[[Progress], None], shard: Shard | None = None
     ) -> Progress:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
         store.remove_damaged()
-        store.say(self._said())
+        store.say(self.metadata)
         ranges = self.ranges(shard or Shard())
         missing = store.missing(ranges)
-        progress = Progress(sum(stop - start for start, stop in ranges))
-        progress.n_resumed = progress.n_done = progress.n_designs - sum(b - a for a, b in missing)
-        runner = Runner(make, n_workers, _evaluated, lambda c: _arguments(evaluation, space, c))
-        runner.broken += broken
+        n_designs = sum(stop - start for start, stop in ranges)
+        n_resumed = n_designs - sum(stop - start for start, stop in missing)
+        progress = Progress(n_designs, n_resumed, n_resumed)
+        runner = Runner(workplace, _evaluated, lambda c: _arguments(evaluation, space, c))
         began = perf_counter()
         for result in runner.run(chunked(missing, self.chunk_size)):
-            chunk = result.chunk
-            done = result.value
-            if done is None:
+            chunk, part = result.chunk, result.value
+            if part is None:
                 progress.failures.append(chunk.start)
                 tables = evaluation.failed(chunk.start, space.designs(chunk.start, chunk.stop))
-                done = Evaluated(_encoded(evaluation, tables), 0.0)
+                part = Evaluated(_encoded(evaluation, tables), 0.0)
             writing = perf_counter()
-            store.write(chunk.start, chunk.stop, done.content)
-            progress.seconds_writing += perf_counter() - writing
-            progress.cpu_seconds_core += done.cpu_seconds
+            store.write(chunk.start, chunk.stop, part.content)
+            progress.writing_seconds += perf_counter() - writing
+            progress.core_seconds += part.cpu_seconds
             progress.n_done += chunk.stop - chunk.start
             progress.seconds = perf_counter() - began
+            progress.deaths = len(runner.deaths)
             watch(progress)
         return progress
 
     def assemble(self) -> None:
-        """Join all parts into the two tables; whole files only, then the parts go."""
-        evaluation, store = self.evaluation, self.store
-        metadata = {
-            "dpg.fingerprint": self.fingerprint,
-            "dpg.sweep": self._said(),
-            "dpg.schema_version": str(SCHEMA_VERSION),
-            "dpg.law": "published: the spring pushes and pulls",
-            "dpg.versions": versions(),
-        }
-        write_table(self.folder / STATES, evaluation.state_columns, store.states(), metadata)
-        write_table(self.folder / DESIGNS, evaluation.design_columns, store.designs(), metadata)
+        """Join all parts into the two tables; then the parts go."""
+        assemble([self.store], self.folder)
         self.drop_unfinished()
+
+
+def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
+    """Join the parts of one sweep from one or more stores into its two tables, whole or not.
+
+    Raises UsageError for parts of different sweeps, gaps and overlaps.
+    """
+    metadata = parts_of[0].said()
+    for store in parts_of[1:]:
+        if changed := differences(metadata, store.said()):
+            raise UsageError(f"{store.folder.parent.parent} differs in {', '.join(changed)}")
+    parts = sorted(part for store in parts_of for part in store.parts())
+    covered = 0
+    for part in [*parts, None]:
+        start = part.start if part else int(metadata["dpg.designs"])
+        if start != covered:
+            what = "lack" if start > covered else "share"
+            first, last = sorted((start, covered))
+            raise UsageError(f"the parts {what} designs {first} to {last - 1}")
+        covered = part.stop if part else covered
+    for which, name in enumerate((STATES, DESIGNS)):
+        batches = (batch for part in parts for batch in part.batches(which))
+        write_table(folder / name, parts[0].schema(which), batches, metadata)
+
+
+def stores(folder: Path) -> list[PartStore]:
+    """What unfinished sweeps left in a folder."""
+    return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
 
 
 class Evaluated(NamedTuple):
@@ -193,8 +219,7 @@ def _arguments(evaluation: Evaluation, space: Space, chunk: Chunk) -> tuple[Any,
 def _evaluated(evaluation: Evaluation, start: int, values: dict[str, Numbers]) -> Evaluated:
     """What a worker does with a chunk."""
     began = process_time()
-    tables = evaluation(start, values)
-    content = _encoded(evaluation, tables)
+    content = _encoded(evaluation, evaluation(start, values))
     return Evaluated(content, process_time() - began)
 
 
@@ -204,18 +229,33 @@ def _encoded(evaluation: Evaluation, tables: Tables) -> bytes:
     )
 
 
-def _values(space: Space, key: str) -> list[int]:
-    return [int(v) for axis in space.axes if key in axis.values for v in axis.values[key]]
-
-
 def _existing(folder: Path) -> Path:
     """The folder, or the nearest above it that exists."""
     folder = folder.absolute()
     return folder if folder.exists() else _existing(folder.parent)
 
 
+def differences(old: dict[str, str], new: dict[str, str]) -> list[str]:
+    """Dotted keys in which two sweeps' metadata differ; JSON texts are looked into."""
+    plain = [
+        {key: _parsed(text) for key, text in said.items() if key != "dpg.fingerprint"}
+        for said in (old, new)
+    ]
+    return [path.removeprefix("dpg.") for path in _changes(plain[0], plain[1])]
+
+
+def _parsed(text: str) -> Any:
+    """A JSON text as data, JSON texts within it too; other text as it is."""
+    try:
+        data = json.loads(text)
+    except ValueError:
+        return text
+    if isinstance(data, dict):
+        return {k: _parsed(v) if isinstance(v, str) else v for k, v in data.items()}
+    return data
+
+
 def _changes(old: Any, new: Any, path: str = "") -> list[str]:
-    """Dotted keys in which two plain values differ."""
     if isinstance(old, dict) and isinstance(new, dict):
         return [
             change

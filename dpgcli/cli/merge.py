@@ -1,0 +1,32 @@
+"""`dpg merge`: join the shards of a sweep."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dpgcli.cli.streams import say
+
+
+def merge(
+    shards: Annotated[
+        list[Path], typer.Argument(metavar="FOLDER...", help="Output folders of the shards")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
+) -> None:
+    """Join shards into the tables of the whole sweep."""
+    from dpgcli.errors import UsageError
+    from dpgcli.studies.sweep import assemble, stores
+
+    found = []
+    for folder in shards:
+        here = stores(folder)
+        if len(here) != 1:
+            what = "no shard" if not here else "several sweeps"
+            raise UsageError(
+                f"{folder}: expected the output of one dpg sweep --shard, found {what}"
+            )
+        found += here
+    output.mkdir(parents=True, exist_ok=True)
+    assemble(found, output)
+    say(f"{output}: {len(found)} shards joined")
