@@ -21,6 +21,7 @@ class ExitCode(IntEnum):
     """Exit codes of every command."""
 
     DONE = 0
+    REQUIREMENT = 1
     USAGE = 2
     INTERNAL = 3
     NOTHING_SELECTED = 5
@@ -43,8 +44,9 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
+            say(str(error))  # each problem starts with its place
             count = len(error.problems)
-            fail(ExitCode.USAGE, f"{error}\n{count} problem{'s' * (count != 1)}")
+            fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
         except (UsageError, OutputError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
@@ -69,7 +71,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 def fail(code: ExitCode, message: str) -> NoReturn:
     """Say why on standard error and end."""
     for line in message.splitlines():
-        say(line if ": expected " in line else f"dpg: {line}")
+        say(f"dpg: {line}")
     raise typer.Exit(code)
 
 

@@ -1,10 +1,21 @@
 """The finger as the model sees it: lattice dimensions and spring constants."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+
+
+ARRAYS = (
+    "segment_length",
+    "segment_height",
+    "stroke",
+    "bistable_stiffness",
+    "force_linearity",
+    "hinge_stiffness",
+    "linear_stiffness",
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +53,7 @@ class Finger:
 
     def arrays(self) -> dict[str, Array]:
         """Every array by name, in the order of the fields."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "n_units"}
+        return {name: getattr(self, name) for name in ARRAYS}
 
     @property
     def n_designs(self) -> int:

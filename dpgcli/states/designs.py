@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import ARRAYS, Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.columns import Column, Group, Kind
@@ -65,13 +65,14 @@ def design_states(
 
 def _stacked(fingers: Sequence[Finger]) -> Finger:
     """Fingers as the designs of one batch."""
-    columns = {name: [f.arrays()[name] for f in fingers] for name in fingers[0].arrays()}
-    return Finger(fingers[0].n_units, **{k: _side_by_side(v) for k, v in columns.items()})
+    columns = {name: _side_by_side([getattr(f, name) for f in fingers]) for name in ARRAYS}
+    return Finger(fingers[0].n_units, **columns)
 
 
 def _side_by_side(parts: list[Array]) -> Array:
     rows = max(len(part) for part in parts)
-    return np.concatenate([np.broadcast_to(part, (rows, 1)) for part in parts], axis=1)
+    repeated = (part if len(part) == rows else np.repeat(part, rows, axis=0) for part in parts)
+    return np.concatenate(list(repeated), axis=1)
 
 
 def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:

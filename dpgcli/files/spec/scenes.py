@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -205,6 +206,7 @@ def _sources(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> 
     yield Source(key, _ranges(everyone), stiffness, Origin.GIVEN, "as given")
 
 
+@cache  # the same few for every design of a sweep
 def _ranges(units: tuple[int, ...]) -> str:
     """Units as a spec writes them: `1-3`, `5`, `1-3,5`."""
     runs: list[list[int]] = []

@@ -1,0 +1,92 @@
+"""The examples of a pipeline run: the Makefile with make, the workflow's steps with bash."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of the specs, and a `dpg` on the PATH that runs this package."""
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    program = tmp_path / "bin" / "dpg"
+    program.parent.mkdir()
+    program.write_text(
+        f"#!{sys.executable}\nfrom dpgcli.cli.main import main\nif __name__ == '__main__': main()\n",
+        encoding="utf-8",
+    )
+    program.chmod(0o755)
+    return tmp_path
+
+
+def shell(
+    command: str, checkout: Path, folder: Path, **env: str
+) -> "subprocess.CompletedProcess[str]":
+    path = f"{checkout / 'bin'}:{os.environ['PATH']}"
+    return subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", command],
+        cwd=folder,
+        env={**os.environ, "PATH": path, **env},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def make(checkout: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    folder = checkout / "configs" / "pipeline"
+    return shell(" ".join(("make", *arguments)), checkout, folder)
+
+
+def test_make_does_what_is_out_of_date_and_no_more(checkout: Path) -> None:
+    first = make(checkout)
+    assert first.returncode == 0, first.stderr
+    out = checkout / "configs" / "pipeline" / "out"
+    assert {p.name for p in out.iterdir()} >= {"states.parquet", "designs.parquet", "report.html"}
+    again = make(checkout)
+    assert "dpg" not in again.stdout
+    base = checkout / "configs" / "five_unit.yaml"
+    base.write_text(base.read_text().replace("elastic_modulus_MPa: 26", "elastic_modulus_MPa: 27"))
+    changed = make(checkout)
+    assert changed.returncode == 0, changed.stderr
+    assert "dpg sweep" in changed.stdout
+
+
+def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
+    result = make(checkout, "REQUIRE='min_barrier_mJ > 1e6'")
+    assert result.returncode == 2  # of make: a recipe failed
+    assert not (checkout / "configs" / "pipeline" / "out" / "checked").exists()
+
+
+def workflow() -> dict[str, Any]:
+    text = (ROOT / "configs" / "pipeline" / "ci.yml").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = YAML(typ="safe", pure=True).load(text)
+    return loaded
+
+
+def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
+    jobs, sweep = workflow()["jobs"], workflow()["env"]["SWEEP"]
+    summary = checkout / "summary.md"
+    steps = [
+        step["run"].replace("${{ matrix.shard }}", str(shard))
+        for shard in jobs["sweep"]["strategy"]["matrix"]["shard"]
+        for step in jobs["sweep"]["steps"]
+        if "run" in step
+    ]
+    steps += [step["run"] for step in jobs["gate"]["steps"] if "run" in step]
+    for step in steps:
+        if not step.startswith("pip "):
+            env = {"SWEEP": sweep, "GITHUB_STEP_SUMMARY": str(summary), "GITHUB_ACTIONS": "true"}
+            result = shell(step, checkout, checkout, **env)
+            assert result.returncode == 0, (step, result.stderr)
+    assert "|" in summary.read_text(encoding="utf-8")
