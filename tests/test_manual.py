@@ -4,22 +4,36 @@ import inspect
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from dpgcli.cli import explain, init, predict, schema, validate
+from dpgcli.cli import check, explain, init, merge, predict, report, schema, sweep, validate
 from dpgcli.cli.exits import ExitCode
 from dpgcli.files.spec import json_schema, read_spec
+from dpgcli.files.sweep import read_sweep
 from dpgcli.mechanics.scene import Origin
 from dpgcli.states.columns import Group, declared
+from dpgcli.states.designs import DESIGN_COLUMNS
 from dpgcli.states.solve import Status
+from dpgcli.studies.evaluation import DesignStatus
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = (predict.predict, explain.explain, validate.validate, init.init, schema.schema)
+COMMANDS = (
+    predict.predict,
+    explain.explain,
+    sweep.sweep,
+    merge.merge,
+    check.check,
+    report.report,
+    validate.validate,
+    init.init,
+    schema.schema,
+)
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
 
 
@@ -59,6 +73,14 @@ def test_the_spec_shown_is_valid(tmp_path: Path) -> None:
     assert read_spec(path).finger.units == 5
 
 
+def test_the_sweep_shown_is_valid(tmp_path: Path) -> None:
+    (tmp_path / "sweeps").mkdir()
+    shutil.copy(ROOT / "configs" / "five_unit.yaml", tmp_path)
+    path = tmp_path / "sweeps" / "sweep.yaml"
+    path.write_text(blocks("yaml")[1], encoding="utf-8")
+    assert read_sweep(path).space.size == 13 * 3 * 3 * 2 * 64
+
+
 def test_the_example_in_python_runs(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -88,5 +110,7 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     columns = declared(3, ("bistable", "hinge", "bar"), True)
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
+    assert not {name for name in named if f"`{name}" not in README}
+    named = {c.name for c in DESIGN_COLUMNS} | set(DesignStatus)
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

@@ -15,6 +15,7 @@ from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
     from dpgcli.exploration.executors import Workplace
+    from dpgcli.exploration.expressions import Expression
     from dpgcli.studies.sweep import Progress, Shard, Study
 
 
@@ -26,55 +27,109 @@ class ExecutorName(StrEnum):
     DASK = "dask"
 
 
+SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")]
+Jobs = Annotated[
+    int | None, typer.Option("-j", "--jobs", min=1, help="Processes  [default: cores]")
+]
+Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask: tcp://host:port")
+]
+Part = Annotated[
+    str | None, typer.Option("--shard", metavar="K/N", help="Only part K of N; see merge")
+]
+Restart = Annotated[bool, typer.Option("--restart", help="Drop what an unfinished sweep left")]
+Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
+Depfile = Annotated[Path | None, typer.Option("--depfile", help="Write the files read, for Make")]
+Require = Annotated[
+    list[str] | None,
+    typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
+]
+SummaryFile = Annotated[
+    Path | None, typer.Option("--summary-file", help="Append the report to this file")
+]
+
+
 def sweep(
-    spec: Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
-    jobs: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, help="Processes  [default: cores]")
-    ] = None,
-    executor: Annotated[
-        ExecutorName, typer.Option("--executor", help="Where designs are evaluated")
-    ] = ExecutorName.PROCESSES,
-    scheduler: Annotated[
-        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask: tcp://host:port")
-    ] = None,
-    shard: Annotated[
-        str | None, typer.Option("--shard", metavar="K/N", help="Only part K of N; see merge")
-    ] = None,
+    spec: SweepPath,
+    output: Output,
+    jobs: Jobs = None,
+    executor: Where = ExecutorName.PROCESSES,
+    scheduler: Scheduler = None,
+    shard: Part = None,
     settings: Settings = None,
     tolerance: Tolerance = None,
-    restart: Annotated[
-        bool, typer.Option("--restart", help="Drop what an unfinished sweep left")
-    ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")] = False,
-    depfile: Annotated[
-        Path | None, typer.Option("--depfile", help="Write the files read, for Make")
-    ] = None,
+    restart: Restart = False,
+    force: Force = False,
+    depfile: Depfile = None,
+    require: Require = None,
+    summary_file: SummaryFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Evaluate every design of a space, resumably."""
+    from dpgcli.errors import UsageError
     from dpgcli.files.sweep import read_sweep
     from dpgcli.states.plan import DEFAULT_TOLERANCE
     from dpgcli.studies.sweep import Study
 
     part = _shard(shard)
+    if part is not None and (require or summary_file):
+        raise UsageError("--require and --summary-file need the whole table: give them to check")
     study = Study(read_sweep(spec, settings or ()), output, tolerance or DEFAULT_TOLERANCE)
+    rules = _rules(study, require or [])
     if depfile is not None:
         _write_depfile(depfile, study)
     if study.is_up_to_date and part is None:
         say(f"{output}: up to date")
-        return
-    if restart:
-        study.drop_unfinished()
-    study.check_unfinished()
-    if not force:
-        study.check_room()
-    progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
+    else:
+        if restart:
+            study.drop_unfinished()
+        study.check_unfinished()
+        if not force:
+            study.check_room()
+        progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
+        if part is None:
+            study.assemble()
+            _write_run(study, progress)
+        if not quiet:
+            say(_summary(output, progress, part))
     if part is None:
-        study.assemble()
-        _write_run(study, progress)
+        _conclude(study, rules, summary_file, quiet)
+
+
+def _rules(study: "Study", require: list[str]) -> "list[Expression]":
+    """Requirements over the columns of designs, checked before any work."""
+    from dpgcli.report.requirements import requirement
+    from dpgcli.states.columns import Kind
+
+    columns = study.evaluation.design_columns
+    numbers = [column.name for column in columns if column.kind in (Kind.COUNT, Kind.NUMBER)]
+    return [requirement(text, numbers) for text in require]
+
+
+def _conclude(
+    study: "Study", rules: "list[Expression]", summary_file: Path | None, quiet: bool
+) -> None:
+    """Write and print the report; then what the requirements say, which may end with code 1."""
+    from dpgcli.cli.check import append_summary, conclude
+    from dpgcli.cli.validate import ProblemFormat
+    from dpgcli.files.output import whole_file
+    from dpgcli.files.reading import read_designs, read_run
+    from dpgcli.report.page import markdown, verdicts_markdown
+    from dpgcli.report.requirements import check_requirements
+    from dpgcli.studies.sweep import DESIGNS, REPORT, RUN
+
+    designs, units = read_designs(study.folder / DESIGNS)
+    text = markdown(designs, units, read_run(study.folder / RUN))
+    with whole_file(study.folder / REPORT) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     if not quiet:
-        say(_summary(output, progress, part))
+        print(text, end="")
+    verdicts = check_requirements(designs, rules) if rules else ()
+    if summary_file is not None:
+        append_summary(summary_file, text + ("\n" + verdicts_markdown(verdicts) if rules else ""))
+    conclude(verdicts, ProblemFormat.TEXT)
 
 
 def _computed(

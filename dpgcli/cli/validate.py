@@ -67,10 +67,10 @@ def _print_json(problems: list[Problem]) -> None:
 def _print_github(problems: list[Problem]) -> None:
     """Workflow commands; property values and messages are escaped as GitHub asks."""
     for problem in problems[:MOST_ANNOTATIONS]:
-        place = f"file={_escaped(problem.file, ':,')}"
+        place = f"file={escaped(problem.file, ':,')}"
         place += f",line={problem.line}" if problem.line is not None else ""
         place += f",col={problem.column}" if problem.column is not None else ""
-        print(f"::error {place}::{_escaped(str(problem))}")
+        print(f"::error {place}::{escaped(str(problem))}")
     if len(problems) > MOST_ANNOTATIONS:
         print(f"::error ::and {len(problems) - MOST_ANNOTATIONS} more problems")
 
@@ -82,7 +82,8 @@ _PRINTERS = {
 }
 
 
-def _escaped(text: str, also: str = "") -> str:
+def escaped(text: str, also: str = "") -> str:
+    """Text as a GitHub workflow command takes it."""
     for character in "%\r\n" + also:
         text = text.replace(character, f"%{ord(character):02X}")
     return text

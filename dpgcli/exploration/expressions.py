@@ -107,8 +107,10 @@ def _parts(node: ast.expr) -> list[ast.expr]:
     if isinstance(node, ast.Compare) and all(type(op) in _COMPARISONS for op in node.ops):
         return [node.left, *node.comparators]
     if isinstance(node, ast.Call) and not node.keywords and isinstance(node.func, ast.Name):
-        if node.func.id in _FUNCTIONS and node.args:
+        if node.func.id in _FUNCTIONS and _takes(node.func.id, len(node.args)):
             return node.args
+        if node.func.id in _FUNCTIONS:
+            raise ExpressionError(f"{node.func.id} does not take {len(node.args)} values")
         raise ExpressionError(f"unknown function {node.func.id}; known: {', '.join(_FUNCTIONS)}")
     raise ExpressionError(f"not allowed here: {ast.unparse(node)[:40]}")
 
@@ -117,6 +119,10 @@ def _number(node: ast.expr) -> int | float | None:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return None if isinstance(node.value, bool) else node.value
     return None
+
+
+def _takes(function: str, n_values: int) -> bool:
+    return n_values > 1 if function in ("min", "max") else n_values == 1
 
 
 def _dotted(node: ast.expr) -> str:

@@ -6,7 +6,6 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 
-
 ARRAYS = (
     "segment_length",
     "segment_height",

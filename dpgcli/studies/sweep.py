@@ -20,7 +20,7 @@ from dpgcli.studies.evaluation import Evaluation, Numbers, Tables, value_columns
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
-STATES, DESIGNS, RUN = "states.parquet", "designs.parquet", "run.json"
+STATES, DESIGNS, RUN, REPORT = "states.parquet", "designs.parquet", "run.json", "report.md"
 PARTS = ".parts"
 
 

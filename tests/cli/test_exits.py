@@ -15,6 +15,11 @@ COMMANDS = {
     "predict": "--output --format --pattern --set --columns --nodes --formulation --tolerance "
     "--plot --quiet",
     "explain": "--format --pattern --set --columns --nodes --formulation --tolerance",
+    "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --restart --force "
+    "--depfile --require --summary-file --quiet",
+    "merge": "--output",
+    "check": "--require --format --summary-file",
+    "report": "--output",
     "validate": "--format --set",
     "init": "--force",
     "schema": "",
@@ -24,6 +29,7 @@ COMMANDS = {
 def test_the_codes_are_the_published_ones() -> None:
     assert {code.name: int(code) for code in ExitCode} == {
         "DONE": 0,
+        "REQUIREMENT": 1,
         "USAGE": 2,
         "INTERNAL": 3,
         "NOTHING_SELECTED": 5,

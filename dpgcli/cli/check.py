@@ -1,0 +1,128 @@
+"""`dpg check`: hold a table of designs against requirements."""
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.streams import say
+from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat, escaped
+
+if TYPE_CHECKING:
+    from dpgcli.report.requirements import Verdict
+
+MOST_LINES = 20
+LARGEST_SUMMARY = 2**20  # bytes; GitHub refuses more
+NOTE = "dpg: left out, the summary would be larger than 1 MiB.\n"
+
+
+def check(
+    table: Annotated[Path, typer.Argument(metavar="TABLE", help="designs.parquet of a sweep")],
+    require: Annotated[
+        list[str],
+        typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
+    ],
+    listed_as: Annotated[
+        ProblemFormat, typer.Option("--format", help="How to list designs that fail")
+    ] = ProblemFormat.TEXT,
+    summary_file: Annotated[
+        Path | None, typer.Option("--summary-file", help="Append Markdown to this file")
+    ] = None,
+) -> None:
+    """Check that every design of a table meets requirements."""
+    from dpgcli.files.reading import read_designs
+    from dpgcli.report.page import verdicts_markdown
+    from dpgcli.report.requirements import check_requirements, number_columns, requirement
+
+    designs, _ = read_designs(table)
+    columns = number_columns(designs)
+    verdicts = check_requirements(designs, [requirement(text, columns) for text in require])
+    if summary_file is not None:
+        append_summary(summary_file, verdicts_markdown(verdicts))
+    conclude(verdicts, listed_as)
+
+
+def conclude(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
+    """Print verdicts; ends the command with its exit code if a requirement is not met."""
+    with suppress(BrokenPipeError):  # the verdict stands when nobody reads on
+        _PRINTERS[listed_as](verdicts)
+        sys.stdout.flush()
+    if not all(verdict.is_met for verdict in verdicts):
+        raise typer.Exit(ExitCode.REQUIREMENT)
+
+
+def append_summary(path: Path, text: str) -> None:
+    """Append Markdown, such as to $GITHUB_STEP_SUMMARY; a note where it would get too large."""
+    from dpgcli.errors import OutputError
+
+    content = text.encode(errors="backslashreplace")
+    try:
+        with path.open("ab") as stream:
+            size = os.fstat(stream.fileno()).st_size
+            gap = b"\n" if size else b""
+            room = LARGEST_SUMMARY - size - len(gap)
+            if len(content) > room:
+                say(f"dpg: {path}: no room for {len(content):,} bytes within 1 MiB")
+                content = NOTE.encode()
+            if len(content) <= room:
+                stream.write(gap + content)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _print_text(verdicts: Sequence["Verdict"]) -> None:
+    for verdict in verdicts:
+        print(verdict)
+        for failure in verdict.failures(MOST_LINES):
+            print(f"  {failure}")
+        if len(verdict.rows) > MOST_LINES:
+            print(f"  and {len(verdict.rows) - MOST_LINES:,} more")
+
+
+def _print_json(verdicts: Sequence["Verdict"]) -> None:
+    import json
+
+    print(json.dumps([_record(verdict) for verdict in verdicts], indent=2))
+
+
+def _print_github(verdicts: Sequence["Verdict"]) -> None:
+    messages = [
+        f"{verdict.requirement.text}: {failure}"
+        for verdict in verdicts
+        for failure in verdict.failures(MOST_ANNOTATIONS)
+    ]
+    for message in messages[:MOST_ANNOTATIONS]:
+        print(f"::error ::{escaped(message)}")
+    n_more = sum(len(verdict.rows) for verdict in verdicts) - MOST_ANNOTATIONS
+    if n_more > 0:
+        print(f"::error ::and {n_more:,} more")
+
+
+_PRINTERS = {
+    ProblemFormat.TEXT: _print_text,
+    ProblemFormat.JSON: _print_json,
+    ProblemFormat.GITHUB: _print_github,
+}
+
+
+def _record(verdict: "Verdict") -> dict[str, Any]:
+    """A verdict as JSON values; null for what is not a finite number."""
+    import math
+    from dataclasses import asdict
+
+    failures = [asdict(failure) for failure in verdict.failures()]
+    for failure in failures:
+        found = failure["found"].items()
+        failure["found"] = {k: v if math.isfinite(v) else None for k, v in found}
+    return {
+        "requirement": verdict.requirement.text,
+        "is_met": verdict.is_met,
+        "n_checked": verdict.n_checked,
+        "n_failing": len(verdict.rows),
+        "failing": failures,
+    }

@@ -1,0 +1,34 @@
+"""`dpg report`: a design space on one page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+KINDS = (".md", ".html")
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a finished sweep")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="File, .md or .html  [default: standard output]"),
+    ] = None,
+) -> None:
+    """Summarize a design space: what is best, what failed and why, where bistability ends."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.output import whole_file
+    from dpgcli.files.reading import read_designs, read_run
+    from dpgcli.report.page import html, markdown
+
+    kind = ".md" if output is None else output.suffix.lower()
+    if kind not in KINDS:
+        raise UsageError(f"--output {output}: expected a name that ends in {' or '.join(KINDS)}")
+    designs, units = read_designs(folder / "designs.parquet")
+    facts = read_run(folder / "run.json")
+    text = (markdown if kind == ".md" else html)(designs, units, facts)
+    if output is None:
+        print(text, end="")
+        return
+    with whole_file(output) as temporary:
+        temporary.write_bytes(text.encode(errors="backslashreplace"))

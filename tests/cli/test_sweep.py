@@ -1,0 +1,271 @@
+"""`dpg sweep`: tables, messages, exit codes, and a file for Make."""
+
+import os
+import resource
+import shutil
+import subprocess
+from collections import namedtuple
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+
+HEIGHT = "finger.geometry.dome_height_mm"
+SEPARATION = "finger.geometry.unit_separation_mm"
+SWEEP = f"""base: three_unit.yaml
+space:
+  - {{key: {HEIGHT}, values: [2.5, 6, 6.5]}}
+  - {{key: {SEPARATION}, values: [2, 3]}}
+"""
+SERIAL = ("-o", "out", "--executor", "serial")
+
+
+@pytest.fixture
+def sweep(folder: Path) -> Path:
+    """A small sweep in the folder."""
+    path = folder / "sweep.yaml"
+    path.write_text(SWEEP)
+    return path
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
+
+
+def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
+    result = call("sweep", "sweep.yaml", *SERIAL)
+    assert (result.exit_code, result.stdout) == (ExitCode.DONE, "")
+    assert result.stderr.startswith("out: 6 designs in ")
+    out = sweep.parent / "out"
+    assert sorted(p.name for p in out.iterdir()) == [
+        "designs.parquet",
+        "run.json",
+        "states.parquet",
+    ]
+    designs = pd.read_parquet(out / "designs.parquet")
+    assert designs["status"].tolist() == ["invalid" if i == 1 else "stable" for i in range(6)]
+    assert designs["reason"][1].startswith(f"{HEIGHT}: expected a dome height > the unit")
+    states = pd.read_parquet(out / "states.parquet")
+    assert len(states) == 5 * 8
+
+
+def test_the_same_bytes_from_processes(run: Any, call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    result = run("sweep", "sweep.yaml", "-o", "two", "-j", "2", "-q")
+    assert (result.returncode, result.stdout, result.stderr) == (ExitCode.DONE, "", "")
+    assert contents(sweep.parent / "two") == contents(sweep.parent / "out")
+
+
+def test_up_to_date_computes_and_touches_nothing(call: Any, sweep: Path) -> None:
+    call("sweep", "sweep.yaml", *SERIAL)
+    before = {p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (sweep.parent / "out").iterdir()}
+    sweep.write_text("# a comment changes nothing\n" + SWEEP)
+    result = call("sweep", "sweep.yaml", *SERIAL)
+    assert (result.exit_code, result.stderr) == (ExitCode.DONE, "out: up to date\n")
+    after = {p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (sweep.parent / "out").iterdir()}
+    assert after == before
+
+
+def test_quiet_is_silent_always(call: Any, sweep: Path) -> None:
+    for _ in ("computed", "up to date"):
+        assert call("sweep", "sweep.yaml", *SERIAL, "-q").output == ""
+
+
+def test_settings_change_the_base(call: Any, sweep: Path) -> None:
+    call("sweep", "sweep.yaml", *SERIAL, "-s", "finger.units=2")
+    designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
+    assert set(designs["n_states"]) == {0, 4}
+
+
+def test_a_sweep_from_standard_input(run: Any, sweep: Path) -> None:
+    result = run("sweep", "-", *SERIAL, "-q", input=sweep.read_text())
+    assert (result.returncode, result.stderr) == (ExitCode.DONE, "")
+
+
+def test_a_column_for_every_key_beside_those_that_are_always_there(call: Any, sweep: Path) -> None:
+    sweep.write_text(
+        "base: three_unit.yaml\nspace:\n"
+        "  - {key: finger.overrides.1.geometry.dome_height_mm, values: [6]}\n"
+        "  - {key: finger.overrides.2-3.geometry.dome_height_mm, values: [6.5, 7]}\n"
+    )
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
+    assert designs["finger.overrides.1.geometry.dome_height_mm"].tolist() == [6, 6]
+    assert designs["finger.overrides.2-3.geometry.dome_height_mm"].tolist() == [6.5, 7]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("space: []\n", "sweep.yaml:1:1: base: expected the path of a spec"),
+        (SWEEP.replace("values: [2, 3]", "vals: [2]"), "sweep.yaml:4:51: space.1.vals: expected"),
+        (SWEEP.replace("dome_height", "dome_hight"), "(did you mean dome_height_mm?)"),
+        (SWEEP + "constraints: [1 +]\n", "sweep.yaml:5:15: constraints.0: expected an expression"),
+        (SWEEP + "  - {table: t.csv}\n", "sweep.yaml:5:6: space.2.table: expected a CSV or"),
+        (SWEEP.replace("three", "four"), "four_unit.yaml: file: expected a readable file"),
+        (SWEEP + "constraints: [calibration > 3]\n", "sweep.yaml:5:15: constraints.0: expected"),
+    ],
+)
+def test_problems_have_their_place(call: Any, sweep: Path, content: str, said: str) -> None:
+    sweep.write_text(content)
+    result = call("sweep", "sweep.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.USAGE, result.stderr
+    assert said in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("dpg: ")
+    assert "Traceback" not in result.stderr
+    assert not (sweep.parent / "out").exists()
+
+
+@pytest.mark.parametrize("shard", ["0/2", "3/2", "1", "a/b", "1/0", "-1/2", "1/2/3", "1.5/2"])
+def test_a_shard_is_k_of_n(call: Any, sweep: Path, shard: str) -> None:
+    result = call("sweep", "sweep.yaml", *SERIAL, "--shard", shard)
+    assert result.exit_code == ExitCode.USAGE
+    assert "expected K/N" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "options", [("--executor", "dask"), ("--scheduler", "tcp://127.0.0.1:1"), ("-j", "0")]
+)
+def test_options_that_make_no_sense(call: Any, sweep: Path, options: tuple[str, ...]) -> None:
+    result = call("sweep", "sweep.yaml", "-o", "out", *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert not (sweep.parent / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["file", "file/out"])
+def test_an_output_that_cannot_be_a_folder(call: Any, sweep: Path, name: str) -> None:
+    (sweep.parent / "file").write_text("old")
+    result = call("sweep", "sweep.yaml", "--executor", "serial", "-o", name)
+    assert result.exit_code == ExitCode.USAGE
+    assert result.stderr.startswith("dpg: cannot write file")
+    assert (sweep.parent / "file").read_text() == "old"
+
+
+def test_a_changed_sweep_beside_an_unfinished_one(call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL, "--shard", "1/2").exit_code == ExitCode.DONE
+    changed = ("sweep", "sweep.yaml", *SERIAL, "-s", "finger.units=2")
+    result = call(*changed)
+    assert result.exit_code == ExitCode.USAGE
+    assert "differs in sweep.base.finger.units" in result.stderr
+    assert "--restart" in result.stderr
+    assert call(*changed, "--restart").exit_code == ExitCode.DONE
+    assert not (sweep.parent / "out" / ".parts").exists()
+
+
+Usage = namedtuple("Usage", "total used free")
+
+
+def test_a_disk_too_small(call: Any, sweep: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, 1000))
+    result = call("sweep", "sweep.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.USAGE
+    assert "6 designs have about 48 states" in result.stderr
+    assert "--force" in result.stderr
+    assert not (sweep.parent / "out").exists()
+    assert call("sweep", "sweep.yaml", *SERIAL, "--force").exit_code == ExitCode.DONE
+
+
+@pytest.mark.parametrize("n_bytes", [0, 300, 3000, 15000])
+def test_a_full_disk_leaves_nothing_half_written_and_can_go_on(
+    run: Any, call: Any, sweep: Path, n_bytes: int
+) -> None:
+    result = run(
+        "sweep",
+        "sweep.yaml",
+        *SERIAL,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, n_bytes)),
+    )
+    assert result.returncode == ExitCode.USAGE
+    assert "cannot write out/" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not list((sweep.parent / "out").rglob("*.tmp"))
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    assert call("sweep", "sweep.yaml", "-o", "new", "--executor", "serial").exit_code == 0
+    assert contents(sweep.parent / "out") == contents(sweep.parent / "new")
+
+
+def make(folder: Path, target: str) -> str:
+    """What GNU Make does, with an environment of its own."""
+    environment = {"PATH": os.environ["PATH"]}
+    command = ["make", "--no-print-directory", "-f", "Makefile", target]
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    return done.stdout + done.stderr
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@pytest.mark.parametrize("name", ["sweep.yaml", "a sweep.yaml", "a#b.yaml", "a$b.yaml", "a%b.yaml"])
+def test_make_runs_a_sweep_only_when_a_file_changed(call: Any, sweep: Path, name: str) -> None:
+    folder = sweep.parent
+    (folder / "heights.csv").write_text(f"{HEIGHT}\n6\n6.5\n")
+    (folder / name).write_text("base: three_unit.yaml\nspace: [{table: heights.csv}]\n")
+    result = call("sweep", name, *SERIAL, "--depfile", "out.d")
+    assert result.exit_code == ExitCode.DONE
+    (folder / "Makefile").write_text("out/states.parquet:\n\t@echo again\n\ninclude out.d\n")
+    assert "up to date" in make(folder, "out/states.parquet")
+    later = (folder / "out" / "states.parquet").stat().st_mtime + 10
+    for changed in (name, "three_unit.yaml", "heights.csv"):
+        before = (folder / changed).stat().st_mtime
+        os.utime(folder / changed, (later, later))
+        assert make(folder, "out/states.parquet") == "again\n", changed
+        os.utime(folder / changed, (before, before))
+    (folder / "heights.csv").unlink()
+    assert make(folder, "out/states.parquet") == "again\n", "a lost file is no error, as in gcc -MP"
+
+
+def test_a_depfile_in_the_output_folder(call: Any, sweep: Path) -> None:
+    result = call("sweep", "sweep.yaml", *SERIAL, "--depfile", "out/sweep.d")
+    assert result.exit_code == ExitCode.DONE
+    assert (sweep.parent / "out" / "sweep.d").read_text() == (
+        "out/states.parquet out/designs.parquet: sweep.yaml three_unit.yaml\n"
+        "\nsweep.yaml:\n\nthree_unit.yaml:\n"
+    )
+
+
+def test_a_depfile_of_standard_input_names_files_only(run: Any, sweep: Path) -> None:
+    result = run("sweep", "-", *SERIAL, "--depfile", "out.d", input=sweep.read_text())
+    assert result.returncode == ExitCode.DONE
+    text = (sweep.parent / "out.d").read_text()
+    assert text.splitlines()[0] == "out/states.parquet out/designs.parquet: three_unit.yaml"
+
+
+def test_progress_goes_to_standard_error_only(run: Any, sweep: Path) -> None:
+    result = run("sweep", "sweep.yaml", "-o", "out", "-j", "2")
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_dead_worker_is_reported_with_the_designs_it_held(
+    call: Any, sweep: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from concurrent.futures import BrokenExecutor
+
+    from dpgcli.exploration import executors
+
+    submit = executors.SerialExecutor.submit
+
+    def deadly(self: Any, fn: Any, /, *arguments: Any) -> Any:
+        if 6.0 in arguments[2][HEIGHT] and 2.0 in arguments[2][SEPARATION]:
+            fn, arguments = _die, ()
+        return submit(self, fn, *arguments)
+
+    def _die() -> None:
+        raise BrokenExecutor("killed")
+
+    monkeypatch.setattr(executors.SerialExecutor, "submit", deadly)
+    result = call("sweep", "sweep.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.DONE
+    designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
+    assert designs["status"].tolist() == [
+        "stable",
+        "invalid",
+        "failed",
+        "stable",
+        "stable",
+        "stable",
+    ]
+    assert "design 2" in result.stderr

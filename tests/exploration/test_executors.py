@@ -1,0 +1,131 @@
+"""Chunks at a workplace: every case once, whatever dies."""
+
+import importlib
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked, processes, serial
+
+
+@pytest.fixture
+def deadly(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Functions that worker processes can import too."""
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    return importlib.import_module("deadly")
+
+
+def results(runner: "Runner[Any]", chunks: Iterator[Chunk]) -> dict[int, Any]:
+    """Values by case; every case must come once."""
+    values: dict[int, Any] = {}
+    for result in runner.run(chunks):
+        cases = range(result.chunk.start, result.chunk.stop)
+        assert values.keys().isdisjoint(cases)
+        values |= dict.fromkeys(cases) if result.value is None else {}
+        values |= dict(zip(cases, result.value or (), strict=False))
+    return values
+
+
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=8), st.integers(1, 7))
+def test_chunks_cover_what_is_missing_and_are_cut_at_fixed_places(
+    lengths: list[int], size: int
+) -> None:
+    missing, here = [], 0
+    for length in lengths:
+        missing.append((here, here + length))
+        here += length + 2
+    chunks = list(chunked(missing, size))
+    cases = [case for chunk in chunks for case in range(chunk.start, chunk.stop)]
+    assert cases == [case for start, stop in missing for case in range(start, stop)]
+    assert all(c.start // size == (c.stop - 1) // size for c in chunks)
+
+
+@pytest.mark.parametrize("workplace", [serial(), processes(1), processes(3)])
+def test_nothing_dies(deadly: Any, tmp_path: Path, workplace: Workplace) -> None:
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    assert results(runner, chunked([(0, 20)], 3)) == {case: case**2 for case in range(20)}
+    assert runner.deaths == []
+
+
+def test_a_worker_that_dies_once_costs_nothing(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, once=[7]))
+    assert results(runner, chunked([(0, 20)], 4)) == {case: case**2 for case in range(20)}
+    assert Chunk(4, 8) in runner.deaths
+
+
+def test_a_case_that_always_kills_is_alone_in_failing(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=[5]))
+    found = results(runner, chunked([(0, 12)], 4))
+    assert found == {case: None if case == 5 else case**2 for case in range(12)}
+    assert len((tmp_path / "5").read_text()) >= 2, "retried at least once"
+
+
+def test_several_die_at_once(deadly: Any, tmp_path: Path) -> None:
+    given = deadly.arguments(tmp_path, always=[0, 3], once=[4, 9])
+    found = results(Runner(processes(3), deadly.squares, given), chunked([(0, 12)], 2))
+    assert found == {case: None if case in (0, 3) else case**2 for case in range(12)}
+
+
+def test_a_worker_that_dies_while_it_sends_its_result(deadly: Any, tmp_path: Path) -> None:
+    """The pool's parent must not wait for the rest of a message that will never come."""
+    if not Path("/proc/self/syscall").exists():
+        pytest.skip("needs /proc/PID/syscall")
+    program = (
+        f"import sys; sys.path.insert(0, {os.fspath(Path(__file__).parent)!r})\n"
+        "from deadly import large\n"
+        "from dpgcli.exploration.executors import Runner, chunked, processes\n"
+        f"runner = Runner(processes(2), large, lambda c: (c, {os.fspath(tmp_path)!r}))\n"
+        "print(sorted(r.chunk.start for r in runner.run(chunked([(0, 4)], 1))))\n"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=15, check=False)
+    assert (done.stdout, done.stderr) == ("[0, 1, 2, 3]\n", "")
+
+
+@pytest.mark.parametrize("workplace", [serial(), processes(2)])
+def test_an_error_of_the_function_is_raised(deadly: Any, workplace: Workplace) -> None:
+    runner: Runner[int] = Runner(workplace, deadly.refused, lambda c: (c,))
+    with pytest.raises(ZeroDivisionError, match="of its own"):
+        list(runner.run(chunked([(0, 9)], 1)))
+
+
+def test_processes_are_other_processes(deadly: Any) -> None:
+    runner: Runner[int] = Runner(processes(2), deadly.process_id, lambda c: (c,))
+    numbers = {result.value for result in runner.run(chunked([(0, 8)], 1))}
+    assert os.getpid() not in numbers
+    assert len(numbers) <= 2
+
+
+def test_few_chunks_are_under_way_at_a_time(deadly: Any, tmp_path: Path) -> None:
+    """A space may be far larger than memory: chunks are made when they are needed."""
+    made = []
+
+    def arguments(chunk: Chunk) -> Any:
+        made.append(chunk)
+        return deadly.arguments(tmp_path)(chunk)
+
+    runner = Runner(processes(2), deadly.squares, arguments)
+    running = runner.run(chunked([(0, 100)], 1))
+    next(running)
+    assert len(made) <= 2 * 2 + 2
+    running.close()
+
+
+def test_a_reader_that_stops_early_leaves_no_thread_behind(deadly: Any, tmp_path: Path) -> None:
+    running = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path)).run(
+        chunked([(0, 50)], 1)
+    )
+    next(running)
+    running.close()
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread():
+            thread.join(timeout=10)
+            assert not thread.is_alive()

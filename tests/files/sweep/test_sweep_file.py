@@ -1,0 +1,335 @@
+"""Sweep files: what they say, and every mistake in them with its place."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dpgcli.errors import SpecError
+from dpgcli.files.sweep import Sweep, read_sweep
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+HEIGHT = "finger.geometry.dome_height_mm"
+SEPARATION = "finger.geometry.unit_separation_mm"
+Read = Callable[..., Sweep]
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Read:
+    """Read a sweep of a three-unit finger whose space and constraints are these lines."""
+    (tmp_path / "base.yaml").write_bytes((CONFIGS / "three_unit.yaml").read_bytes())
+
+    def reading(*axes: str, constraints: str = "", head: str = "base: base.yaml") -> Sweep:
+        lines = [head, "space:", *(f"  - {axis}" for axis in axes)]
+        lines += [f"constraints: {constraints}"] if constraints else []
+        (tmp_path / "sweep.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return read_sweep(tmp_path / "sweep.yaml")
+
+    return reading
+
+
+def designs(sweep: Sweep) -> dict[str, list[float]]:
+    """All values of the space by key."""
+    columns = sweep.space.designs(0, sweep.space.size)
+    return {key: column.tolist() for key, column in columns.items()}
+
+
+def problems(read: Read, *axes: str, **options: str) -> list[str]:
+    """The problems, each with line and column."""
+    with pytest.raises(SpecError) as raised:
+        read(*axes, **options)
+    return [str(p).split("sweep.yaml:")[-1] for p in raised.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("axis", "values"),
+    [
+        ("values: [6, 6.5]", [6, 6.5]),
+        ("linear: {from: 5, to: 7, count: 5}", [5, 5.5, 6, 6.5, 7]),
+        ("log: {from: 0.1, to: 10, count: 3}", [0.1, 1, 10]),
+    ],
+)
+def test_an_axis_of_one_key(read: Read, axis: str, values: list[float]) -> None:
+    assert designs(read(f"{{key: {HEIGHT}, {axis}}}"))[HEIGHT] == pytest.approx(values, rel=1e-15)
+
+
+def test_axes_multiply_with_the_last_fastest(read: Read) -> None:
+    found = designs(
+        read(f"{{key: {HEIGHT}, values: [6, 7]}}", f"paired: {{{SEPARATION}: [2, 3, 4]}}")
+    )
+    assert found == {HEIGHT: [6, 6, 6, 7, 7, 7], SEPARATION: [2, 3, 4] * 2}
+
+
+@pytest.mark.parametrize("key", ["finger.overrides.2.geometry.dome_height_mm"])
+def test_a_key_of_one_unit(read: Read, key: str) -> None:
+    assert designs(read(f"{{key: {key}, values: [6]}}")) == {key: [6]}
+
+
+def test_samples(read: Read) -> None:
+    ranges = f"{{{HEIGHT}: {{from: 5, to: 7}}, {SEPARATION}: {{from: 1, to: 4, scale: log}}}}"
+    first = designs(read(f"sample: {{method: sobol, count: 9, seed: 3, ranges: {ranges}}}"))
+    again = designs(read(f"sample: {{method: sobol, count: 9, seed: 3, ranges: {ranges}}}"))
+    assert first == again
+    assert len(first[HEIGHT]) == 9
+    assert all(5 <= value <= 7 for value in first[HEIGHT])
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_gives_its_very_numbers(read: Read, tmp_path: Path, suffix: str) -> None:
+    values = np.random.default_rng(1).uniform(4, 8, (500, 2))
+    frame = pd.DataFrame(values, columns=[HEIGHT, SEPARATION])
+    if suffix == "csv":
+        text = "\n".join(",".join(map(repr, row)) for row in values.tolist())
+        (tmp_path / "t.csv").write_text(f"{HEIGHT},{SEPARATION}\n{text}\n")
+    else:
+        frame.to_parquet(tmp_path / "t.parquet")
+    sweep = read(f"table: t.{suffix}")
+    assert designs(sweep) == {key: frame[key].tolist() for key in frame}
+    assert tmp_path / f"t.{suffix}" in sweep.files
+
+
+@pytest.mark.parametrize("kind", ["uint8", "int32", "float32"])
+def test_a_table_of_any_numeric_type(read: Read, tmp_path: Path, kind: str) -> None:
+    pd.DataFrame({HEIGHT: np.array([6, 7], kind)}).to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {HEIGHT: [6, 7]}
+
+
+@pytest.mark.parametrize("row", ["6.5,3,9", "6.5,3,", "6.5"])
+def test_rows_that_do_not_fit_the_header_are_refused(read: Read, tmp_path: Path, row: str) -> None:
+    """pandas would take the first column for row names and shift the others."""
+    (tmp_path / "t.csv").write_text(f"{HEIGHT},{SEPARATION}\n{row}\n")
+    assert problems(read, "table: t.csv")[0].startswith("3:5: space.0.table: expected ")
+
+
+UNKNOWN = [
+    ("finger.geometry.dome_hight_mm", "dome_height_mm"),
+    ("finger.geometri.dome_height_mm", "finger.geometry.dome_height_mm"),
+    ("dome_height_mm", "finger.geometry.dome_height_mm"),
+    ("finger.unit", "units"),
+    ("finger.overrides.2.geometry.unit_sep_mm", "unit_separation_mm"),
+    ("finger.overrides.2.geometri.dome_height_mm", "geometry"),
+    ("finger.overides.2.geometry.dome_height_mm", "overrides"),
+    ("finger.overrides.2.lattice.segment_height_mm", "segment height is shared"),
+    ("griper.base_spacing_mm", "gripper"),
+]
+
+
+@pytest.mark.parametrize(("key", "hint"), UNKNOWN)
+def test_an_unknown_key_names_the_nearest(read: Read, key: str, hint: str) -> None:
+    (problem,) = problems(read, f"{{key: {key}, values: [1]}}")
+    assert problem.startswith("3:6: space.0.key: expected ")
+    assert hint in problem
+
+
+@pytest.mark.parametrize("key", ["finger.geometry", "finger", "finger.calibration"])
+def test_keys_that_hold_no_number_are_refused(read: Read, key: str) -> None:
+    assert problems(read, f"{{key: {key}, values: [1]}}")[0].startswith("3:6: space.0.key: ")
+
+
+@pytest.mark.parametrize("units", ["foo", "3-2", "0"])
+def test_keys_of_units_that_no_finger_has_are_refused(read: Read, units: str) -> None:
+    key = f"finger.overrides.{units}.geometry.dome_height_mm"
+    assert problems(read, f"{{key: {key}, values: [1]}}")[0].startswith("3:6: space.0.key: ")
+
+
+def test_gripper_keys_need_a_gripper(read: Read) -> None:
+    """Else every design would be a gripper without an aperture."""
+    found = problems(read, "{key: gripper.base_spacing_mm, values: [60]}")
+    assert "gripper" in found[0]
+
+
+ZERO_LOG = "{from: 0, to: 1, scale: log}"
+WRONG_AXES = [
+    (f"{{key: {HEIGHT}}}", "3:5: space.0: expected exactly one of values, linear, log, paired"),
+    (f"{{key: {HEIGHT}, vales: [1]}}", f"3:{len(HEIGHT) + 13}: space.0.vales: expected a known"),
+    (f"{{key: {HEIGHT}, values: [1], table: t.csv}}", "found values, table"),
+    ("{values: [1]}", "a key beside values"),
+    (f"{{key: {HEIGHT}, table: t.csv}}", "no key beside table"),
+    (f"{{key: {HEIGHT}, values: []}}", "a list of numbers"),
+    (f"{{key: {HEIGHT}, values: 3}}", "a list of numbers, found 3"),
+    (f"{{key: {HEIGHT}, values: [a]}}", 'found "a"'),
+    (f"{{key: {HEIGHT}, values: [true]}}", "found true"),
+    (f"{{key: {HEIGHT}, values: [.nan]}}", "found .nan"),
+    (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 0}}}}", "a whole number from 1, found 0"),
+    (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 1.5}}}}", "whole number from 1, found 1"),
+    (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2}}}}", "count: expected how many values"),
+    (f"{{key: {HEIGHT}, linear: {{from: 1, too: 2, count: 3}}}}", "did you mean to?"),
+    (f"{{key: {HEIGHT}, log: {{from: 0, to: 2, count: 3}}}}", "bounds above zero, found 0 and 2"),
+    (f"{{key: {HEIGHT}, log: {{from: 1, to: -2, count: 3}}}}", "bounds above zero"),
+    (f"paired: {{{HEIGHT}: [1, 2], {SEPARATION}: [1]}}", "lists of one length, found 2, 1"),
+    ("paired: {}", "space.0.paired: expected lists of numbers by key"),
+    ("paired: {a.b: [1]}", "space.0.paired: expected a known key, found a.b"),
+    ("sample: {method: halton, count: 3, ranges: {}}", "sobol or latin_hypercube"),
+    (
+        f"sample: {{method: sobol, count: 3, ranges: {{{HEIGHT}: {ZERO_LOG}}}}}",
+        "bounds above zero",
+    ),
+    ("table: missing.csv", "3:5: space.0.table: expected a CSV or Parquet file of designs"),
+    ("table: base.yaml", "3:5: space.0.table: expected "),
+    ("table: .", "3:5: space.0.table: expected a CSV or Parquet file of designs"),
+    ("3", "3:5: space.0: expected "),
+]
+
+
+@pytest.mark.parametrize(("axis", "said"), WRONG_AXES)
+def test_a_wrong_axis_is_said_with_its_place(read: Read, axis: str, said: str) -> None:
+    found = problems(read, axis)
+    assert any(said in problem for problem in found), found
+    assert all(problem.startswith("3:") for problem in found)
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        ("abc\n", "text"),
+        ("\n", "gap"),
+        ("", "no rows"),
+        ("inf\n", "infinity"),
+        ("6.5\nsix\n", "text"),
+        ("true\n", "truth"),
+    ],
+)
+def test_a_table_needs_numbers(read: Read, tmp_path: Path, content: str, what: str) -> None:
+    (tmp_path / "t.csv").write_text(f"{HEIGHT},{SEPARATION}\n" + content.replace("\n", ",3\n"))
+    assert problems(read, "table: t.csv")[0].startswith("3:5: space.0.table: expected "), what
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"\xff\xfe\x00"])
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_that_cannot_be_read(
+    read: Read, tmp_path: Path, content: bytes, suffix: str
+) -> None:
+    (tmp_path / f"t.{suffix}").write_bytes(content)
+    assert problems(read, f"table: t.{suffix}")[0].startswith("3:5: space.0.table: expected ")
+
+
+def test_a_key_stands_on_one_axis(read: Read) -> None:
+    (problem,) = problems(read, f"{{key: {HEIGHT}, values: [1]}}", f"paired: {{{HEIGHT}: [2]}}")
+    assert problem == f"4:5: space.1.paired: expected each key on one axis, found {HEIGHT} again"
+
+
+WRONG_RULES = [
+    "1 +",
+    "import os",
+    "__import__('os')",
+    "finger.units.real > 2",
+    "dome_hight_mm > 3",
+    "calibration > 3",
+    "finger > 3",
+    "sqrt(units, 2) > 1",
+    "-" * 490 + "units > 1",
+]
+
+
+@pytest.mark.parametrize("rule", WRONG_RULES)
+def test_a_wrong_constraint_is_said_with_its_place(read: Read, rule: str) -> None:
+    (problem,) = problems(read, f"{{key: {HEIGHT}, values: [6]}}", constraints=f'["{rule}"]')
+    assert problem.startswith("4:15: constraints.0: expected ")
+
+
+def test_a_misspelled_name_in_a_constraint_names_the_nearest(read: Read) -> None:
+    (problem,) = problems(
+        read, f"{{key: {HEIGHT}, values: [6]}}", constraints="[dome_hight_mm > 3]"
+    )
+    assert problem.endswith("(did you mean dome_height_mm?)")
+
+
+def test_a_short_name_of_two_keys_is_ambiguous(read: Read) -> None:
+    keys = [f"finger.overrides.{unit}.geometry.dome_height_mm" for unit in (1, 2)]
+    axes = [f"{{key: {key}, values: [6, 6.5]}}" for key in keys]
+    assert problems(read, *axes, constraints="[dome_height_mm > 6.2]")
+
+
+def test_a_constraint_can_name_the_key_of_a_unit(read: Read) -> None:
+    key = "finger.overrides.2.geometry.dome_height_mm"
+    sweep = read(f"{{key: {key}, values: [6, 6.5]}}", constraints=f"[{key} > 6.2]")
+    assert sweep.constraints[0].names == {key}
+
+
+def test_all_problems_are_said_at_once(read: Read) -> None:
+    found = problems(
+        read,
+        f"{{key: {HEIGHT}, log: {{from: 0, to: 1, count: 2}}}}",
+        "{key: finger.unit, values: [1]}",
+        "table: missing.csv",
+        constraints="[1 +, 2 +]",
+    )
+    assert [problem.split(":")[0] for problem in found] == ["3", "4", "5", "6", "6"]
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("# nothing", "1:1: base: expected the path of a spec"),
+        ("base: 3", "1:1: base: expected the path of a spec, from this file's folder, found 3"),
+        ("base: base.yaml\nbse: 3", "2:1: bse: expected a known key"),
+        ("base: base.yaml\nbase: base.yaml", "2:1: base: expected each key once"),
+    ],
+)
+def test_a_wrong_head(read: Read, head: str, said: str) -> None:
+    found = problems(read, f"{{key: {HEIGHT}, values: [6]}}", head=head)
+    assert any(problem.startswith(said) or said[3:] in problem for problem in found), found
+
+
+def test_a_missing_or_wrong_base_is_named(read: Read, tmp_path: Path) -> None:
+    axis = f"{{key: {HEIGHT}, values: [6]}}"
+    with pytest.raises(SpecError, match=r"missing\.yaml: file: expected a readable file"):
+        read(axis, head="base: missing.yaml")
+    (tmp_path / "wrong.yaml").write_text("finger: {unts: 3}\n")
+    with pytest.raises(SpecError, match=r"wrong\.yaml:1:\d+: finger\.unts"):
+        read(axis, head="base: wrong.yaml")
+
+
+@pytest.mark.parametrize(
+    "number", [10**30, 10**400, 2**63, -(2**64)], ids=["1e30", "1e400", "2^63", "-2^64"]
+)
+def test_huge_whole_numbers_are_numbers_or_refused(read: Read, number: int) -> None:
+    try:
+        column = read(f"{{key: {HEIGHT}, values: [6, {number}]}}").space.designs(0, 2)[HEIGHT]
+    except SpecError:
+        return
+    assert column.dtype.kind == "f"
+
+
+def test_rigid_bars_are_a_value(read: Read) -> None:
+    """`.inf` is a value of this key in a spec, so it is one in a space."""
+    key = "finger.linear_stiffness_N_per_mm"
+    assert designs(read(f"{{key: {key}, values: [1.0e4, .inf]}}"))[key] == [1e4, np.inf]
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        "{key: finger.units, linear: {from: 2, to: 4, count: 3}}",
+        "{key: finger.units, values: [2, 3.0, 4]}",
+    ],
+)
+def test_whole_numbers_of_units_count_as_whole(read: Read, axis: str) -> None:
+    column = read(axis).space.designs(0, 3)["finger.units"]
+    assert (column.dtype.kind, column.tolist()) == ("i", [2, 3, 4])
+
+
+def test_sweeps_that_say_the_same_are_the_same(read: Read) -> None:
+    axis = f"{{key: {HEIGHT}, values: [6]}}"
+    said = read(axis).canonical_json()
+    assert said == read(axis + "  # a comment").canonical_json()
+    assert said != read(axis.replace("6", "7")).canonical_json()
+    assert said != read(axis, constraints="[units < 4]").canonical_json()
+
+
+def test_a_changed_table_is_another_sweep(read: Read, tmp_path: Path) -> None:
+    said = []
+    for number in (6, 7):
+        (tmp_path / "t.csv").write_text(f"{HEIGHT}\n{number}\n")
+        said.append(read("table: t.csv").canonical_json())
+    assert said[0] != said[1]
+
+
+def test_ranges_of_any_size_give_no_warning(read: Read) -> None:
+    read(f"{{key: {HEIGHT}, linear: {{from: -1.0e+308, to: 1.0e+308, count: 3}}}}")
+    read(f"{{key: {HEIGHT}, log: {{from: 1.0e-300, to: 1.0e+300, count: 3}}}}")
+    ranges = f"{{{HEIGHT}: {{from: -1.0e+308, to: 1.0e+308}}}}"
+    sweep = read(f"sample: {{method: sobol, count: 4, ranges: {ranges}}}")
+    assert np.isfinite(designs(sweep)[HEIGHT]).all()
