@@ -81,6 +81,7 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _terminate)
     code = _code_of(app)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is over: a second Ctrl-C changes nothing
     try:
         sys.stdout.flush()
     except BrokenPipeError:

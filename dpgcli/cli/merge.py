@@ -15,7 +15,7 @@ def merge(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
 ) -> None:
     """Join shards into the tables of the whole sweep."""
-    from dpgcli.errors import UsageError
+    from dpgcli.errors import OutputError, UsageError
     from dpgcli.studies.sweep import assemble, stores
 
     found = []
@@ -27,6 +27,9 @@ def merge(
                 f"{folder}: expected the output of one dpg sweep --shard, found {what}"
             )
         found += here
-    output.mkdir(parents=True, exist_ok=True)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {output}: {error.strerror}") from error
     assemble(found, output)
     say(f"{output}: {len(found)} shards joined")

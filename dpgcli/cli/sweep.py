@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard, Study
 
 
+MOST_NAMED = 20
+
+
 class ExecutorName(StrEnum):
     """Where designs are evaluated."""
 
@@ -80,8 +83,10 @@ def sweep(
     rules = _rules(study, require or [])
     if depfile is not None:
         _write_depfile(depfile, study)
-    if study.is_up_to_date and part is None:
-        say(f"{output}: up to date")
+    is_new = part is not None or not study.is_up_to_date
+    if not is_new:
+        if not quiet:
+            say(f"{output}: up to date")
     else:
         if restart:
             study.drop_unfinished()
@@ -95,7 +100,7 @@ def sweep(
         if not quiet:
             say(_summary(output, progress, part))
     if part is None:
-        _conclude(study, rules, summary_file, quiet)
+        _conclude(study, rules, summary_file, is_new, quiet)
 
 
 def _rules(study: "Study", require: list[str]) -> "list[Expression]":
@@ -109,7 +114,11 @@ def _rules(study: "Study", require: list[str]) -> "list[Expression]":
 
 
 def _conclude(
-    study: "Study", rules: "list[Expression]", summary_file: Path | None, quiet: bool
+    study: "Study",
+    rules: "list[Expression]",
+    summary_file: Path | None,
+    is_new: bool,
+    quiet: bool,
 ) -> None:
     """Write and print the report; then what the requirements say, which may end with code 1."""
     from dpgcli.cli.check import append_summary, conclude
@@ -122,9 +131,10 @@ def _conclude(
 
     designs, units = read_designs(study.folder / DESIGNS)
     text = markdown(designs, units, read_run(study.folder / RUN))
-    with whole_file(study.folder / REPORT) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    if not quiet:
+    if is_new or not (study.folder / REPORT).exists():
+        with whole_file(study.folder / REPORT) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if is_new and not quiet:
         print(text, end="")
     verdicts = check_requirements(designs, rules) if rules else ()
     if summary_file is not None:
@@ -183,8 +193,9 @@ def _write_depfile(path: Path, study: "Study") -> None:
     from dpgcli.files.output import whole_file
     from dpgcli.studies.sweep import DESIGNS, STATES
 
+    study.folder.mkdir(parents=True, exist_ok=True)
     targets = " ".join(_escaped(study.folder / name) for name in (STATES, DESIGNS))
-    sources = [_escaped(source) for source in study.sweep.files]
+    sources = [_escaped(source) for source in study.sweep.files if source != Path("-")]
     text = f"{targets}: {' '.join(sources)}\n" + "".join(f"\n{source}:\n" for source in sources)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -229,7 +240,9 @@ def _summary(output: Path, progress: "Progress", part: "Shard | None") -> str:
         f"{progress.core_seconds:.3g} s of CPU in workers, {progress.writing_seconds:.2g} s writing"
     )
     if progress.failures:
-        text += f"; {len(progress.failures)} failed (their worker died twice): see designs.parquet"
+        named = ", ".join(f"design {number}" for number in progress.failures[:MOST_NAMED])
+        more = ", ..." if len(progress.failures) > MOST_NAMED else ""
+        text += f"; failed, their worker died twice: {named}{more}"
     if part is not None:
         text += f"; part {part.number} of {part.count}: join with dpg merge"
     return text

@@ -7,6 +7,7 @@ through elementwise.
 
 import ast
 import operator
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -16,6 +17,8 @@ import numpy as np
 
 LONGEST = 500
 LARGEST = 1e300
+DEEPEST = 50
+DIGITS = "number_"  # before a part of a dotted name that is a number
 
 Values = Mapping[str, Any]
 
@@ -64,7 +67,7 @@ class Expression:
     def __call__(self, values: Values) -> Any:
         """The value for these names, numbers or arrays; division by zero gives inf or NaN."""
         with np.errstate(all="ignore"):
-            return _value(ast.parse(self.text, mode="eval").body, values)
+            return _value(ast.parse(_without_digits(self.text), mode="eval").body, values)
 
 
 def expression(text: str) -> Expression:
@@ -79,21 +82,32 @@ def expression(text: str) -> Expression:
     if len(text) > LONGEST:
         raise ExpressionError(f"longer than {LONGEST} characters")
     try:
-        body = ast.parse(text.strip(), mode="eval").body
+        body = ast.parse(_without_digits(text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"not an expression: {text!r}") from error
-    return Expression(text.strip(), frozenset(_names(body)))
+    return Expression(text.strip(), frozenset(_names(body, DEEPEST)))
 
 
-def _names(node: ast.expr) -> list[str]:
+def _without_digits(text: str) -> str:
+    """Parts of dotted names that are numbers, `overrides.4-5.`, spelled as Python names."""
+
+    def spelled(match: re.Match[str]) -> str:
+        return f".{DIGITS}{match[1].replace('-', 'to')}."
+
+    return re.sub(r"(?<=[A-Za-z_])\.(\d+(?:-\d+)?)\.(?=[A-Za-z_])", spelled, text)
+
+
+def _names(node: ast.expr, depth: int) -> list[str]:
     """Names in an expression; refuses every node that is not in the language."""
+    if depth == 0:
+        raise ExpressionError(f"nested more than {DEEPEST} levels deep")
     if (number := _number(node)) is not None:
         if not abs(number) < LARGEST:
             raise ExpressionError("a number beyond double precision")
         return []
     if name := _dotted(node):
         return [name]
-    return [name for part in _parts(node) for name in _names(part)]
+    return [name for part in _parts(node) for name in _names(part, depth - 1)]
 
 
 def _parts(node: ast.expr) -> list[ast.expr]:
@@ -112,7 +126,7 @@ def _parts(node: ast.expr) -> list[ast.expr]:
         if node.func.id in _FUNCTIONS:
             raise ExpressionError(f"{node.func.id} does not take {len(node.args)} values")
         raise ExpressionError(f"unknown function {node.func.id}; known: {', '.join(_FUNCTIONS)}")
-    raise ExpressionError(f"not allowed here: {ast.unparse(node)[:40]}")
+    raise ExpressionError(f"not allowed here: {type(node).__name__}")
 
 
 def _number(node: ast.expr) -> int | float | None:
@@ -131,8 +145,16 @@ def _dotted(node: ast.expr) -> str:
         return node.id
     if isinstance(node, ast.Attribute):
         parent = _dotted(node.value)
-        return f"{parent}.{node.attr}" if parent else ""
+        part = (
+            node.attr.removeprefix(DIGITS).replace("to", "-") if DIGITS in node.attr else node.attr
+        )
+        return f"{parent}.{part}" if parent else ""
     return ""
+
+
+def _as_number(value: Any) -> Any:
+    """Truths count as 0 and 1, and whole numbers do not overflow."""
+    return np.multiply(value, 1.0)
 
 
 def _value(node: ast.expr, values: Values) -> Any:
@@ -142,9 +164,10 @@ def _value(node: ast.expr, values: Values) -> Any:
         return values[name]
     parts = [_value(part, values) for part in _parts(node)]
     if isinstance(node, ast.BinOp):
-        return _ARITHMETIC[type(node.op)](*parts)
+        return _ARITHMETIC[type(node.op)](*map(_as_number, parts))
     if isinstance(node, ast.UnaryOp):
-        return _UNARY[type(node.op)](*parts)
+        operand = parts[0] if isinstance(node.op, ast.Not) else _as_number(parts[0])
+        return _UNARY[type(node.op)](operand)
     if isinstance(node, ast.BoolOp):
         joined = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
         return reduce(joined, parts)

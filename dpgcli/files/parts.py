@@ -86,25 +86,30 @@ class PartStore:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
-        if not (self.folder / SAID).exists():
+        if self.said() != said:
             with whole_file(self.folder / SAID) as temporary:
                 temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
 
     def said(self) -> dict[str, str]:
-        """What the sweep is about."""
-        said: dict[str, str] = json.loads((self.folder / SAID).read_text(encoding="utf-8"))
-        return said
+        """What the sweep is about; empty where that cannot be read."""
+        try:
+            said = json.loads((self.folder / SAID).read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return said if isinstance(said, dict) else {}
 
     def parts(self) -> list[Part]:
         """Parts in order of their designs."""
         matches = ((NAME.fullmatch(path.name), path) for path in self.folder.glob("*.part"))
         return sorted(Part(int(m[1]), int(m[2]), path) for m, path in matches if m)
 
-    def remove_damaged(self) -> None:
-        """Remove parts whose bytes do not match their name."""
-        for part in self.parts():
-            if hashlib.sha256(part.path.read_bytes()).hexdigest()[:16] not in part.path.name:
-                part.path.unlink()
+    def damaged(self) -> list[Part]:
+        """Parts whose bytes do not match their name."""
+        return [
+            part
+            for part in self.parts()
+            if hashlib.sha256(part.path.read_bytes()).hexdigest()[:16] not in part.path.name
+        ]
 
     def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
         """What of these ranges no part covers."""

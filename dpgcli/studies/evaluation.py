@@ -121,7 +121,8 @@ class Evaluation:
         short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
         allowed = np.ones(n_designs, bool)
         for rule in self.constraints:
-            allowed &= np.broadcast_to(rule({**short, **known}), n_designs).astype(bool)
+            met = np.asarray(rule({**short, **known}), float)
+            allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
         return allowed
 
     def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "_Solved":

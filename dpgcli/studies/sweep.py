@@ -13,6 +13,7 @@ from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.exploration.space import Space
 from dpgcli.files.parts import PartStore, encoded
+from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.plan import DEFAULT_TOLERANCE
@@ -98,13 +99,15 @@ class Study:
         """Units of the longest finger in the space."""
         key = "finger.units"
         swept = [int(n) for axis in self.sweep.space.axes for n in axis.values.get(key, ())]
-        return max([self.sweep.base.finger.units, *swept])
+        possible = [n for n in swept if 1 <= n <= MAX_UNITS]
+        return max([self.sweep.base.finger.units, *possible])
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""
         size = self.sweep.space.size
-        every = range((shard.number - 1) * self.chunk_size, size, shard.count * self.chunk_size)
-        return [(first, min(first + self.chunk_size, size)) for first in every]
+        step = min(self.chunk_size, -(-size // shard.count))  # so that none goes without
+        every = range((shard.number - 1) * step, size, shard.count * step)
+        return [(first, min(first + step, size)) for first in every]
 
     @property
     def is_up_to_date(self) -> bool:
@@ -117,14 +120,15 @@ class Study:
 
     def check_room(self) -> None:
         """Refuse a sweep whose tables the disk cannot hold; raises UsageError."""
-        n_states = self.sweep.space.size << self.most_units
-        needed = 2 * n_states * BYTES_PER_STATE
+        missing = self.store.missing([(0, self.sweep.space.size)])
+        n_designs = sum(stop - start for start, stop in missing)
+        needed = 2 * (n_designs << self.most_units) * BYTES_PER_STATE
         free = shutil.disk_usage(_existing(self.folder)).free
         if needed > free:
             raise UsageError(
-                f"{self.sweep.space.size:,} designs have about {n_states:,} states, "
-                f"{needed / 2**30:,.0f} GiB while they are made, and {free / 2**30:,.0f} GiB are "
-                "free: take fewer values or units, or go on with --force"
+                f"{n_designs:,} designs have about {n_designs << self.most_units:,} states, "
+                f"{_size(needed)} while they are made, and {_size(free)} are free: "
+                "take fewer values or units, or go on with --force"
             )
 
     def check_unfinished(self) -> None:
@@ -146,8 +150,11 @@ class Study:
     ) -> Progress:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
-        store.remove_damaged()
+        for damaged in store.damaged():
+            damaged.path.unlink()
         store.say(self.metadata)
+        for stale in self.folder.glob(".*.parquet.*.tmp"):  # of a run that was killed
+            stale.unlink()
         ranges = self.ranges(shard or Shard())
         missing = store.missing(ranges)
         n_designs = sum(stop - start for start, stop in ranges)
@@ -183,6 +190,9 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     Raises UsageError for parts of different sweeps, gaps and overlaps.
     """
     metadata = parts_of[0].said()
+    for store in parts_of:
+        if damaged := store.damaged():
+            raise UsageError(f"{damaged[0].path} is damaged: run its sweep again")
     for store in parts_of[1:]:
         if changed := differences(metadata, store.said()):
             raise UsageError(f"{store.folder.parent.parent} differs in {', '.join(changed)}")
@@ -229,6 +239,15 @@ def _encoded(evaluation: Evaluation, tables: Tables) -> bytes:
     )
 
 
+def _size(n_bytes: float) -> str:
+    """A number of bytes as people say it."""
+    for unit in ("bytes", "KiB", "MiB", "GiB"):
+        if n_bytes < 1024:
+            return f"{n_bytes:.2g} {unit}" if n_bytes < 10 else f"{n_bytes:.0f} {unit}"
+        n_bytes /= 1024
+    return f"{n_bytes:,.4g} TiB"
+
+
 def _existing(folder: Path) -> Path:
     """The folder, or the nearest above it that exists."""
     folder = folder.absolute()
@@ -256,6 +275,8 @@ def _parsed(text: str) -> Any:
 
 
 def _changes(old: Any, new: Any, path: str = "") -> list[str]:
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        old, new = (dict(enumerate(part)) for part in (old, new))
     if isinstance(old, dict) and isinstance(new, dict):
         return [
             change

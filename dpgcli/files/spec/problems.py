@@ -19,7 +19,7 @@ from dpgcli.files.spec.models import (
     UnitOverride,
 )
 from dpgcli.files.spec.places import KeyPath, dotted, in_order, shown
-from dpgcli.files.spec.scenes import issues, range_issues
+from dpgcli.files.spec.scenes import issues, range_issues, unit_range
 from dpgcli.files.spec.source import Document
 
 SECTIONS: dict[KeyPath, type[Section]] = {
@@ -118,9 +118,20 @@ def _hint(key: str, error: Any) -> str:
 
 def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
     """Expected, found and hint if no spec can have a number at this path."""
-    parent = _pattern(path[:-1])
+    if (
+        path[:2] == ("finger", "overrides")
+        and len(path) > 2
+        and min(unit_range(str(path[2])), default=0) < 1
+    ):
+        return "units such as 4 or 4-5", dotted(path), "count from the base"
+    parent, pattern = _pattern(path[:-1]), _pattern(path)
+    if pattern in SECTIONS or str(path[-1]) in ("overrides", "calibration"):
+        return "the key of a number", dotted(path), "name the number itself"
     if parent not in SECTIONS:
-        return "a known key", dotted(path), _nearest(str(path[-1]), list(SECTIONS[()].model_fields))
+        known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]
+        units = str(path[2]) if len(path) > 2 else "*"
+        close = get_close_matches(dotted(path), [k.replace("*", units) for k in known], n=1)
+        return "a known key", dotted(path), f"did you mean {close[0]}?" if close else ""
     if str(path[-1]) not in SECTIONS[parent].model_fields:
         return _unknown(path)
     return None

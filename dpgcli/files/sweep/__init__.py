@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -39,6 +41,8 @@ from dpgcli.files.sweep.models import (
 
 __all__ = ["Sweep", "read_sweep"]
 
+UNITS = "finger.units"
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -73,7 +77,7 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     base_path = path.parent / spec.base
     base_document = with_settings(read_document(base_path), settings)
     base = checked(base_document)
-    reader = _SpaceReader(document, path.parent)
+    reader = _SpaceReader(document, path.parent, base.gripper is not None)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
     rules = [
         reader.constraint(place, text, base_document.data)
@@ -140,6 +144,7 @@ class _SpaceReader:
 
     document: Document
     folder: Path
+    has_gripper: bool
 
     def __post_init__(self) -> None:
         self.problems: list[Problem] = []
@@ -168,7 +173,7 @@ class _SpaceReader:
 
     def made(self, path: KeyPath, said: AxisSpec, kind: str) -> Axis | None:
         if said.key is not None and said.values is not None:
-            return listed(said.key, said.values)
+            return listed(said.key, _numbers(said.key, said.values))
         if said.key is not None and (between := said.linear or said.log):
             return self.spaced((*path, kind), said.key, between, is_log=said.log is not None)
         if said.paired is not None:
@@ -182,14 +187,15 @@ class _SpaceReader:
             self.wrong(path, "bounds above zero", f"{between.first:g} and {between.last:g}")
             return None
         make = logarithmic if is_log else linear
-        return make(key, between.first, between.last, between.count)
+        axis = make(key, between.first, between.last, between.count)
+        return Axis({key: _numbers(key, axis.values[key].tolist())})
 
     def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
         lengths = {key: len(values) for key, values in columns.items()}
         if len(set(lengths.values())) > 1:
             self.wrong(path, "lists of one length", ", ".join(map(str, lengths.values())))
             return None
-        return Axis({key: np.asarray(values) for key, values in columns.items()})
+        return Axis({key: _numbers(key, values) for key, values in columns.items()})
 
     def sampled(self, path: KeyPath, sample: Sample) -> Axis | None:
         for key, bounds in sample.ranges.items():
@@ -205,13 +211,17 @@ class _SpaceReader:
 
         table = self.folder / name
         try:
-            reader = pd.read_parquet if table.suffix == ".parquet" else pd.read_csv
-            frame = reader(table)
-        except (OSError, ValueError) as error:
+            if table.suffix == ".parquet":
+                frame = pd.read_parquet(table)
+            else:
+                with warnings.catch_warnings():  # rows that do not fit the header
+                    warnings.simplefilter("error", pd.errors.ParserWarning)
+                    frame = pd.read_csv(table, index_col=False)
+        except (OSError, ValueError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
             return None
         columns = {str(key): frame[key].to_numpy() for key in frame.columns}
-        numeric = all(c.dtype.kind in "if" and np.isfinite(c).all() for c in columns.values())
+        numeric = all(c.dtype.kind in "iuf" and np.isfinite(c).all() for c in columns.values())
         if frame.empty or not numeric:
             self.wrong(path, "rows of finite numbers", f"{len(frame)} rows", "no text, no gaps")
             return None
@@ -223,6 +233,8 @@ class _SpaceReader:
         for key in keys:
             if unknown := unknown_key(tuple(key.split("."))):
                 self.wrong(path, *unknown)
+            elif key.startswith("gripper.") and not self.has_gripper:
+                self.wrong(path, "keys of a base that has them", key, "the base has no gripper")
             if key in self.keys:
                 self.wrong(path, "each key on one axis", f"{key} again")
             self.keys.add(key)
@@ -235,13 +247,23 @@ class _SpaceReader:
         except ExpressionError as error:
             self.wrong(path, "an expression over keys", shown(text), str(error))
             return None
-        known = self.keys | set(flattened(data))
-        short = {name.rsplit(".", 1)[-1] for name in known}
+        numbers = {k for k, v in flattened(data).items() if type(v) in (int, float)}
+        known = self.keys | numbers
+        last = Counter(name.rsplit(".", 1)[-1] for name in known)
+        short = {name for name, count in last.items() if count == 1}
         if unknown := sorted(rule.names - known - short):
             close = get_close_matches(unknown[0], [*known, *short], n=1)
             hint = f"did you mean {close[0]}?" if close else ""
-            self.wrong(path, "keys of the space or the base", ", ".join(unknown), hint)
+            expected = "keys with numbers, by their last part if no other has it"
+            self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
+
+
+def _numbers(key: str, values: Sequence[int | float]) -> Any:
+    """Values as an array: whole numbers stay whole, and those of units become so."""
+    whole = all(float(value).is_integer() and abs(value) < 2**53 for value in values)
+    counts = whole and (key == UNITS or all(isinstance(value, int) for value in values))
+    return np.array(values, np.int64 if counts else np.float64)
 
 
 def flattened(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:

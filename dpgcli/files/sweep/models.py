@@ -3,11 +3,13 @@
 Each description says what is expected: it is what a wrong value is answered with.
 """
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 MOST_POINTS = 10_000_000
+Bound = Annotated[float, Field(ge=-1e18, le=1e18)]
 
 
 class Part(BaseModel):
@@ -21,8 +23,8 @@ class Part(BaseModel):
 class Between(Part):
     """Values from one number to another, both included."""
 
-    first: float = Field(alias="from", description="the first value, a number")
-    last: float = Field(alias="to", description="the last value, a number")
+    first: Bound = Field(alias="from", description="the first value, a number")
+    last: Bound = Field(alias="to", description="the last value, a number")
     count: Annotated[int, Field(ge=1, le=MOST_POINTS)] = Field(
         description="how many values, a whole number from 1"
     )
@@ -31,8 +33,8 @@ class Between(Part):
 class SampleRange(Part):
     """Bounds of a sampled key."""
 
-    first: float = Field(alias="from", description="the lower bound, a number")
-    last: float = Field(alias="to", description="the upper bound, a number")
+    first: Bound = Field(alias="from", description="the lower bound, a number")
+    last: Bound = Field(alias="to", description="the upper bound, a number")
     scale: Literal["linear", "log"] = Field(default="linear", description="linear or log")
 
 
@@ -49,7 +51,9 @@ class Sample(Part):
     )
 
 
-Numbers = Annotated[list[int | float], Field(min_length=1, max_length=MOST_POINTS)]
+Whole = Annotated[int, Field(ge=-(2**63), le=2**63 - 1)]
+Number = Whole | Annotated[float, Field(allow_inf_nan=True, ge=-math.inf)]  # .inf: rigid bars
+Numbers = Annotated[list[Number], Field(min_length=1, max_length=MOST_POINTS)]
 
 
 class AxisSpec(Part):

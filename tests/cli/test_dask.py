@@ -1,0 +1,154 @@
+"""`dpg sweep --executor dask` on a real scheduler with two real workers."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+
+pytest.importorskip("distributed")
+
+PROGRAM = (
+    sys.executable,
+    "-c",
+    "import dpgcli.studies.sweep as s; s.STATES_PER_CHUNK = 2**12; "
+    "from dpgcli.cli.main import main; main()",
+)
+SWEEP = """base: eight_unit.yaml
+space:
+  - {key: finger.geometry.dome_height_mm, linear: {from: 2.5, to: 7, count: 30}}
+  - {key: finger.geometry.unit_separation_mm, linear: {from: 2, to: 3, count: 30}}
+"""
+Cluster = tuple[str, list["subprocess.Popen[bytes]"]]
+
+
+def until(happened: Callable[[], Any], seconds: float = 30) -> Any:
+    end = time.monotonic() + seconds
+    while not (found := happened()):
+        assert time.monotonic() < end, "too slow"
+        time.sleep(0.02)
+    return found
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    """The address of a scheduler on this machine, and its two workers."""
+    file = tmp_path / "scheduler.json"
+    common = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", os.fspath(file))
+    environment = {**os.environ, "DASK_DISTRIBUTED__DIAGNOSTICS__NVML": "False"}
+
+    def started(tool: str, *options: str) -> "subprocess.Popen[bytes]":
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.{tool}", *options, *common],
+            cwd=tmp_path,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    processes = [started("dask_scheduler", "--port", "0")]
+    try:
+        until(lambda: file.exists() and file.read_text().strip().endswith("}"))
+        address = json.loads(file.read_text())["address"]
+        place = ("--local-directory", os.fspath(tmp_path / "dask"))
+        options = ("--nthreads", "1", "--no-nanny", *place)
+        processes += [started("dask_worker", *options) for _ in range(2)]
+        until(lambda: len(list((tmp_path / "dask").rglob("*.dirlock"))) == 2)
+        yield address, processes[1:]
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def sweep(folder: Path) -> Path:
+    configs = Path(__file__).parents[2] / "configs"
+    (folder / "eight_unit.yaml").write_bytes((configs / "eight_unit.yaml").read_bytes())
+    (folder / "sweep.yaml").write_text(SWEEP)
+    return folder
+
+
+def start(folder: Path, *options: str) -> "subprocess.Popen[str]":
+    command = [*PROGRAM, "sweep", "sweep.yaml", "-q", *options]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, cwd=folder, text=True, **pipes)
+
+
+def on_dask(address: str) -> tuple[str, ...]:
+    return ("-o", "out", "--executor", "dask", "--scheduler", address)
+
+
+def tables(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "n_killed",
+    [
+        0,
+        pytest.param(
+            1, marks=pytest.mark.xfail(strict=False, reason="Dask logs to standard error")
+        ),
+    ],
+)
+def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, n_killed: int) -> None:
+    """Also when a worker is killed on the way."""
+    address, workers = cluster
+    process = start(sweep, *on_dask(address))
+    if n_killed:
+        until(lambda: list((sweep / "out").rglob("*.part")))
+        workers[0].kill()
+    assert process.communicate(timeout=60) == ("", "")
+    assert process.returncode == ExitCode.DONE
+    serial = start(sweep, "-o", "serial", "--executor", "serial")
+    assert serial.communicate(timeout=60) == ("", "")
+    assert tables(sweep / "out") == tables(sweep / "serial")
+    assert len(tables(sweep / "out")) == 2
+
+
+@pytest.mark.slow
+def test_an_interrupt_on_a_cluster(cluster: Cluster, sweep: Path) -> None:
+    """A plain message, a quick end, and the cluster is free for others."""
+    address, _ = cluster
+    process = start(sweep, *on_dask(address))
+    until(lambda: list((sweep / "out").rglob("*.part")))
+    process.terminate()
+    output, errors = process.communicate(timeout=30)
+    assert (process.returncode, output) == (ExitCode.TERMINATED, "")
+    assert len(errors.splitlines()) == 1, errors
+    process = start(sweep, *on_dask(address))
+    assert process.communicate(timeout=60) == ("", "")
+    assert process.returncode == ExitCode.DONE
+
+
+@pytest.mark.xfail(strict=False, reason="a lost scheduler is reported as an internal error")
+@pytest.mark.slow
+def test_a_lost_scheduler_ends_the_sweep_with_a_message(cluster: Cluster, sweep: Path) -> None:
+    address, _ = cluster
+    process = start(sweep, *on_dask(address))
+    until(lambda: list((sweep / "out").rglob("*.part")))
+    scheduler = int(subprocess.check_output(["pgrep", "-P", str(os.getpid()), "-f", "dask_sched"]))
+    os.kill(scheduler, signal.SIGKILL)
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (ExitCode.USAGE, "")
+    assert "Traceback" not in errors
+
+
+@pytest.mark.slow
+def test_no_scheduler(sweep: Path) -> None:
+    process = start(sweep, *on_dask("tcp://127.0.0.1:1"))
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (ExitCode.USAGE, "")
+    assert errors.startswith("dpg: --scheduler tcp://127.0.0.1:1: no scheduler answers")
+    assert len(errors.splitlines()) == 1
+    assert not (sweep / "out").exists()

@@ -1,0 +1,40 @@
+"""Memory of a sweep is that of its chunks, not of its space."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SWEEP = """base: three_unit.yaml
+space:
+  - sample:
+      method: sobol
+      count: 200000
+      ranges:
+        finger.geometry.dome_height_mm: {from: 4, to: 8}
+        finger.geometry.unit_separation_mm: {from: 1, to: 3.5}
+        finger.overrides.2.geometry.dome_height_mm: {from: 4, to: 8}
+"""
+PROGRAM = """
+import resource, sys
+from dpgcli.cli.main import main
+try:
+    main()
+finally:
+    kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"peak {kib / 1024:.0f} MiB", file=sys.stderr)
+"""
+LIMIT = 600.0  # MiB
+
+
+@pytest.mark.slow
+def test_two_hundred_thousand_designs_stay_small(folder: Path) -> None:
+    (folder / "sweep.yaml").write_text(SWEEP)
+    command = [sys.executable, "-c", PROGRAM, "sweep", "sweep.yaml", "-o", "out", "-q"]
+    jobs = ("-j", str(min(4, os.cpu_count() or 1)))
+    done = subprocess.run(
+        [*command, *jobs], cwd=folder, capture_output=True, text=True, timeout=900, check=True
+    )
+    assert float(done.stderr.split()[1]) < LIMIT
