@@ -142,7 +142,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         residual_limit=request.tolerance * _largest_force(formulation),
         bar_flexibility=bar_flexibility(finger),
         expected_seconds=_seconds(request, split, n, n_states, {c.group for c in columns}),
-        expected_bytes=_bytes(split, n, len(columns)),
+        expected_bytes=_bytes(split, n, n_states, len(columns)),
     )
 
 
@@ -264,7 +264,7 @@ def _omissions(
 
 
 # Rough costs on one core of a 2020s server, in seconds: measured, good to a factor of two.
-UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 20e-6}
+UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
 PAIR_SECONDS = 1.0e-6
 EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
 START_SECONDS = 0.3
@@ -281,9 +281,10 @@ def _seconds(
     return START_SECONDS + n_states * (n * per_unit + eigenvalue)
 
 
-def _bytes(split: Split | None, n: int, n_columns: int) -> int:
-    """Interpreter and libraries, one batch with its temporaries, one block of rows, tables."""
-    batch = lanes_at_once(n) * n * 8 * 300
-    rows = 2**16 * (n_columns * 8 + 4 * n) * 4
-    tables = 0 if split is None else split.n_solves * 8 * 24
-    return 120 * 2**20 + batch + rows + tables
+def _bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> int:
+    """Interpreter and libraries, one batch with its temporaries, tables and a block of rows."""
+    batch = min(lanes_at_once(n), n_states) * n * 8 * 150
+    row = n_columns * 8 + 4 * n
+    if split is None:
+        return 64 * 2**20 + batch + lanes_at_once(n) * row
+    return 128 * 2**20 + batch + split.n_solves * 8 * 24 + 2**16 * row * 4
