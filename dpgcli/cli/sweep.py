@@ -95,8 +95,8 @@ def sweep(
             study.check_room()
         progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
         if part is None:
-            study.assemble()
             _write_run(study, progress)
+            study.assemble()  # last: finished tables say that all is there
         if not quiet:
             say(_summary(output, progress, part))
     if part is None:
