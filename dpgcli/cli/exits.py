@@ -108,6 +108,8 @@ def _code_of(app: Callable[..., object]) -> int:
         return ExitCode.DONE
     except OSError as error:
         return _no_output(error)
+    except Terminated:
+        return ExitCode.TERMINATED
     except (KeyboardInterrupt, typer.Abort):
         return ExitCode.INTERRUPTED
     return code if isinstance(code, int) else ExitCode.DONE
