@@ -33,6 +33,10 @@ class UsageError(Exception):
     """What was asked for makes no sense for this scene; the message says what to do."""
 
 
+class WorkplaceError(Exception):
+    """The workers that should do the work cannot, or are lost; what was done is kept."""
+
+
 class NothingSelectedError(Exception):
     """A selection matches no state."""
 

@@ -14,6 +14,7 @@ FLOORS = {
     "mechanics": 1,
     "equilibrium": 2,
     "states": 3,
+    "accuracy": 4,
     "exploration": 5,
     "files": 6,
     "report": 6,

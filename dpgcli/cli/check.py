@@ -44,16 +44,16 @@ def check(
     verdicts = check_requirements(designs, [requirement(text, columns) for text in require])
     if summary_file is not None:
         append_summary(summary_file, verdicts_markdown(verdicts))
-    conclude(verdicts, listed_as)
-
-
-def conclude(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
-    """Print verdicts; ends the command with its exit code if a requirement is not met."""
-    with suppress(BrokenPipeError):  # the verdict stands when nobody reads on
-        _PRINTERS[listed_as](verdicts)
-        sys.stdout.flush()
+    print_verdicts(verdicts, listed_as)
     if not all(verdict.is_met for verdict in verdicts):
         raise typer.Exit(ExitCode.REQUIREMENT)
+
+
+def print_verdicts(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
+    """Print verdicts, which stand when nobody reads on."""
+    with suppress(BrokenPipeError):
+        _PRINTERS[listed_as](verdicts)
+        sys.stdout.flush()
 
 
 def append_summary(path: Path, text: str) -> None:

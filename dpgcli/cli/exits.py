@@ -12,9 +12,18 @@ from typing import NoReturn, ParamSpec
 import typer
 
 from dpgcli.cli.streams import discard, open_streams, say
-from dpgcli.errors import NothingSelectedError, OutputError, SpecError, UsageError
+from dpgcli.errors import (
+    NothingSelectedError,
+    OutputError,
+    SpecError,
+    UsageError,
+    WorkplaceError,
+)
 
 P = ParamSpec("P")
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+NOTHING_HALF = "nothing half-written is left"
 
 
 class ExitCode(IntEnum):
@@ -24,6 +33,7 @@ class ExitCode(IntEnum):
     REQUIREMENT = 1
     USAGE = 2
     INTERNAL = 3
+    FAILED_CASES = 4
     NOTHING_SELECTED = 5
     INTERRUPTED = 130
     TERMINATED = 143
@@ -47,17 +57,17 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             say(str(error))  # each problem starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
-        except (UsageError, OutputError) as error:
+        except (UsageError, OutputError, WorkplaceError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))
         except BrokenPipeError:  # the reader, such as head, has had enough
             discard(sys.stdout)
             raise typer.Exit(ExitCode.DONE) from None
-        except KeyboardInterrupt:
-            fail(ExitCode.INTERRUPTED, "interrupted; nothing half-written is left")
-        except Terminated:
-            fail(ExitCode.TERMINATED, "terminated; nothing half-written is left")
+        except KeyboardInterrupt as stop:
+            fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
+        except Terminated as stop:
+            fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
         except OSError as error:
             if error.filename is None:  # what is left without a name is standard output
                 fail(_no_output(error), "")
@@ -78,10 +88,11 @@ def fail(code: ExitCode, message: str) -> NoReturn:
 def run_and_exit(app: Callable[..., object]) -> NoReturn:
     """Run the program and exit with its code, whatever state the streams are in."""
     open_streams()
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _terminate)
+    for number in STOP_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
+            signal.signal(number, _stop)
     code = _code_of(app)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is over: a second Ctrl-C changes nothing
+    _ignore_further_signals()
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -121,8 +132,15 @@ def _no_output(error: OSError) -> ExitCode:
     return ExitCode.USAGE
 
 
-def _terminate(*_: object) -> NoReturn:
-    raise Terminated
+def _stop(number: int, _: object) -> NoReturn:
+    """Unwind once; what comes after the first signal would only disturb the cleaning up."""
+    _ignore_further_signals()
+    raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+
+def _ignore_further_signals() -> None:
+    for number in STOP_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _internal_error() -> NoReturn:

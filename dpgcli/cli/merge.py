@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from dpgcli.cli.options import Quiet
+from dpgcli.cli.report import summarize
 from dpgcli.cli.streams import say
 
 
@@ -13,9 +15,11 @@ def merge(
         list[Path], typer.Argument(metavar="FOLDER...", help="Output folders of the shards")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
+    quiet: Quiet = False,
 ) -> None:
     """Join shards into the tables of the whole sweep."""
-    from dpgcli.errors import OutputError, UsageError
+    from dpgcli.errors import UsageError
+    from dpgcli.files.output import sole_use
     from dpgcli.studies.sweep import assemble, stores
 
     found = []
@@ -27,9 +31,9 @@ def merge(
                 f"{folder}: expected the output of one dpg sweep --shard, found {what}"
             )
         found += here
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot write {output}: {error.strerror}") from error
-    assemble(found, output)
-    say(f"{output}: {len(found)} shards joined")
+    with sole_use(output):
+        assemble(found, output)
+        _, text = summarize(output, is_new=True)
+    if not quiet:
+        print(text, end="")
+        say(f"{output}: {len(found)} shards joined")

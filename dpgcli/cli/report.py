@@ -1,9 +1,12 @@
 """`dpg report`: a design space on one page."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 KINDS = (".md", ".html")
 
@@ -32,3 +35,18 @@ def report(
         return
     with whole_file(output) as temporary:
         temporary.write_bytes(text.encode(errors="backslashreplace"))
+
+
+def summarize(folder: Path, *, is_new: bool) -> "tuple[pd.DataFrame, str]":
+    """The designs of a finished sweep and their report, written into its folder if need be."""
+    from dpgcli.files.output import whole_file
+    from dpgcli.files.reading import read_designs, read_run
+    from dpgcli.report.page import markdown
+
+    designs, units = read_designs(folder / "designs.parquet")
+    text = markdown(designs, units, read_run(folder / "run.json"))
+    path = folder / "report.md"
+    if is_new or not path.exists():
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return designs, text

@@ -2,22 +2,29 @@
 
 import os
 import re
-import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dpgcli.cli.check import append_summary, print_verdicts
+from dpgcli.cli.depfile import write_depfile
+from dpgcli.cli.exits import ExitCode, Terminated, fail
 from dpgcli.cli.options import Quiet, Settings, Tolerance
 from dpgcli.cli.progress import ProgressLine
+from dpgcli.cli.report import summarize
+from dpgcli.cli.run import run_facts, run_summary
 from dpgcli.cli.streams import say
+from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
     from dpgcli.exploration.executors import Workplace
     from dpgcli.exploration.expressions import Expression
+    from dpgcli.report.requirements import Verdict
     from dpgcli.studies.sweep import Progress, Shard, Study
-
 
 MOST_NAMED = 20
 
@@ -49,6 +56,9 @@ Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
 ]
+MaxFailed = Annotated[
+    int, typer.Option("--max-failed", min=0, help="Designs that may kill their worker")
+]
 SummaryFile = Annotated[
     Path | None, typer.Option("--summary-file", help="Append the report to this file")
 ]
@@ -67,11 +77,15 @@ def sweep(
     force: Force = False,
     depfile: Depfile = None,
     require: Require = None,
+    max_failed: MaxFailed = 0,
     summary_file: SummaryFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Evaluate every design of a space, resumably."""
+    if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
+        _start_fork_server_early()
     from dpgcli.errors import UsageError
+    from dpgcli.files.output import sole_use
     from dpgcli.files.sweep import read_sweep
     from dpgcli.states.plan import DEFAULT_TOLERANCE
     from dpgcli.studies.sweep import Study
@@ -82,29 +96,40 @@ def sweep(
     study = Study(read_sweep(spec, settings or ()), output, tolerance or DEFAULT_TOLERANCE)
     rules = _rules(study, require or [])
     if depfile is not None:
-        _write_depfile(depfile, study)
-    is_new = part is not None or not study.is_up_to_date
-    if not is_new:
-        if not quiet:
+        write_depfile(depfile, study)
+    with sole_use(output):
+        is_new = part is not None or not study.is_up_to_date
+        if is_new:
+            if restart:
+                study.drop_unfinished()
+            study.check_unfinished()
+            if not force:
+                study.check_room()
+            progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
+            _conclude(study, progress, part, settings or (), quiet)
+        elif not quiet:
             say(f"{output}: up to date")
-    else:
-        if restart:
-            study.drop_unfinished()
-        study.check_unfinished()
-        if not force:
-            study.check_room()
-        progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
         if part is None:
-            _write_run(study, progress)
-            study.assemble()  # last: finished tables say that all is there
-        if not quiet:
-            say(_summary(output, progress, part))
-    if part is None:
-        _conclude(study, rules, summary_file, is_new, quiet)
+            n_failed, is_met = _judge(study, rules, summary_file, is_new, quiet)
+        else:
+            n_failed, is_met = len(progress.failures), True
+    if n_failed > max_failed:
+        fail(ExitCode.FAILED_CASES, f"{n_failed:,} designs failed; --max-failed is {max_failed}")
+    if not is_met:
+        raise typer.Exit(ExitCode.REQUIREMENT)
+
+
+def _start_fork_server_early() -> None:
+    """Workers' imports, once for all of them, while this process is busy with its own."""
+    from dpgcli.exploration.executors import start_fork_server
+
+    start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
 
 
 def _rules(study: "Study", require: list[str]) -> "list[Expression]":
     """Requirements over the columns of designs, checked before any work."""
+    if not require:
+        return []
     from dpgcli.report.requirements import requirement
     from dpgcli.states.columns import Kind
 
@@ -115,31 +140,44 @@ def _rules(study: "Study", require: list[str]) -> "list[Expression]":
 
 def _conclude(
     study: "Study",
-    rules: "list[Expression]",
-    summary_file: Path | None,
-    is_new: bool,
+    progress: "Progress",
+    part: "Shard | None",
+    settings: Sequence[str],
     quiet: bool,
 ) -> None:
-    """Write and print the report; then what the requirements say, which may end with code 1."""
-    from dpgcli.cli.check import append_summary, conclude
-    from dpgcli.cli.validate import ProblemFormat
-    from dpgcli.files.output import whole_file
-    from dpgcli.files.reading import read_designs, read_run
-    from dpgcli.report.page import markdown, verdicts_markdown
-    from dpgcli.report.requirements import check_requirements
-    from dpgcli.studies.sweep import DESIGNS, REPORT, RUN
+    """Write the tables unless this is a part of them, and say what the run came to."""
+    from dpgcli.files.tables import write_run
+    from dpgcli.studies.sweep import RUN
 
-    designs, units = read_designs(study.folder / DESIGNS)
-    text = markdown(designs, units, read_run(study.folder / RUN))
-    if is_new or not (study.folder / REPORT).exists():
-        with whole_file(study.folder / REPORT) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]
+    if part is None:
+        write_run(study.folder / RUN, run_facts(progress, replays))
+        began = perf_counter()
+        study.assemble()  # last but for its own time: finished tables say that all is there
+        progress.tables_seconds = perf_counter() - began
+        write_run(study.folder / RUN, run_facts(progress, replays))
+    if not quiet:
+        say(run_summary(study.folder, progress, part))
+    for replay in replays:
+        say(f"failed, its worker died twice; alone: {replay}")
+
+
+def _judge(
+    study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
+) -> tuple[int, bool]:
+    """Report; how many designs failed, and whether all requirements are met."""
+    from dpgcli.report.page import verdicts_markdown
+    from dpgcli.report.requirements import check_requirements
+
+    designs, text = summarize(study.folder, is_new=is_new)
     if is_new and not quiet:
         print(text, end="")
-    verdicts = check_requirements(designs, rules) if rules else ()
+    verdicts: Sequence[Verdict] = check_requirements(designs, rules) if rules else ()
     if summary_file is not None:
         append_summary(summary_file, text + ("\n" + verdicts_markdown(verdicts) if rules else ""))
-    conclude(verdicts, ProblemFormat.TEXT)
+    print_verdicts(verdicts, ProblemFormat.TEXT)
+    is_met = all(verdict.is_met for verdict in verdicts)
+    return int((designs["status"] == "failed").sum()), is_met
 
 
 def _computed(
@@ -152,9 +190,12 @@ def _computed(
         line.resume_at(progress.n_resumed)
         line.show(progress.n_done)
 
-    progress = study.compute(workplace, watch, part)
-    line.clear()
-    return progress
+    try:
+        return study.compute(workplace, watch, part)
+    except (KeyboardInterrupt, Terminated) as stop:
+        raise type(stop)("what is done is kept, and the same command goes on from there") from None
+    finally:
+        line.clear()
 
 
 def _shard(text: str | None) -> "Shard | None":
@@ -186,63 +227,3 @@ def _workplace(executor: ExecutorName, jobs: int | None, scheduler: str | None) 
     if executor is ExecutorName.SERIAL or n_workers == 1:
         return executors.serial()
     return executors.processes(n_workers)
-
-
-def _write_depfile(path: Path, study: "Study") -> None:
-    """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does."""
-    from dpgcli.files.output import whole_file
-    from dpgcli.studies.sweep import DESIGNS, STATES
-
-    study.folder.mkdir(parents=True, exist_ok=True)
-    targets = " ".join(_escaped(study.folder / name) for name in (STATES, DESIGNS))
-    sources = [_escaped(source) for source in study.sweep.files if source != Path("-")]
-    text = f"{targets}: {' '.join(sources)}\n" + "".join(f"\n{source}:\n" for source in sources)
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _escaped(path: Path) -> str:
-    """A name as Make reads it."""
-    return re.sub(r"([ #\\])", r"\\\1", os.path.normpath(path)).replace("$", "$$")
-
-
-def _write_run(study: "Study", progress: "Progress") -> None:
-    from dpgcli.files.tables import write_run
-    from dpgcli.studies.sweep import RUN
-
-    write_run(study.folder / RUN, _facts(progress))
-
-
-def _facts(progress: "Progress") -> dict[str, Any]:
-    import platform
-
-    return {
-        "designs": progress.n_designs,
-        "resumed_designs": progress.n_resumed,
-        "failed_designs": progress.failures,
-        "worker_deaths": progress.deaths,
-        "seconds": progress.seconds,
-        "core_cpu_seconds": progress.core_seconds,
-        "writing_seconds": progress.writing_seconds,
-        "machine": platform.machine(),
-        "host": platform.node(),
-        "python": platform.python_version(),
-        "command": sys.argv,
-    }
-
-
-def _summary(output: Path, progress: "Progress", part: "Shard | None") -> str:
-    new = progress.n_done - progress.n_resumed
-    resumed = f", {progress.n_resumed:,} were there" if progress.n_resumed else ""
-    rate = new / max(progress.seconds, 1e-9)
-    text = (
-        f"{output}: {new:,} designs in {progress.seconds:.3g} s ({rate:,.0f}/s){resumed}; "
-        f"{progress.core_seconds:.3g} s of CPU in workers, {progress.writing_seconds:.2g} s writing"
-    )
-    if progress.failures:
-        named = ", ".join(f"design {number}" for number in progress.failures[:MOST_NAMED])
-        more = ", ..." if len(progress.failures) > MOST_NAMED else ""
-        text += f"; failed, their worker died twice: {named}{more}"
-    if part is not None:
-        text += f"; part {part.number} of {part.count}: join with dpg merge"
-    return text

@@ -3,21 +3,37 @@
 A chunk is a range of cases. A worker that dies takes a whole process pool with it; then the
 chunks that were under way are tried once more, each alone in a pool of its own. A chunk that
 kills its worker again is halved, until the one case that kills is alone: it is reported as
-failed, and everything else goes on.
+failed, and everything else goes on. If nothing but failures comes back, it is not the cases:
+the run gives up.
 """
 
 import os
+import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Generic, TypeVar
+
+from dpgcli.errors import WorkplaceError
 
 T = TypeVar("T")
 Arguments = Callable[["Chunk"], tuple[Any, ...]]
 
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
+MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
+CLUSTER_PATIENCE = 10  # s
+GO_ON = "What is done is kept, and the same command goes on from there."
 
 
 @dataclass(frozen=True)
@@ -72,38 +88,60 @@ class Runner(Generic[T]):
     deaths: list[Chunk] = field(default_factory=list)
 
     def run(self, chunks: Iterable[Chunk]) -> Iterator[Result[T]]:
-        """Results as they are done, in no order."""
+        """Results as they are done, in no order.
+
+        Raises WorkplaceError where no worker can work or all are lost. Failures are held back
+        until something succeeds after them: a workplace to blame leaves none.
+        """
+        failures: list[Result[T]] = []
+        for result in self._results(chunks):
+            if result.value is not None:
+                yield from failures
+                failures.clear()
+                yield result
+                continue
+            failures.append(result)
+            if len(failures) > MOST_FAILURES_IN_A_ROW:
+                raise WorkplaceError(
+                    f"{len(failures)} cases in a row killed their workers, from case "
+                    f"{failures[0].chunk.start} on: is there memory enough? {GO_ON}"
+                )
+        yield from failures
+
+    def _results(self, chunks: Iterable[Chunk]) -> Iterator[Result[T]]:
         waiting = deque(chunks)
         while waiting:
             suspects = yield from self._run_until_broken(waiting)
+            if suspects:
+                self._check_that_a_worker_starts()
             for chunk in suspects:
                 yield from self._run_alone(chunk)
 
     def _run_until_broken(self, waiting: deque[Chunk]) -> Generator[Result[T], None, list[Chunk]]:
         """Work off `waiting`; return the chunks that were under way when a worker died."""
-        executor = self.workplace.make(self.workplace.n_workers)
+        n_workers = self.workplace.n_workers
         under_way: dict[Future[T], Chunk] = {}
-        try:
-            while waiting or under_way:
-                while waiting and len(under_way) < UNDER_WAY_PER_WORKER * self.workplace.n_workers:
-                    future = executor.submit(self.function, *self.arguments(waiting[0]))
-                    under_way[future] = waiting.popleft()
-                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-                    value = future.result()
-                    yield Result(under_way.pop(future), value)
-        except self.workplace.broken:
-            self.deaths += under_way.values()
-        finally:
-            for future in under_way:
-                future.cancel()
-            executor.shutdown(wait=False)
+        with self._open(n_workers) as executor:
+            try:
+                while waiting or under_way:
+                    while waiting and len(under_way) < UNDER_WAY_PER_WORKER * n_workers:
+                        future = executor.submit(self.function, *self.arguments(waiting[0]))
+                        under_way[future] = waiting.popleft()
+                    for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                        value = future.result()
+                        yield Result(under_way.pop(future), value)
+            except self.workplace.broken:
+                self.deaths += under_way.values()
+            finally:
+                for future in under_way:
+                    future.cancel()
         return list(under_way.values())
 
     def _run_alone(self, chunk: Chunk) -> Iterator[Result[T]]:
         """A chunk that may be to blame, in a pool of its own; halved if it is."""
-        executor = self.workplace.make(1)
         try:
-            value = executor.submit(self.function, *self.arguments(chunk)).result()
+            with self._open(1) as executor:
+                value = executor.submit(self.function, *self.arguments(chunk)).result()
         except self.workplace.broken:
             if chunk.is_single:
                 yield Result(chunk, None)
@@ -112,37 +150,70 @@ class Runner(Generic[T]):
                 yield from self._run_alone(half)
         else:
             yield Result(chunk, value)
+
+    def _check_that_a_worker_starts(self) -> None:
+        try:
+            with self._open(1) as executor:
+                executor.submit(os.getpid).result()
+        except self.workplace.broken as error:
+            raise WorkplaceError(f"{self.workplace.name}: workers do not start. {GO_ON}") from error
+
+    @contextmanager
+    def _open(self, n_workers: int) -> Iterator[Executor]:
+        executor = self.workplace.make(n_workers)
+        try:
+            yield executor
+        except self.workplace.lost as error:
+            raise WorkplaceError(f"{self.workplace.name} is lost. {GO_ON}") from error
         finally:
-            executor.shutdown(wait=False)
+            executor.shutdown(wait=self.workplace.is_local)
 
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where to run: how to make an executor of n workers, how many, and how it says it broke."""
+    """Where to run: how to make an executor of n workers, and how many.
 
+    `is_local` says that workers see this machine's files. `broken` is what an executor raises
+    when a worker dies, `lost` when there is nobody left to ask.
+    """
+
+    name: str
     make: Callable[[int], Executor]
     n_workers: int
+    is_local: bool = True
     broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    lost: tuple[type[BaseException], ...] = ()
 
 
 def serial() -> Workplace:
     """This process."""
-    return Workplace(lambda _: SerialExecutor(), 1)
+    return Workplace("this process", lambda _: SerialExecutor(), 1)
 
 
 def processes(n_workers: int) -> Workplace:
     """A pool of processes on this machine."""
-    return Workplace(process_pool, n_workers)
+    return Workplace("the pool of processes", process_pool, n_workers)
 
 
 def dask_cluster(scheduler: str) -> Workplace:
-    """The workers of a Dask cluster; raises OSError where no scheduler answers."""
-    from distributed import Client, KilledWorker
+    """The workers of a Dask cluster; raises OSError where no scheduler or no worker answers."""
+    import logging
 
-    client = Client(scheduler, timeout=10, set_as_default=False)
-    n_threads = sum(client.nthreads().values())
-    executor = partial(client.get_executor, pure=False)
-    return Workplace(lambda _: executor(), max(n_threads, 1), (BrokenExecutor, KilledWorker))
+    from distributed import Client, KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is raised
+    client = Client(scheduler, timeout=CLUSTER_PATIENCE, set_as_default=False)
+    client.wait_for_workers(1, timeout=CLUSTER_PATIENCE)
+    return Workplace(
+        f"the Dask cluster at {scheduler}",
+        lambda _: client.get_executor(pure=False),
+        sum(client.nthreads().values()),
+        is_local=False,
+        broken=(BrokenExecutor, KilledWorker),
+        lost=(CancelledError, CommClosedError),
+    )
 
 
 class SerialExecutor(Executor):
@@ -160,17 +231,64 @@ class SerialExecutor(Executor):
 
 def process_pool(n_workers: int) -> Executor:
     """A pool of fresh processes: BLAS on one thread, deaf to Ctrl-C, gone with their parent."""
-    from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    context = get_context("forkserver" if os.name == "posix" else "spawn")
-    return ProcessPoolExecutor(n_workers, mp_context=context, initializer=_start_worker)
+    start_fork_server()
+    return _Pool(n_workers, mp_context=get_context("forkserver"), initializer=_start_worker)
+
+
+def start_fork_server(*modules: str) -> None:
+    """Start the process that workers are forked from; it imports these modules once for all.
+
+    Called early, it does so while this process is still busy with imports of its own.
+    """
+    from multiprocessing import forkserver, resource_tracker
+
+    resource_tracker.ensure_running()  # which would unblock the signal below
+    if modules:
+        forkserver.set_forkserver_preload(list(modules))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        forkserver.ensure_running()  # workers inherit from it that Ctrl-C is blocked
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Pool(ProcessPoolExecutor):
+    """A pool that no signal stops halfway through starting or ending its processes."""
+
+    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+        """As of the base."""
+        with _held_signals():
+            return super().submit(fn, *args, **kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """As of the base."""
+        with _held_signals():
+            super().shutdown(wait, cancel_futures=cancel_futures)
+
+
+@contextmanager
+def _held_signals() -> Iterator[None]:
+    """Hold back what would stop the main thread until the end of the block."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    handlers = {
+        number: signal.signal(number, lambda caught, _: held.append(caught))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+        for caught in held[:1]:
+            signal.raise_signal(caught)
 
 
 def _start_worker() -> None:
-    import signal
-    import threading
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -1,12 +1,13 @@
 """Files appear whole or not at all."""
 
+import fcntl
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from dpgcli.errors import OutputError
+from dpgcli.errors import OutputError, UsageError
 
 
 @contextmanager
@@ -39,6 +40,35 @@ def check_writable(path: Path) -> None:
         _beside(path).unlink()
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def sole_use(folder: Path) -> Iterator[None]:
+    """Make a folder if need be, and keep every other process that asks out of it.
+
+    Raises UsageError where another is at work there, OutputError where there can be no such
+    folder. A folder that was made and stayed empty is removed.
+    """
+    is_new = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {error.strerror}") from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(handle)
+        raise UsageError(f"another dpg is at work in {folder}: wait, or name another") from error
+    except OSError:
+        pass  # a file system without locks
+    try:
+        yield
+    finally:
+        if is_new:
+            with suppress(OSError):
+                folder.rmdir()
+        os.close(handle)
 
 
 def _beside(path: Path) -> Path:

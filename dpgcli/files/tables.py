@@ -169,10 +169,8 @@ def _hash(digest: Any, column: Any) -> None:
 
 
 def _array(column: Column, values: NDArray[Any]) -> Any:
-    if column.kind is Kind.PATTERN:
-        return _strings(values)
-    if column.kind is Kind.TEXT:
-        return _strings(np.char.encode(values, "utf-8"))
+    if column.kind in (Kind.PATTERN, Kind.TEXT):
+        return _strings(values if values.dtype.kind == "S" else np.char.encode(values, "utf-8"))
     if column.kind is Kind.STATUS:
         return _statuses(values)
     if column.kind is Kind.FLAG:

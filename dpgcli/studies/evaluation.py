@@ -97,7 +97,7 @@ class Evaluation:
         solved = [self._solved(places, scenes) for places in _alike(scenes)]
         described = {
             **self._described(start, values),
-            "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)]),
+            "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)], "S"),
         }
         return Tables(
             self._state_rows(described, solved),
@@ -106,7 +106,7 @@ class Evaluation:
 
     def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
         """The rows of one design that cannot be evaluated at all."""
-        described = {**self._described(design, values), "calibration": np.array([""])}
+        described = {**self._described(design, values), "calibration": np.array([b""])}
         rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
         rows["status"] = np.array([DesignStatus.FAILED.value])
         return Tables(self._state_rows(described, []), rows)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shlex
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -11,8 +12,8 @@ from typing import Any, NamedTuple
 
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
-from dpgcli.exploration.space import Space
 from dpgcli.files.parts import PartStore, encoded
+from dpgcli.files.spec import spelled
 from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
@@ -21,7 +22,7 @@ from dpgcli.studies.evaluation import Evaluation, Numbers, Tables, value_columns
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
-STATES, DESIGNS, RUN, REPORT = "states.parquet", "designs.parquet", "run.json", "report.md"
+STATES, DESIGNS, RUN = "states.parquet", "designs.parquet", "run.json"
 PARTS = ".parts"
 
 
@@ -37,16 +38,21 @@ class Shard:
 class Progress:
     """How far a sweep is; handed to whoever watches after every chunk.
 
-    Seconds are wall time but for `core_seconds`, the workers' CPU time; `failures` are designs
-    whose worker died twice, `deaths` how many chunks were under way when a worker died.
+    `n_states` were computed in this run. `seconds` is the wall time of that, `tables_seconds`
+    of joining the parts into the tables; `core_seconds` and `writing_seconds` are the workers'
+    CPU time for states and parts; `failures` are designs whose worker died twice, `deaths` how
+    many chunks were under way when a worker died.
     """
 
     n_designs: int
     n_done: int
     n_resumed: int
+    n_workers: int
+    n_states: int = 0
     seconds: float = 0.0
-    writing_seconds: float = 0.0
+    tables_seconds: float = 0.0
     core_seconds: float = 0.0
+    writing_seconds: float = 0.0
     failures: list[int] = field(default_factory=list)
     deaths: int = 0
 
@@ -159,24 +165,33 @@ class Study:
         missing = store.missing(ranges)
         n_designs = sum(stop - start for start, stop in ranges)
         n_resumed = n_designs - sum(stop - start for start, stop in missing)
-        progress = Progress(n_designs, n_resumed, n_resumed)
-        runner = Runner(workplace, _evaluated, lambda c: _arguments(evaluation, space, c))
+        progress = Progress(n_designs, n_resumed, n_resumed, workplace.n_workers)
+        work = Work(evaluation, store if workplace.is_local else None)
+        runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop)))
         began = perf_counter()
         for result in runner.run(chunked(missing, self.chunk_size)):
-            chunk, part = result.chunk, result.value
-            if part is None:
+            chunk, done = result.chunk, result.value
+            if done is None:
                 progress.failures.append(chunk.start)
                 tables = evaluation.failed(chunk.start, space.designs(chunk.start, chunk.stop))
-                part = Evaluated(_encoded(evaluation, tables), 0.0)
-            writing = perf_counter()
-            store.write(chunk.start, chunk.stop, part.content)
-            progress.writing_seconds += perf_counter() - writing
-            progress.core_seconds += part.cpu_seconds
+                done = work.stored(chunk, tables, 0.0)
+            if done.content is not None:
+                store.write(chunk.start, chunk.stop, done.content)
+            progress.n_states += done.n_states
+            progress.core_seconds += done.core_seconds
+            progress.writing_seconds += done.writing_seconds
             progress.n_done += chunk.stop - chunk.start
             progress.seconds = perf_counter() - began
             progress.deaths = len(runner.deaths)
             watch(progress)
         return progress
+
+    def replay(self, number: int, settings: Sequence[str] = ()) -> str:
+        """The command that evaluates one design alone; `settings` are those of the sweep."""
+        values = self.sweep.space.designs(number, number + 1)
+        changes = [f"{key}={spelled(column[0].item())}" for key, column in values.items()]
+        options = (option for change in (*settings, *changes) for option in ("--set", change))
+        return shlex.join(["dpg", "predict", str(self.sweep.base_path), *options])
 
     def assemble(self) -> None:
         """Join all parts into the two tables; then the parts go."""
@@ -215,28 +230,46 @@ def stores(folder: Path) -> list[PartStore]:
     return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
 
 
-class Evaluated(NamedTuple):
-    """The bytes of a part and the CPU time it took, s."""
+class Done(NamedTuple):
+    """What a worker sends back: counts, CPU seconds, and the part if it could not store it.
 
-    content: bytes
-    cpu_seconds: float
+    Without the bytes it is shorter than what a pipe takes at once: a worker that is killed
+    while it sends leaves no half of a message, for the rest of which the pool would wait.
+    """
 
-
-def _arguments(evaluation: Evaluation, space: Space, chunk: Chunk) -> tuple[Any, ...]:
-    return evaluation, chunk.start, space.designs(chunk.start, chunk.stop)
-
-
-def _evaluated(evaluation: Evaluation, start: int, values: dict[str, Numbers]) -> Evaluated:
-    """What a worker does with a chunk."""
-    began = process_time()
-    content = _encoded(evaluation, evaluation(start, values))
-    return Evaluated(content, process_time() - began)
+    n_states: int
+    core_seconds: float
+    writing_seconds: float
+    content: bytes | None
 
 
-def _encoded(evaluation: Evaluation, tables: Tables) -> bytes:
-    return encoded(
-        evaluation.state_columns, tables.states, evaluation.design_columns, tables.designs
-    )
+@dataclass(frozen=True)
+class Work:
+    """What a worker does with a chunk; `store` is None where it sees no common disk."""
+
+    evaluation: Evaluation
+    store: PartStore | None
+
+    def __call__(self, chunk: Chunk, values: dict[str, Numbers]) -> Done:
+        """Evaluate a chunk's designs, with these values by key, into a part."""
+        began = process_time()
+        tables = self.evaluation(chunk.start, values)
+        return self.stored(chunk, tables, process_time() - began)
+
+    def stored(self, chunk: Chunk, tables: Tables, core_seconds: float) -> Done:
+        """Store the part, or send it along."""
+        began = process_time()
+        n_states = len(tables.states["design"])
+        content = encoded(
+            self.evaluation.state_columns,
+            tables.states,
+            self.evaluation.design_columns,
+            tables.designs,
+        )
+        if self.store is None:
+            return Done(n_states, core_seconds, process_time() - began, content)
+        self.store.write(chunk.start, chunk.stop, content)
+        return Done(n_states, core_seconds, process_time() - began, None)
 
 
 def _size(n_bytes: float) -> str:

@@ -92,15 +92,7 @@ def tables(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "n_killed",
-    [
-        0,
-        pytest.param(
-            1, marks=pytest.mark.xfail(strict=False, reason="Dask logs to standard error")
-        ),
-    ],
-)
+@pytest.mark.parametrize("n_killed", [0, 1])
 def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, n_killed: int) -> None:
     """Also when a worker is killed on the way."""
     address, workers = cluster
@@ -131,7 +123,6 @@ def test_an_interrupt_on_a_cluster(cluster: Cluster, sweep: Path) -> None:
     assert process.returncode == ExitCode.DONE
 
 
-@pytest.mark.xfail(strict=False, reason="a lost scheduler is reported as an internal error")
 @pytest.mark.slow
 def test_a_lost_scheduler_ends_the_sweep_with_a_message(cluster: Cluster, sweep: Path) -> None:
     address, _ = cluster

@@ -16,8 +16,8 @@ COMMANDS = {
     "--plot --quiet",
     "explain": "--format --pattern --set --columns --nodes --formulation --tolerance",
     "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --restart --force "
-    "--depfile --require --summary-file --quiet",
-    "merge": "--output",
+    "--depfile --require --max-failed --summary-file --quiet",
+    "merge": "--output --quiet",
     "check": "--require --format --summary-file",
     "report": "--output",
     "validate": "--format --set",
@@ -32,6 +32,7 @@ def test_the_codes_are_the_published_ones() -> None:
         "REQUIREMENT": 1,
         "USAGE": 2,
         "INTERNAL": 3,
+        "FAILED_CASES": 4,
         "NOTHING_SELECTED": 5,
         "INTERRUPTED": 130,
         "TERMINATED": 143,

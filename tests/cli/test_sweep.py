@@ -1,10 +1,16 @@
 """`dpg sweep`: tables, messages, exit codes, and a file for Make."""
 
+import json
 import os
+import pickle
+import re
 import resource
+import select
+import shlex
 import shutil
 import subprocess
 from collections import namedtuple
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +18,10 @@ import pandas as pd
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.exploration.executors import Chunk
+from dpgcli.files.output import sole_use
+from dpgcli.files.sweep import read_sweep
+from dpgcli.studies.sweep import Study, Work
 
 HEIGHT = "finger.geometry.dome_height_mm"
 SEPARATION = "finger.geometry.unit_separation_mm"
@@ -38,7 +48,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
     assert result.exit_code == ExitCode.DONE
-    assert result.stderr.splitlines()[0].startswith("out: 6 designs in ")
+    assert result.stderr.splitlines()[0].startswith("out: 6 designs, 40 states in ")
     out = sweep.parent / "out"
     assert {p.name for p in out.iterdir()} - {"report.md"} == {
         "designs.parquet",
@@ -247,9 +257,9 @@ def test_progress_goes_to_standard_error_only(run: Any, sweep: Path) -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_a_dead_worker_is_reported_with_the_designs_it_held(
-    call: Any, sweep: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def design_2_kills() -> Iterator[pytest.MonkeyPatch]:
+    """Design 2 kills whatever worker it meets, until this is undone."""
     from concurrent.futures import BrokenExecutor
 
     from dpgcli.exploration import executors
@@ -257,23 +267,82 @@ def test_a_dead_worker_is_reported_with_the_designs_it_held(
     submit = executors.SerialExecutor.submit
 
     def deadly(self: Any, fn: Any, /, *arguments: Any) -> Any:
-        if 6.0 in arguments[2][HEIGHT] and 2.0 in arguments[2][SEPARATION]:
+        if arguments and 6.0 in arguments[1][HEIGHT] and 2.0 in arguments[1][SEPARATION]:
             fn, arguments = _die, ()
         return submit(self, fn, *arguments)
 
     def _die() -> None:
         raise BrokenExecutor("killed")
 
-    monkeypatch.setattr(executors.SerialExecutor, "submit", deadly)
+    patch = pytest.MonkeyPatch()
+    patch.setattr(executors.SerialExecutor, "submit", deadly)
+    yield patch
+    patch.undo()
+
+
+@pytest.mark.usefixtures("design_2_kills")
+def test_a_design_that_kills_its_worker_is_a_row_and_has_its_exit_code(
+    call: Any, sweep: Path
+) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
-    assert result.exit_code == ExitCode.DONE
+    assert result.exit_code == ExitCode.FAILED_CASES
+    assert "dpg: 1 designs failed; --max-failed is 0" in result.stderr
     designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
-    assert designs["status"].tolist() == [
-        "stable",
-        "invalid",
-        "failed",
-        "stable",
-        "stable",
-        "stable",
-    ]
-    assert "design 2" in result.stderr
+    expected = ["stable", "invalid", "failed", "stable", "stable", "stable"]
+    assert designs["status"].tolist() == expected
+    again = call("sweep", "sweep.yaml", *SERIAL)
+    assert "up to date" in again.stderr
+    assert again.exit_code == ExitCode.FAILED_CASES
+
+
+def test_a_failed_design_comes_with_the_command_that_replays_it(
+    call: Any, sweep: Path, design_2_kills: pytest.MonkeyPatch
+) -> None:
+    options = ("--max-failed", "1", "-s", "finger.linear_stiffness_N_per_mm=2.0e4")
+    result = call("sweep", "sweep.yaml", *SERIAL, *options)
+    assert result.exit_code == ExitCode.DONE
+    (replay,) = re.findall("^failed, .* alone: dpg (.*)$", result.stderr, re.MULTILINE)
+    assert json.loads((sweep.parent / "out" / "run.json").read_text())["replay"] == [f"dpg {replay}"]
+    alone = call(*shlex.split(replay), "--columns", "tip_x_mm", "--format", "json")
+    assert alone.exit_code == ExitCode.DONE
+    design_2_kills.undo()
+    assert call("sweep", "sweep.yaml", *SERIAL[2:], "-o", "whole", *options).exit_code == 0
+    states = pd.read_parquet(sweep.parent / "whole" / "states.parquet")
+    expected = states[states["design"] == 2]["tip_x_mm"].tolist()
+    assert [row["tip_x_mm"] for row in json.loads(alone.stdout)] == expected
+
+
+def test_one_dpg_at_a_time_in_a_folder(call: Any, sweep: Path) -> None:
+    with sole_use(sweep.parent / "out"):
+        result = call("sweep", "sweep.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.USAGE
+    assert "another dpg is at work in out" in result.stderr
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+
+
+def test_a_refused_sweep_leaves_no_empty_folder(call: Any, sweep: Path) -> None:
+    result = call("sweep", "sweep.yaml", "-o", "new", "--executor", "dask", "-j", "2")
+    assert result.exit_code == ExitCode.USAGE
+    assert not (sweep.parent / "new").exists()
+
+
+def test_what_a_worker_sends_is_less_than_a_pipe_takes_at_once(sweep: Path) -> None:
+    """A worker killed halfway through a longer message would leave the pool waiting forever."""
+    study = Study(read_sweep(sweep), sweep.parent / "out")
+    study.store.say({})
+    values = study.sweep.space.designs(0, 6)
+    done = Work(study.evaluation, study.store)(Chunk(0, 6), values)
+    assert done.n_states == 5 * 8
+    assert len(pickle.dumps(done)) < select.PIPE_BUF / 4
+    assert Work(study.evaluation, None)(Chunk(0, 6), values).content is not None
+
+
+def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    facts = json.loads((sweep.parent / "out" / "run.json").read_text())
+    assert facts["states"] == 5 * 8
+    shares = facts["core_share"] + facts["writing_share"] + facts["pool_share"]
+    assert shares == pytest.approx(1.0, abs=0.05)
+    assert facts["states_per_second"] == pytest.approx(
+        40 / (facts["seconds"] + facts["tables_seconds"])
+    )

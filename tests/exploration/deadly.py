@@ -2,7 +2,6 @@
 
 import os
 import signal
-import threading
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -25,21 +24,9 @@ def squares(chunk: Chunk, folder: str, always: frozenset[int], once: frozenset[i
     return [case**2 for case in range(chunk.start, chunk.stop)]
 
 
-def large(chunk: Chunk, folder: str) -> bytes:
-    """More than a pipe holds; the first time, the process dies while it is being sent."""
-    mark = Path(folder) / "large"
-    if chunk.start == 0 and not mark.exists():
-        mark.touch()
-        threading.Thread(target=_kill_while_sending, daemon=True).start()
-    return bytes(2**25)
-
-
-def _kill_while_sending() -> None:
-    call = Path(f"/proc/self/task/{os.getpid()}/syscall")
-    while True:
-        words = call.read_text().split()
-        if words[0] == "1" and int(words[3], 16) > 2**20:  # write(2) of more than 1 MiB
-            os.kill(os.getpid(), signal.SIGKILL)
+def dies() -> None:
+    """Ends the process that calls it."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def process_id(_: Chunk) -> int:

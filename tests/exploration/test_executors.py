@@ -2,10 +2,10 @@
 
 import importlib
 import os
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dpgcli.errors import WorkplaceError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked, processes, serial
 
 
@@ -74,22 +75,29 @@ def test_several_die_at_once(deadly: Any, tmp_path: Path) -> None:
     assert found == {case: None if case in (0, 3) else case**2 for case in range(12)}
 
 
-@pytest.mark.xfail(strict=False, reason="the pool of the standard library waits forever")
-@pytest.mark.slow
-def test_a_worker_that_dies_while_it_sends_its_result(deadly: Any, tmp_path: Path) -> None:
-    """The pool's parent must not wait for the rest of a message that will never come."""
-    if not Path("/proc/self/syscall").exists():
-        pytest.skip("needs /proc/PID/syscall")
-    program = (
-        f"import sys; sys.path.insert(0, {os.fspath(Path(__file__).parent)!r})\n"
-        "from deadly import large\n"
-        "from dpgcli.exploration.executors import Runner, chunked, processes\n"
-        f"runner = Runner(processes(2), large, lambda c: (c, {os.fspath(tmp_path)!r}))\n"
-        "print(sorted(r.chunk.start for r in runner.run(chunked([(0, 4)], 1))))\n"
-    )
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=15, check=False)
-    assert (done.stdout, done.stderr) == ("[0, 1, 2, 3]\n", "")
+def test_workers_that_always_die_end_the_run(deadly: Any, tmp_path: Path) -> None:
+    """Then it is not the cases' fault, and none of them is reported as failed."""
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(64)))
+    found = []
+    with pytest.raises(WorkplaceError, match="17 cases in a row .* is there memory enough"):
+        found += runner.run(chunked([(0, 64)], 8))
+    assert found == []
+
+
+def test_a_few_cases_that_all_kill_are_failures(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(3)))
+    assert results(runner, chunked([(0, 3)], 2)) == dict.fromkeys(range(3))
+
+
+def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
+    def broken(n_workers: int) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=deadly.dies)
+
+    workplace = Workplace("the pool", broken, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    with pytest.raises(WorkplaceError, match="the pool: workers do not start"):
+        list(runner.run(chunked([(0, 20)], 3)))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("workplace", [serial(), processes(2)])

@@ -150,7 +150,7 @@ def _overridden(finger: FingerSpec, base: Group) -> Iterator[Group]:
 
 def _given(section: Any) -> dict[str, float]:
     """The values that a section of the spec gives."""
-    return {} if section is None else {k: v for k, v in section if v is not None}
+    return {} if section is None else {k: v for k, v in vars(section).items() if v is not None}
 
 
 def _chamber_issues(finger: FingerSpec) -> Iterator[Issue]:

@@ -55,6 +55,7 @@ class Sweep:
     base_data: dict[str, Any]
     space: Space
     constraints: tuple[Expression, ...]
+    base_path: Path
     files: tuple[Path, ...]
     said: dict[str, Any]
     digests: tuple[str, ...]
@@ -90,6 +91,7 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         base_document.data,
         Space(tuple(axis for axis in axes if axis is not None)),
         tuple(rule for rule in rules if rule is not None),
+        base_path,
         (path, base_path, *reader.tables),
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),

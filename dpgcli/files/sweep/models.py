@@ -25,8 +25,8 @@ class Between(Part):
 
     first: Bound = Field(alias="from", description="the first value, a number")
     last: Bound = Field(alias="to", description="the last value, a number")
-    count: Annotated[int, Field(ge=1, le=MOST_POINTS)] = Field(
-        description="how many values, a whole number from 1"
+    count: Annotated[int, Field(ge=2, le=MOST_POINTS)] = Field(
+        description="how many values, a whole number from 2"
     )
 
 

@@ -1,0 +1,67 @@
+"""What a run of a sweep came to: times, shares of them, failures."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dpgcli.studies.sweep import Progress, Shard
+
+
+def run_facts(progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
+    """The content of run.json; shares are of the wall time of all workers."""
+    import platform
+
+    core, writing, pool = _shares(progress)
+    return {
+        "designs": progress.n_designs,
+        "resumed_designs": progress.n_resumed,
+        "states": progress.n_states,
+        "states_per_second": progress.n_states / _seconds(progress),
+        "seconds": progress.seconds,
+        "tables_seconds": progress.tables_seconds,
+        "workers": progress.n_workers,
+        "core_cpu_seconds": progress.core_seconds,
+        "writing_cpu_seconds": progress.writing_seconds,
+        "core_share": core,
+        "writing_share": writing,
+        "pool_share": pool,
+        "worker_deaths": progress.deaths,
+        "failed_designs": progress.failures,
+        "replay": list(replays),
+        "machine": platform.machine(),
+        "host": platform.node(),
+        "python": platform.python_version(),
+        "command": sys.argv,
+    }
+
+
+def run_summary(output: Path, progress: "Progress", part: "Shard | None") -> str:
+    """One line for standard error."""
+    new = progress.n_done - progress.n_resumed
+    resumed = f", {progress.n_resumed:,} were there" if progress.n_resumed else ""
+    text = (
+        f"{output}: {new:,} designs, {progress.n_states:,} states "
+        f"in {_seconds(progress):.3g} s ({progress.n_states / _seconds(progress):,.0f} states/s)"
+        f"{resumed}"
+    )
+    if progress.n_states:
+        core, writing, pool = (f"{100 * share:.0f} %" for share in _shares(progress))
+        of = "the worker's time" if progress.n_workers == 1 else "the workers' time"
+        text += f"; {core} of {of} in states, {writing} in parts, {pool} in the pool"
+        text += f"; tables {progress.tables_seconds:.2g} s" if part is None else ""
+    if part is not None:
+        text += f"; part {part.number} of {part.count}: join with dpg merge"
+    return text
+
+
+def _seconds(progress: "Progress") -> float:
+    return max(progress.seconds + progress.tables_seconds, 1e-9)
+
+
+def _shares(progress: "Progress") -> tuple[float, float, float]:
+    """Of the workers' wall time: CPU time for states, for parts, and all the rest."""
+    whole = max(progress.seconds * progress.n_workers, 1e-9)
+    core, writing = progress.core_seconds / whole, progress.writing_seconds / whole
+    return core, writing, max(1.0 - core - writing, 0.0)
