@@ -13,6 +13,7 @@ from dpgcli.cli.options import (
     Patterns,
     Settings,
     SpecPath,
+    TargetError,
     Tolerance,
     request_of,
 )
@@ -36,6 +37,7 @@ def explain(
     nodes: Nodes = False,
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
+    target_error: TargetError = None,
     printed_as: Annotated[
         PlanFormat, typer.Option("--format", help="How to print the plan")
     ] = PlanFormat.TEXT,
@@ -45,7 +47,8 @@ def explain(
     from dpgcli.states import plan
 
     scene = scene_of(read_spec(spec, settings or ()))
-    made = plan.explain(scene, request_of(patterns, columns, nodes, formulation, tolerance))
+    request = request_of(patterns, columns, nodes, formulation, tolerance, target_error)
+    made = plan.explain(scene, request)
     if printed_as is PlanFormat.JSON:
         import json
 
@@ -70,6 +73,8 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "tolerance": plan.request.tolerance,
         "residual_limit_N": plan.residual_limit,
         "bar_flexibility_mm": plan.bar_flexibility,
+        "rung": plan.rung and plan.rung.name,
+        "error_bound_mm": spelled(plan.error_bound),
         "columns": [column.name for column in plan.columns],
         "left_out": [{"what": o.what, "why": o.why} for o in plan.omissions],
         "expected_seconds": plan.expected_seconds,
@@ -113,6 +118,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         "",
         "Error and cost",
         f"  {_bar_error(plan)}",
+        f"  {_bound(plan)}",
         f"  about {plan.expected_seconds:.1f} s on one core and "
         f"{plan.expected_bytes / 2**20:.0f} MiB (rough: a factor of two either way)",
     ]
@@ -133,6 +139,13 @@ def _bar_error(plan: "Plan") -> str:
     if plan.scene.finger.is_rigid:
         return f"bars 1000 times as stiff as the stiffest spring would move {bound}"
     return f"the bars' flexibility moves {bound}"
+
+
+def _bound(plan: "Plan") -> str:
+    if plan.error_bound == float("inf"):
+        return "the tip's numerical error is bounded only after the work, in tip_error_mm"
+    way = f"{plan.rung.name}, chosen for the target error: " if plan.rung else ""
+    return f"{way}the tip's error will be below {plan.error_bound:.1e} mm (the model's left aside)"
 
 
 def _count(number: int, what: str) -> str:

@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+import re
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -31,6 +32,15 @@ Tolerance = Annotated[
 ]
 
 
+LENGTHS = {"": 1.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6, "m": 1e3}  # in mm
+TargetError = Annotated[
+    str | None,
+    typer.Option(
+        "--target-error", metavar="LENGTH", help="Cheapest way whose tips are this exact: 0.01mm"
+    ),
+]
+
+
 class FormulationName(StrEnum):
     """The two formulations of one finger."""
 
@@ -51,9 +61,11 @@ def request_of(
     nodes: bool,
     formulation: FormulationName,
     tolerance: float | None,
+    target_error: str | None = None,
 ) -> "Request":
     """The options as a request."""
-    from dpgcli.states.plan import DEFAULT_TOLERANCE, Request
+    from dpgcli.states.plan import Request
+    from dpgcli.states.rungs import DEFAULT_TOLERANCE
 
     names = tuple(name.strip() for name in columns.split(",") if name.strip())
     return Request(
@@ -61,4 +73,16 @@ def request_of(
         columns=(*names, *(("nodes",) if nodes else ())),
         formulation=formulation.value,
         tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
+        target_error=None if target_error is None else millimeters("--target-error", target_error),
     )
+
+
+def millimeters(option: str, text: str) -> float:
+    """A length with its unit as a number of mm: 0.01mm, 10um; a plain number is mm."""
+    from dpgcli.errors import UsageError
+
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)(e[-+]?\d+)?\s*([a-zµ]*)\s*", text)
+    if match is None or match[3] not in LENGTHS:
+        units = ", ".join(filter(None, LENGTHS))
+        raise UsageError(f"{option} {text}: expected a length in {units}, such as 0.01mm")
+    return float(match[1] + (match[2] or "")) * LENGTHS[match[3]]

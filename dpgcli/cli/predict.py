@@ -17,6 +17,7 @@ from dpgcli.cli.options import (
     Quiet,
     Settings,
     SpecPath,
+    TargetError,
     Tolerance,
     request_of,
 )
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from dpgcli.mechanics.scene import Scene
     from dpgcli.states.predict import Prediction, Summary
     from dpgcli.states.rows import Columns
+    from dpgcli.states.rungs import Rung
 
 
 def predict(
@@ -45,6 +47,7 @@ def predict(
     nodes: Nodes = False,
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
+    target_error: TargetError = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
     ] = None,
@@ -56,7 +59,7 @@ def predict(
 
     checked = read_spec(spec, settings or ())
     scene = scene_of(checked)
-    request = request_of(patterns, columns, nodes, formulation, tolerance)
+    request = request_of(patterns, columns, nodes, formulation, tolerance, target_error)
     prediction = states.predict(scene, request)
     if plot is not None:
         _check_plot(plot, prediction.plan.n_states)
@@ -162,11 +165,21 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
         f"worst residual {summary.residual:.1e} N, worst tip error {summary.tip_error:.1e} mm "
         "(numerical; not the model's)"
     )
+    if plan.rung is not None:
+        yield _chosen(plan.rung, plan.error_bound, plan.request.target_error or 0.0)
     worst = worst if summary.statuses[Status.STABLE] else "no stable state"
     yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); published law, pushing and pulling"
+
+
+def _chosen(rung: "Rung", bound: float, target: float) -> str:
+    """What a target error chose, in words."""
+    promise = f"bound on the tips' error {bound:.1e} mm (the model's left aside)"
+    if bound > target:
+        promise = "no way is bounded by that before the work: tip_error_mm says what was reached"
+    return f"chosen for the target error: {rung.name}; {promise}"
 
 
 def _rate(summary: "Summary") -> str:

@@ -13,7 +13,7 @@ import typer
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated, fail
-from dpgcli.cli.options import Quiet, Settings, Tolerance
+from dpgcli.cli.options import Quiet, Settings, TargetError, Tolerance, millimeters
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
 from dpgcli.cli.run import run_facts, run_summary
@@ -73,6 +73,7 @@ def sweep(
     shard: Part = None,
     settings: Settings = None,
     tolerance: Tolerance = None,
+    target_error: TargetError = None,
     restart: Restart = False,
     force: Force = False,
     depfile: Depfile = None,
@@ -87,13 +88,20 @@ def sweep(
     from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
     from dpgcli.files.sweep import read_sweep
-    from dpgcli.states.plan import DEFAULT_TOLERANCE
+    from dpgcli.states.rungs import DEFAULT_TOLERANCE
     from dpgcli.studies.sweep import Study
 
     part = _shard(shard)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
-    study = Study(read_sweep(spec, settings or ()), output, tolerance or DEFAULT_TOLERANCE)
+    if tolerance is not None and target_error is not None:
+        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
+    study = Study(
+        read_sweep(spec, settings or ()),
+        output,
+        tolerance or DEFAULT_TOLERANCE,
+        None if target_error is None else millimeters("--target-error", target_error),
+    )
     rules = _rules(study, require or [])
     if depfile is not None:
         write_depfile(depfile, study)

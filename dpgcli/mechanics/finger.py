@@ -72,6 +72,12 @@ class Finger:
         hinge = self.hinge_stiffness / self.segment_height**2
         return (self.bistable_stiffness + hinge) * self.stroke
 
+    def with_bars(self, stiffness: float) -> "Finger":
+        """The finger with bars of another stiffness k_L (N/mm); infinite makes them rigid."""
+        return Finger(
+            self.n_units, **{**self.arrays(), "linear_stiffness": np.array([[stiffness]])}
+        )
+
     def designs(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
         picked = {

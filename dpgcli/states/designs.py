@@ -1,6 +1,7 @@
 """Many designs at once: all states of each, and what they come to for a design."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.rows import Columns, Wanted, solved_rows
+from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
 from dpgcli.states.solve import Status, Units, lanes_at_once
 from dpgcli.states.wells import barriers
 
@@ -39,24 +41,53 @@ DESIGN_COLUMNS = (
 )
 
 
+@dataclass(frozen=True)
+class Choice:
+    """Designs (by place) that take one rung, and the bound on their tips' error, mm."""
+
+    rung: Rung
+    places: Indices
+    bounds: Array
+
+
+def choices(scenes: Sequence[Scene], target_error: float) -> Iterator[Choice]:
+    """The cheapest rung of each design that is bounded by the target error (mm), by rung.
+
+    The scenes agree in the number of units and in having rigid bars.
+    """
+    bounds = error_bounds(Units.of(_stacked([scene.finger for scene in scenes])))
+    chosen = cheapest(bounds, target_error)
+    for index in np.unique(chosen):
+        places = np.flatnonzero(chosen == index)
+        yield Choice(RUNGS[index], places, bounds[index, places])
+
+
 def design_states(
     scenes: Sequence[Scene],
     formulate: Callable[[Finger], Formulation],
     tolerance: float,
     groups: frozenset[Group],
+    *,
+    drops_bars: bool = False,
 ) -> tuple[Columns, Columns]:
     """All states of some designs, design by design, and one row of metrics for each design.
 
-    The scenes agree in the number of units, in having rigid bars and in being grippers.
+    The scenes agree in the number of units, in having rigid bars and in being grippers. If it
+    drops the bars, the error of the tips includes what that costs.
     """
     units = Units.of(_stacked([scene.finger for scene in scenes]))
+    dropped = np.zeros(len(scenes))
+    if drops_bars:
+        dropped = bar_flexibility(units)
+        units = Units.of(units.finger.with_bars(np.inf))
     n_units = units.finger.n_units
     patterns = inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units)
     blocks = []
     for designs in _design_batches(len(scenes), n_units):
         lanes = np.repeat(designs, patterns.shape[1])
         inverted = np.tile(patterns, len(designs))
-        wanted = Wanted(formulate, tolerance, groups, *_placement(scenes, lanes))
+        placement = _placement(scenes, lanes)
+        wanted = Wanted(formulate, tolerance, groups, *placement, dropped[lanes])
         of_lanes = units.designs(lanes) if len(scenes) > 1 else units
         blocks.append(solved_rows(of_lanes, inverted, wanted))
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}

@@ -1,7 +1,7 @@
 """What a scene needs, decided once: `explain` prints the plan, `predict` carries it out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -14,14 +14,22 @@ from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.columns import Column, Group, declared, named
+from dpgcli.states.costs import peak_bytes, seconds
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import MOST_SELECTED, select, too_many
 from dpgcli.states.rows import Wanted
-from dpgcli.states.solve import Status, Units, lanes_at_once, reach
+from dpgcli.states.rungs import (
+    DEFAULT_TOLERANCE,
+    RUNGS,
+    Rung,
+    bar_flexibility,
+    cheapest,
+    error_bounds,
+)
+from dpgcli.states.solve import Status, Units
 
 FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
-DEFAULT_TOLERANCE = 1e-12
 SMALLEST_TOLERANCE = 1e-14  # of the forces in play; below, rounding decides
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
@@ -44,13 +52,15 @@ class Method(StrEnum):
 class Request:
     """What is asked of a scene: which states (globs, none = all), which columns, how exactly.
 
-    `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d.
+    `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d. With a
+    `target_error` (mm, of the tip) the plan takes the cheapest rung that is bounded by it.
     """
 
     patterns: tuple[str, ...] = ()
     columns: tuple[str, ...] = ("default",)
     formulation: str = "chain"
     tolerance: float = DEFAULT_TOLERANCE
+    target_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -68,6 +78,8 @@ class Plan:
     `codes` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
     bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
+    `rung` was chosen for the target error, if there is one; `error_bound` (mm) is what it
+    promises for every tip, and infinite where nothing can be promised before the work.
     """
 
     scene: Scene
@@ -85,6 +97,8 @@ class Plan:
     omissions: tuple[Omission, ...]
     residual_limit: float
     bar_flexibility: float
+    rung: Rung | None
+    error_bound: float
     expected_seconds: float
     expected_bytes: int
 
@@ -97,6 +111,11 @@ class Plan:
         return frozenset(column.group for column in self.columns)
 
     @property
+    def dropped_error(self) -> float:
+        """What a rung without the scene's bars adds to the error of each tip, mm."""
+        return self.bar_flexibility if self.rung is not None and self.rung.drops_bars else 0.0
+
+    @property
     def wanted(self) -> Wanted:
         """The plan as far as batches of states need it."""
         return Wanted(
@@ -105,6 +124,7 @@ class Plan:
             self.groups,
             self.scene.gripper,
             self.scene.layer_thickness or 0.0,
+            self.dropped_error,
         )
 
 
@@ -112,18 +132,24 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     """Decide what the scene needs; raises UsageError and NothingSelectedError."""
     request = request or Request()
     _check(scene, request)
-    finger = scene.finger
-    n = finger.n_units
+    n = scene.finger.n_units
+    units = Units.of(scene.finger)
+    flexibility = _flexibility(units)
+    rung, bound = _rung(units, request.target_error)
+    if rung is not None:
+        request = replace(request, tolerance=rung.tolerance)
+        units = Units.of(scene.finger.with_bars(np.inf)) if rung.drops_bars else units
+    finger = units.finger
     codes = select(request.patterns, n) if request.patterns else None
     n_states = 2**n if codes is None else len(codes)
     if n_states > MOST_SELECTED:
         raise UsageError(too_many(n, "the finger has"))
-    units = Units.of(finger)
     formulation = FORMULATIONS[request.formulation](finger)
     terms = tuple(term.kind for term in formulation.terms)
     available = declared(n, terms, scene.gripper is not None)
     columns, left_out = _columns(available, request.columns, n_states)
-    split = _split(units, request, codes is None, n_states, {c.group for c in columns})
+    groups = {column.group for column in columns}
+    split = _split(units, request, codes is None, n_states, groups)
     n_solves = n_states if split is None else split.n_solves
     return Plan(
         scene=scene,
@@ -138,11 +164,15 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         n_unit_solves=units.wells.exists.size,
         n_finger_solves=n_solves,
         columns=columns,
-        omissions=(*_omissions(scene, units, split, n_solves), *left_out),
+        omissions=(*_omissions(scene, units, split, n_solves, rung), *left_out),
         residual_limit=request.tolerance * _largest_force(formulation),
-        bar_flexibility=bar_flexibility(finger),
-        expected_seconds=_seconds(request, split, n, n_states, {c.group for c in columns}),
-        expected_bytes=_bytes(split, n, n_states, len(columns)),
+        bar_flexibility=flexibility,
+        rung=rung,
+        error_bound=bound,
+        expected_seconds=seconds(
+            request.formulation, split, n, n_states, {c.group for c in columns}
+        ),
+        expected_bytes=peak_bytes(split, n, n_states, len(columns)),
     )
 
 
@@ -165,6 +195,26 @@ def _check(scene: Scene, request: Request) -> None:
             f"--tolerance {request.tolerance}: expected {SMALLEST_TOLERANCE} … 0.001 "
             "of the forces in play; below, rounding decides"
         )
+    if request.target_error is not None:
+        _check_target(request)
+
+
+def _check_target(request: Request) -> None:
+    if not request.target_error or not 0.0 < request.target_error < np.inf:
+        raise UsageError(f"--target-error {request.target_error}: expected a length > 0")
+    if request.tolerance != DEFAULT_TOLERANCE or request.formulation != "chain":
+        raise UsageError(
+            "--target-error chooses the tolerance, in the chain: drop --tolerance and --formulation"
+        )
+
+
+def _rung(units: Units, target: float | None) -> tuple[Rung | None, float]:
+    """The cheapest rung for a target error (mm), and what it is bounded by."""
+    bounds = error_bounds(units)
+    if target is None:
+        return None, float(bounds[-1, 0])
+    (index,) = cheapest(bounds, target)
+    return RUNGS[index], float(bounds[index, 0])
 
 
 def _columns(
@@ -216,31 +266,25 @@ def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> boo
     return all((s.status != Status.NOT_CONVERGED).all() for s in paired_states(trial))
 
 
-def bar_flexibility(finger: Finger) -> float:
-    """Bound (mm) on how far the bars' flexibility moves the tip, over all states.
-
-    Twice the sum, over units, of what each unit's bars do to first order. For rigid bars: of
-    what bars a thousand times as stiff as the stiffest spring would do.
-    """
+def _flexibility(units: Units) -> float:
+    """What the bars do to the tip (mm); rigid ones: what a stiffness of 1000 springs would."""
+    finger = units.finger
     if finger.is_rigid:
-        stiffness = 1e3 * finger.bistable_stiffness.max(axis=0, keepdims=True)
-        finger = Finger(finger.n_units, **{**finger.arrays(), "linear_stiffness": stiffness})
-    unit = Units.of(finger).first_order
-    per_unit = np.abs(unit.chord) + reach(finger)[0] * unit.turn
-    return float(2.0 * np.broadcast_to(per_unit, (finger.n_units, 1)).sum())
+        units = Units.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))
+    return float(bar_flexibility(units)[0])
 
 
 def _omissions(
-    scene: Scene, units: Units, split: Split | None, n_solves: int
+    scene: Scene, units: Units, split: Split | None, n_solves: int, rung: Rung | None
 ) -> tuple[Omission, ...]:
-    finger = scene.finger
+    finger = units.finger
     n = finger.n_units
     omissions = [Omission("loads, pressure and contact", "the spec has none")]
     if finger.is_rigid:
         omissions.append(
             Omission(
                 f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
-                "k_L is infinite; units do not feel each other, "
+                f"{_why_rigid(rung)}; units do not feel each other, "
                 "so the guess is the solution and Newton only certifies it",
             )
         )
@@ -263,28 +307,7 @@ def _omissions(
     return tuple(omissions)
 
 
-# Rough costs on one core of a 2020s server, in seconds: measured, good to a factor of two.
-UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
-PAIR_SECONDS = 1.0e-6
-EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
-START_SECONDS = 0.3
-
-
-def _seconds(
-    request: Request, split: Split | None, n: int, n_states: int, groups: set[Group]
-) -> float:
-    per_unit = UNIT_STATE_SECONDS[request.formulation]
-    if split is not None:
-        length = n // 2 + split.context
-        return START_SECONDS + split.n_solves * length * per_unit + n_states * PAIR_SECONDS
-    eigenvalue = EIGENVALUE_SECONDS * (4 * n) ** 3 if Group.EIGENVALUE in groups else 0.0
-    return START_SECONDS + n_states * (n * per_unit + eigenvalue)
-
-
-def _bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> int:
-    """Interpreter and libraries, one batch with its temporaries, tables and a block of rows."""
-    batch = min(lanes_at_once(n), n_states) * n * 8 * 150
-    row = n_columns * 8 + 4 * n
-    if split is None:
-        return 64 * 2**20 + batch + lanes_at_once(n) * row
-    return 128 * 2**20 + batch + split.n_solves * 8 * 24 + 2**16 * row * 4
+def _why_rigid(rung: Rung | None) -> str:
+    if rung is None or not rung.drops_bars:
+        return "k_L is infinite"
+    return "the target error allows it"

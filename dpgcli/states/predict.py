@@ -97,6 +97,7 @@ def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
     summary.n_finger_solves += plan.split.n_solves
     for states in paired_states(plan.split):
         columns = state_columns(states)
+        columns["tip_error_mm"] += plan.dropped_error
         unfit = np.flatnonzero(states.status == Status.NOT_CONVERGED)
         if len(unfit):  # a pair that did not fit is solved as a whole
             solved = _solved(plan, codes_of(states.inverted[:, unfit]), summary)

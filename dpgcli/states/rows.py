@@ -68,7 +68,8 @@ def state_columns(states: States) -> Columns:
 class Wanted:
     """What rows are to hold and how exactly: what `plan` decides for all batches of a scene.
 
-    The gripper's values and the layer's thickness (mm) are numbers, or arrays by lane.
+    The gripper's values, the layer's thickness (mm) and the error of the tip (mm) by what the
+    units lack of the scene are numbers, or arrays by lane.
     """
 
     formulate: Callable[[Finger], Formulation]
@@ -76,6 +77,7 @@ class Wanted:
     groups: frozenset[Group]
     gripper: Gripper | None = None
     layer_thickness: float | Array = 0.0
+    dropped_error: float | Array = 0.0
 
 
 def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
@@ -91,7 +93,7 @@ def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
         batch.reached,
         status,
         at_tip.pose,
-        at_tip.error,
+        at_tip.error + wanted.dropped_error,
         batch.equilibrium.energies,
         batch.equilibrium.residual,
     )

@@ -160,7 +160,7 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     if finger.is_rigid:
         return FirstOrder(wells.angle, zero, zero, zero, zero, zero, zero)
     units, designs = wells.angle.shape
-    flat = _as_single_units(finger, (units, designs))
+    flat = as_single_units(finger, (units, designs))
     angle = wells.angle.reshape(1, -1)
     rest = np.zeros_like(angle)
     chain = Chain(flat)
@@ -201,7 +201,7 @@ def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
     return by_chord, by_near, by_far
 
 
-def _as_single_units(finger: Finger, shape: tuple[int, int]) -> Finger:
+def as_single_units(finger: Finger, shape: tuple[int, ...]) -> Finger:
     """Every unit of every design as a design of its own."""
     arrays = {k: np.broadcast_to(v, shape).reshape(1, -1) for k, v in finger.arrays().items()}
     return Finger(1, **arrays)

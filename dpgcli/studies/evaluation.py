@@ -1,6 +1,6 @@
 """Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from dpgcli.files.sweep import flattened
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared
-from dpgcli.states.designs import DESIGN_COLUMNS, design_states
+from dpgcli.states.designs import DESIGN_COLUMNS, choices, design_states
 from dpgcli.states.rows import Columns
 
 Numbers = NDArray[Any]
@@ -55,7 +55,8 @@ class Tables(NamedTuple):
 class Evaluation:
     """Evaluates designs around a base spec, given the values of its keys that change.
 
-    `values` are the columns of those keys, by key.
+    `values` are the columns of those keys, by key. With a `target_error` (mm) each design takes
+    the cheapest rung that is bounded by it.
     """
 
     base_data: Mapping[str, Any]
@@ -63,6 +64,7 @@ class Evaluation:
     constraints: tuple[Expression, ...]
     tolerance: float
     is_gripper: bool
+    target_error: float | None = None
 
     @property
     def groups(self) -> frozenset[Group]:
@@ -79,7 +81,8 @@ class Evaluation:
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
         metrics = (c for c in DESIGN_COLUMNS if c.group in self.groups)
-        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics)
+        rung = () if self.target_error is None else RUNG_COLUMNS
+        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
 
     def __call__(self, start: int, values: Mapping[str, Numbers]) -> Tables:
         """Rows of designs numbered from `start` on, with these values by key."""
@@ -94,7 +97,7 @@ class Evaluation:
                 scenes[place] = variant(self.base_data, changes)
             except SpecError as error:
                 reasons[place] = "; ".join(map(_reason, error.problems))
-        solved = [self._solved(places, scenes) for places in _alike(scenes)]
+        solved = [part for places in _alike(scenes) for part in self._solved(places, scenes)]
         described = {
             **self._described(start, values),
             "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)], "S"),
@@ -125,10 +128,21 @@ class Evaluation:
             allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
         return allowed
 
-    def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "_Solved":
+    def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "Iterator[_Solved]":
         group = [scenes[place] for place in places]
-        rows, metrics = design_states(group, Chain, self.tolerance, self.groups)
-        return _Solved(np.array(places), rows, metrics)
+        if self.target_error is None:
+            rows, metrics = design_states(group, Chain, self.tolerance, self.groups)
+            yield _Solved(np.array(places), rows, metrics)
+            return
+        for choice in choices(group, self.target_error):
+            rung = choice.rung
+            chosen = [group[place] for place in choice.places]
+            rows, metrics = design_states(
+                chosen, Chain, rung.tolerance, self.groups, drops_bars=rung.drops_bars
+            )
+            metrics["rung"] = np.full(len(chosen), rung.name)
+            metrics["error_bound_mm"] = choice.bounds
+            yield _Solved(np.array(places)[choice.places], rows, metrics)
 
     def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
         """Rows of all groups, brought back into the order of the designs."""
@@ -158,8 +172,7 @@ class Evaluation:
         status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("U16")
         rows = dict(described)
         for column in self.design_columns[len(described) + 2 :]:
-            values = np.full(n_designs, 0 if column.kind is Kind.COUNT else np.nan)
-            values = values.astype(_dtype(column.kind))
+            values = np.full(n_designs, EMPTY.get(column.kind, np.nan), _dtype(column.kind))
             for part in solved:
                 values[part.places] = part.metrics[column.name]
             rows[column.name] = values
@@ -178,6 +191,11 @@ CALIBRATION = Column(
     "calibration", "", "gravest origin of a spring constant", Group.STATES, Kind.TEXT
 )
 STATUS = Column("status", "", "what became of the design", Group.STATES, Kind.TEXT)
+RUNG_COLUMNS = (
+    Column("rung", "", "way chosen for the target error", Group.STATES, Kind.TEXT),
+    Column("error_bound_mm", "mm", "bound on the tips' error before the work", Group.STATES),
+)
+EMPTY = {Kind.COUNT: 0, Kind.TEXT: ""}
 REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TEXT)
 
 
@@ -241,7 +259,7 @@ def _dtype(kind: Kind) -> str:
     types = {
         Kind.PATTERN: "S1",
         Kind.STATUS: "u1",
-        Kind.TEXT: "U1",
+        Kind.TEXT: "U24",
         Kind.COUNT: "i8",
         Kind.FLAG: "?",
     }

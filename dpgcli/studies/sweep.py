@@ -17,7 +17,7 @@ from dpgcli.files.spec import spelled
 from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
-from dpgcli.states.plan import DEFAULT_TOLERANCE
+from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.evaluation import Evaluation, Numbers, Tables, value_columns
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
@@ -64,6 +64,7 @@ class Study:
     sweep: Sweep
     folder: Path
     tolerance: float = DEFAULT_TOLERANCE
+    target_error: float | None = None
 
     @property
     def evaluation(self) -> Evaluation:
@@ -74,6 +75,7 @@ class Study:
             self.sweep.constraints,
             self.tolerance,
             self.sweep.base.gripper is not None,
+            self.target_error,
         )
 
     @property
@@ -81,7 +83,7 @@ class Study:
         """All that the results depend on, and its SHA-256 as the fingerprint."""
         said = {
             "dpg.sweep": self.sweep.canonical_json(),
-            "dpg.tolerance": repr(self.tolerance),
+            **self._exactness,
             "dpg.designs": str(self.sweep.space.size),
             "dpg.schema_version": str(SCHEMA_VERSION),
             "dpg.law": "published: the spring pushes and pulls",
@@ -89,6 +91,12 @@ class Study:
         }
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
         return {**said, "dpg.fingerprint": digest}
+
+    @property
+    def _exactness(self) -> dict[str, str]:
+        if self.target_error is None:
+            return {"dpg.tolerance": repr(self.tolerance)}
+        return {"dpg.target_error_mm": repr(self.target_error)}
 
     @property
     def store(self) -> PartStore:

@@ -302,7 +302,9 @@ def test_a_failed_design_comes_with_the_command_that_replays_it(
     result = call("sweep", "sweep.yaml", *SERIAL, *options)
     assert result.exit_code == ExitCode.DONE
     (replay,) = re.findall("^failed, .* alone: dpg (.*)$", result.stderr, re.MULTILINE)
-    assert json.loads((sweep.parent / "out" / "run.json").read_text())["replay"] == [f"dpg {replay}"]
+    assert json.loads((sweep.parent / "out" / "run.json").read_text())["replay"] == [
+        f"dpg {replay}"
+    ]
     alone = call(*shlex.split(replay), "--columns", "tip_x_mm", "--format", "json")
     assert alone.exit_code == ExitCode.DONE
     design_2_kills.undo()

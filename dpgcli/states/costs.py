@@ -1,0 +1,32 @@
+"""What a plan will cost: rough, good to a factor of two either way."""
+
+from dpgcli.states.columns import Group
+from dpgcli.states.halves import Split
+from dpgcli.states.solve import lanes_at_once
+
+# Measured on one core of a 2020s server, in seconds.
+UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
+PAIR_SECONDS = 1.0e-6
+EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
+START_SECONDS = 0.3
+
+
+def seconds(
+    formulation: str, split: Split | None, n: int, n_states: int, groups: set[Group]
+) -> float:
+    """Run time of a plan, seconds: its states, once the program has started."""
+    per_unit = UNIT_STATE_SECONDS[formulation]
+    if split is not None:
+        length = n // 2 + split.context
+        return START_SECONDS + split.n_solves * length * per_unit + n_states * PAIR_SECONDS
+    eigenvalue = EIGENVALUE_SECONDS * (4 * n) ** 3 if Group.EIGENVALUE in groups else 0.0
+    return START_SECONDS + n_states * (n * per_unit + eigenvalue)
+
+
+def peak_bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> int:
+    """Interpreter and libraries, one batch with its temporaries, tables and a block of rows."""
+    batch = min(lanes_at_once(n), n_states) * n * 8 * 150
+    row = n_columns * 8 + 4 * n
+    if split is None:
+        return 64 * 2**20 + batch + lanes_at_once(n) * row
+    return 128 * 2**20 + batch + split.n_solves * 8 * 24 + 2**16 * row * 4

@@ -1,0 +1,119 @@
+"""How exactly to solve: a ladder of ways to the same states, each with a bound on its error.
+
+The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
+units of how far the unit may turn, times the length of the finger (our derivation):
+
+- rigid bars: what the bars' flexibility does to the unit, to first order in 1/k_L
+- a residual of τ times the forces in play: the corners' answer to moments of τ F H, which is
+  1/λ per moment, λ the smallest eigenvalue of the unit's Hessian by its two corners
+- rounding: a few units in the last place, times the finger's softness F H/λ
+
+All are doubled for what is left out. Where bars are so soft, or a unit so close to losing its
+second well, that a single unit does not show what the finger does, there is no bound.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Indices
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.formulation import Internal
+from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.solve import TIP_ROUNDING, Units, reach
+from dpgcli.states.wells import as_single_units
+
+SAFETY = 2.0
+LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are too soft for a bound
+LARGEST_TOLERANCE = 1e-3
+DEFAULT_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A way to the states: with or without elastic bars, and to which tolerance.
+
+    `tolerance` is the largest residual over the forces in play.
+    """
+
+    name: str
+    drops_bars: bool
+    tolerance: float
+
+
+RUNGS = (  # from the cheapest to the most exact
+    Rung("rigid bars", True, DEFAULT_TOLERANCE),
+    *(Rung(f"tolerance {t:g}", False, t) for t in (1e-3, 1e-6, 1e-9, DEFAULT_TOLERANCE)),
+)
+
+
+def error_bounds(units: Units) -> Array:
+    """Bound on the tip's error (mm) by each rung, shape (rung, design); infinite where none.
+
+    The first rung needs elastic bars to drop, and a second well of every unit without them.
+    """
+    finger = units.finger
+    softness, length = _softness(units), reach(finger)
+    rounding = 10.0 * TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + softness) * length
+    bounds = [
+        SAFETY * 2.0 * rung.tolerance * softness * length
+        + rounding
+        + (dropped_bars(units) if rung.drops_bars else 0.0)
+        for rung in RUNGS
+    ]
+    return np.where(_is_bounded(units), np.stack(bounds), np.inf)
+
+
+def cheapest(bounds: Array, target: float) -> Indices:
+    """Index of the first rung whose bound meets the target (mm), by design; else of the last."""
+    meets = bounds <= target
+    return np.where(meets.any(axis=0), meets.argmax(axis=0), len(RUNGS) - 1)
+
+
+def dropped_bars(units: Units) -> Array:
+    """Bound on how far dropping the bars moves the tip (mm), shape (design,)."""
+    if units.finger.is_rigid:
+        return np.full(units.wells.exists.shape[1], np.inf)
+    exists = np.asarray(units.wells.exists.all(axis=0))
+    return np.where(exists, bar_flexibility(units), np.inf)
+
+
+def bar_flexibility(units: Units) -> Array:
+    """Bound on how far the bars' flexibility moves the tip (mm), in any state, (design,).
+
+    Twice the sum, over units, of what each unit's bars do to first order.
+    """
+    unit = units.first_order
+    per_unit = np.abs(unit.chord) + reach(units.finger) * unit.turn
+    shape = (units.finger.n_units, per_unit.shape[1])
+    return np.asarray(SAFETY * np.broadcast_to(per_unit, shape).sum(axis=0))
+
+
+def _softness(units: Units) -> Array:
+    """Σ F H/λ over the units: their turning by moments of the size of those in play."""
+    finger = units.finger
+    moment = finger.force_scale * finger.segment_height
+    softness = moment / _corner_stiffness(units)
+    return np.asarray(np.broadcast_to(softness, (finger.n_units, softness.shape[1])).sum(axis=0))
+
+
+def _corner_stiffness(units: Units) -> Array:
+    """Smallest eigenvalue λ (N mm/rad) by a unit's two corners, in any well, (unit, design)."""
+    angle = np.where(units.wells.exists, units.wells.angle, 0.0)
+    finger = as_single_units(units.finger, angle.shape)
+    chain = Chain(finger.with_bars(np.inf))
+    rest = np.zeros((1, 1))
+    least = np.full((1, angle.size), np.inf)
+    for corner in (np.zeros((1, angle.size)), angle.reshape(1, -1)):
+        band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
+        least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
+    with np.errstate(divide="ignore"):
+        return np.where(least > 0.0, least, 0.0).reshape(angle.shape)
+
+
+def _is_bounded(units: Units) -> Array:
+    """Where single units show what the finger does, shape (design,)."""
+    unit = units.first_order
+    with np.errstate(invalid="ignore"):
+        soft = unit.turn > LARGEST_TURN * units.wells.angle
+    return np.asarray(~soft.any(axis=0))

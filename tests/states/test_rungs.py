@@ -1,0 +1,140 @@
+"""Bounds known before the work hold after it, on thousands of random fingers."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dpgcli.errors import UsageError
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.plan import Request, explain
+from dpgcli.states.predict import predict
+from dpgcli.states.rungs import RUNGS, cheapest, error_bounds
+from dpgcli.states.solve import Status, Units, certify, solve, tip
+
+FOLD = 0.0964682337467354  # α at which the reference unit loses its second well
+Fingers = Callable[..., Finger]
+
+
+def random_fingers(n_units: int, n_designs: int, seed: int) -> Finger:
+    """Graded fingers of all proportions: soft to stiff bars, some units close to their fold."""
+    random = np.random.default_rng(seed)
+
+    def between(low: float, high: float, units: int = n_units) -> np.ndarray:
+        return 10.0 ** random.uniform(low, high, (units, n_designs))
+
+    height = between(0.3, 1.5, 1)
+    stiffness = between(-1.0, 2.0)
+    near = FOLD - between(-9.0, -1.1)
+    linearity = random.uniform(0.0, 0.11, near.shape)
+    return Finger(
+        n_units,
+        segment_length=between(0.5, 1.5),
+        segment_height=height,
+        stroke=np.minimum(between(-1.0, 0.9), 1.2 * height),
+        bistable_stiffness=stiffness,
+        force_linearity=np.where(random.random(near.shape) < 0.3, near, linearity),
+        hinge_stiffness=stiffness * height**2 * between(-4.0, -1.0),
+        linear_stiffness=stiffness.max(axis=0) * between(-0.5, 8.0, 1),
+    )
+
+
+@pytest.mark.parametrize("n_units", [1, 2, 3, 5, 8])
+def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
+    n_designs = 1000
+    finger = random_fingers(n_units, n_designs, seed=n_units)
+    inverted = np.random.default_rng(n_units).random((n_units, n_designs)) < 0.6
+    units = Units.of(finger)
+    bounds = error_bounds(units)
+    exact = solve(units, Chain, inverted, 1e-14)
+    truth = tip(exact, with_compliance=False)
+    is_state = certify(exact, units.wells, 1e-12) == Status.STABLE
+    rigid = Units.of(finger.with_bars(np.inf))
+    n_checked = []
+    for rung, bound in zip(RUNGS, bounds, strict=True):
+        own = rigid if rung.drops_bars else units
+        batch = solve(own, Chain, inverted, rung.tolerance)
+        says_stable = certify(batch, own.wells, rung.tolerance) == Status.STABLE
+        bounded = np.isfinite(bound)
+        assert not (says_stable & ~is_state & bounded).any(), "stable only where it is"
+        both = says_stable & is_state & bounded
+        pose = tip(batch, with_compliance=False).pose
+        error = np.hypot(*(pose[:2] - truth.pose[:2])) - truth.error
+        assert (error <= bound)[both].all(), (rung.name, (error / bound)[both].max())
+        n_checked.append(int(both.sum()))
+    assert min(n_checked) > 0.2 * n_designs, "many have a bound and a state"
+
+
+def test_bounds_are_not_absurd(reference_finger: Fingers) -> None:
+    """Of the study's finger: dropping the bars is known within a factor of three."""
+    units = Units.of(reference_finger(5, 1e4))
+    inverted = np.ones((5, 1), bool)
+    exact = tip(solve(units, Chain, inverted, 1e-12), with_compliance=False)
+    rigid = Units.of(units.finger.with_bars(np.inf))
+    without = tip(solve(rigid, Chain, inverted, 1e-12), with_compliance=False)
+    moved = np.hypot(*(without.pose[:2] - exact.pose[:2]))[0]
+    (bound,) = error_bounds(units)[0]
+    assert moved < bound < 6.0 * moved
+
+
+def test_no_bound_where_a_unit_is_about_to_lose_its_well(reference_finger: Fingers) -> None:
+    units = Units.of(reference_finger(2, 1e2, force_linearity=FOLD - 1e-12))
+    assert np.isinf(error_bounds(units)).all()
+
+
+def test_rigid_bars_cannot_be_dropped(reference_finger: Fingers) -> None:
+    bounds = error_bounds(Units.of(reference_finger(2)))
+    assert np.isinf(bounds[0]).all()
+    assert np.isfinite(bounds[1:]).all()
+
+
+def test_the_cheapest_that_meets_the_target_is_chosen() -> None:
+    bounds = np.array([[1e-2, 5.0, np.inf], [1e-3, 1.0, np.inf], [1e-9, 1e-4, np.inf]])
+    assert cheapest(bounds, 2e-3).tolist() == [1, 2, len(RUNGS) - 1]
+
+
+@pytest.mark.parametrize("target", [1.0, 1e-2, 1e-5, 1e-7])
+def test_predict_meets_its_target_and_says_so_in_every_row(
+    reference_finger: Fingers, target: float
+) -> None:
+    scene = Scene(reference_finger(5, 1e4), ())
+    request = Request(columns=("states",), target_error=target)
+    plan = explain(scene, request)
+    assert plan.error_bound <= target
+    rows, exact = (predict(scene, r).arrays() for r in (request, Request(columns=("states",))))
+    error = np.hypot(*(rows[name] - exact[name] for name in ("tip_x_mm", "tip_y_mm")))
+    assert (error <= rows["tip_error_mm"] + exact["tip_error_mm"]).all()
+    assert rows["tip_error_mm"].max() <= target
+
+
+def test_a_rung_without_bars_has_fewer_unknowns(reference_finger: Fingers) -> None:
+    scene = Scene(reference_finger(5, 1e4), ())
+    plan = explain(scene, Request(target_error=0.1))
+    assert plan.rung == RUNGS[0]
+    assert (plan.unknowns, plan.terms) == (10, ("bistable", "hinge"))
+    assert any("the target error allows it" in omission.why for omission in plan.omissions)
+
+
+def test_long_fingers_in_pairs_meet_it_too(reference_finger: Fingers) -> None:
+    scene = Scene(reference_finger(13, 1e4), ())
+    rows = predict(scene, Request(columns=("states",), target_error=0.1)).arrays()
+    exact = predict(scene, Request(columns=("states",))).arrays()
+    error = np.hypot(*(rows[name] - exact[name] for name in ("tip_x_mm", "tip_y_mm")))
+    assert 1e-6 < error.max() <= rows["tip_error_mm"].max() < 0.1
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        Request(target_error=0.0),
+        Request(target_error=np.nan),
+        Request(target_error=np.inf),
+        Request(target_error=0.1, tolerance=1e-6),
+        Request(target_error=0.1, formulation="lattice"),
+    ],
+)
+def test_targets_that_make_no_sense(reference_finger: Fingers, request_: Request) -> None:
+    with pytest.raises(UsageError, match="--target-error"):
+        explain(Scene(reference_finger(2, 1e4), ()), request_)
