@@ -1,5 +1,7 @@
 """Names for the array types that every floor speaks of."""
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,7 @@ def total(parts: Array) -> Array:
     return np.asarray(parts.sum(axis=0))
 
 
+@cache  # once is enough
 def keep_freed_memory() -> None:
     """Let the C library keep the memory of freed arrays for the next ones.
 

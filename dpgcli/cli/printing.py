@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +95,9 @@ def table_printer(*, principal: bool) -> Printer:
             or column.name in PRINCIPAL
             or (strays and column.name == "reached_pattern")
         }
-        _print_grid(columns, shown, may_drop=principal)
+        right = (Kind.NUMBER, Kind.FLAG)
+        left = {column.name for column in columns if column.kind not in right}
+        print_grid(shown, left=left, may_drop=principal)
         if n_rows > len(first):
             print(
                 f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output",
@@ -115,8 +117,8 @@ def _rows(
     return [list(row) for row in zip(*listed, strict=True)]
 
 
-def _print_grid(
-    columns: tuple[Column, ...], texts: dict[str, list[str]], *, may_drop: bool
+def print_grid(
+    texts: dict[str, list[str]], *, left: Container[str], may_drop: bool = False
 ) -> None:
     """Aligned columns; on a terminal with folded heads, and without some if it is narrow."""
     from rich import box
@@ -133,9 +135,8 @@ def _print_grid(
         pad_edge=False,
         show_edge=False,
     )
-    right = {column.name for column in columns if column.kind in (Kind.NUMBER, Kind.FLAG)}
     for name, head in heads.items():
-        table.add_column(head, justify="right" if name in right else "left", no_wrap=True)
+        table.add_column(head, justify="left" if name in left else "right", no_wrap=True)
     for row in zip(*(texts[name] for name in heads), strict=True):
         table.add_row(*row)
     lines = io.StringIO()

@@ -93,7 +93,8 @@ def _softness(units: Units) -> Array:
     """Σ F H/λ over the units: their turning by moments of the size of those in play."""
     finger = units.finger
     moment = finger.force_scale * finger.segment_height
-    softness = moment / _corner_stiffness(units)
+    with np.errstate(divide="ignore"):  # without hinges a unit is a mechanism
+        softness = moment / _corner_stiffness(units)
     return np.asarray(np.broadcast_to(softness, (finger.n_units, softness.shape[1])).sum(axis=0))
 
 
@@ -107,8 +108,7 @@ def _corner_stiffness(units: Units) -> Array:
     for corner in (np.zeros((1, angle.size)), angle.reshape(1, -1)):
         band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
-    with np.errstate(divide="ignore"):
-        return np.where(least > 0.0, least, 0.0).reshape(angle.shape)
+    return np.where(least > 0.0, least, 0.0).reshape(angle.shape)
 
 
 def _is_bounded(units: Units) -> Array:

@@ -84,6 +84,15 @@ def test_no_bound_where_a_unit_is_about_to_lose_its_well(reference_finger: Finge
     assert np.isinf(error_bounds(units)).all()
 
 
+@pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
+@pytest.mark.parametrize("hinge_stiffness", [0.0, 1e-300])
+def test_no_bound_for_a_mechanism(
+    reference_finger: Fingers, linear_stiffness: float, hinge_stiffness: float
+) -> None:
+    finger = reference_finger(2, linear_stiffness, hinge_stiffness=hinge_stiffness)
+    assert np.isinf(error_bounds(Units.of(finger))).all()
+
+
 def test_rigid_bars_cannot_be_dropped(reference_finger: Fingers) -> None:
     bounds = error_bounds(Units.of(reference_finger(2)))
     assert np.isinf(bounds[0]).all()

@@ -1,0 +1,1 @@
+"""Solved states measured against references that share no code with the solver."""

@@ -1,0 +1,220 @@
+"""`dpg bench`: error against run time, on the user's own finger."""
+
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dpgcli.cli.options import Quiet, Settings, SpecPath, TargetError, millimeters
+from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.streams import say
+
+if TYPE_CHECKING:
+    from dpgcli.studies.bench import Row
+
+GROUPS = {
+    "ladder": "Ways to the states, in a batch as large as a sweep's",
+    "one finger": "The same, for the states of this finger alone",
+    "peer": "What one would do instead, state by state",
+    "model": "The lattice against the data given",
+    "units": "All 2^n states of longer fingers",
+    "designs": "Many designs at once",
+    "stiffness": "Stiffer bars",
+    "kept": "What the plan leaves out, put back",
+}
+SHOWN = {
+    "ladder": ("certified", "n_missing", "max_tip_error_mm", "rms_tip_error_mm",
+               "max_angle_error_rad", "max_energy_error_mJ", "µs_per_state", "spread",
+               "cpu_µs_per_state"),
+    "model": ("n_missing", "max_tip_error_mm", "rms_tip_error_mm"),
+    "units": ("n_units", "n_states", "seconds", "µs_per_state", "peak_MiB"),
+    "designs": ("n_designs", "n_states", "seconds", "µs_per_state", "peak_MiB"),
+    "stiffness": ("stiffness_ratio", "n_missing", "max_tip_error_mm", "µs_per_state"),
+    "kept": ("seconds", "µs_per_state", "peak_MiB", "max_tip_error_mm", "bound_mm"),
+}  # fmt: skip
+SLOWER = 1.3  # times its recorded ratio: more than noise
+
+
+def bench(
+    spec: SpecPath,
+    settings: Settings = None,
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="Times each way is timed")] = 5,
+    target_error: TargetError = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
+    ] = None,
+    against: Annotated[
+        Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
+    ] = None,
+    printed_as: Annotated[
+        Format, typer.Option("--format", help="How to print what was measured")
+    ] = Format.TABLE,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
+    ] = None,
+    compare: Annotated[
+        Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure error against run time, beside what else there is."""
+    from dpgcli.files.reading import read_record, read_tips
+    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.report.precision import cheapest_way, draw_precision
+    from dpgcli.studies.bench import Bench
+
+    _check_extras(plot)
+    scene = scene_of(read_spec(spec, settings or ()))
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    patterns, tips = (None, None) if against is None else read_tips(against, scene.finger.n_units)
+    then = None if compare is None else read_record(compare)
+    study = Bench(scene, repeats, tuple(keep or ()), target, patterns, tips)
+    study.check()
+    rows = list(_watched(study.rows(), quiet))
+    _write(rows, output, record)
+    if plot is not None:
+        draw_precision(rows, str(spec), plot)
+    _PRINTERS[printed_as](rows)
+    if target is not None:
+        _tell(printed_as, cheapest_way(rows, target))
+    if then is not None:
+        for line in _changes(then, rows):
+            _tell(printed_as, line)
+
+
+def _check_extras(plot: Path | None) -> None:
+    from importlib.util import find_spec
+
+    from dpgcli.errors import UsageError
+
+    if find_spec("mpmath") is None:
+        raise UsageError("dpg bench needs mpmath: pip install 'dpgcli[bench]'")
+    if plot is not None and plot.suffix.lower() not in (".svg", ".png"):
+        raise UsageError(f"--plot {plot}: expected a name that ends in .svg or .png")
+    if plot is not None and find_spec("matplotlib") is None:
+        raise UsageError("--plot needs matplotlib: pip install 'dpgcli[plot]'")
+
+
+def _watched(rows: "Iterable[Row]", quiet: bool) -> "Iterable[Row]":
+    """Name each row on a terminal as it is measured."""
+    interactive = sys.stderr.isatty() and not quiet
+    for row in rows:
+        if interactive:
+            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
+        yield row
+    if interactive:
+        print(" " * 71, end="\r", file=sys.stderr)
+
+
+def _tell(printed_as: Format, line: str) -> None:
+    """A finding: with the tables for people, beside the data for programs."""
+    if printed_as is Format.TABLE:
+        print(line)
+    else:
+        say(line)
+
+
+def _print_tables(rows: "Sequence[Row]") -> None:
+    from dpgcli.report.precision import text_figure
+
+    for group, title in GROUPS.items():
+        own = [row for row in rows if row["group"] == group]
+        if own:
+            names = SHOWN.get(group, SHOWN["ladder"])
+            print(f"{title}\n")
+            print_grid(
+                {"way": [row["way"] for row in own]}
+                | {name: [_cell(row, name) for row in own] for name in names},
+                left=("way",),
+            )
+            print()
+    print("\n".join(text_figure(rows)))
+
+
+def _cell(row: "Row", name: str) -> str:
+    if name == "µs_per_state":
+        return f"{row['seconds_per_state'] * 1e6:.3g}"
+    if name == "cpu_µs_per_state":
+        return f"{row['cpu_seconds'] / row['n_states'] * 1e6:.3g}"
+    if name == "spread":
+        low, high = (row[f"seconds_{end}"] / row["seconds"] for end in ("min", "max"))
+        return f"{low:.2f}-{high:.2f}"
+    value = row[name]
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if name.endswith(("_mm", "_rad", "_mJ")):
+        return f"{value:.1e}"
+    return f"{value:.3g}"
+
+
+def _print_csv(rows: "Sequence[Row]") -> None:
+    _print_by(print_csv, rows)
+
+
+def _print_json(rows: "Sequence[Row]") -> None:
+    _print_by(print_json, rows)
+
+
+def _print_by(printer: Any, rows: "Sequence[Row]") -> None:
+    from dpgcli.studies.bench import COLUMNS, as_columns
+
+    for _ in printer(COLUMNS, [as_columns(rows)]):
+        pass
+
+
+_PRINTERS = {Format.TABLE: _print_tables, Format.CSV: _print_csv, Format.JSON: _print_json}
+
+
+def _write(rows: "Sequence[Row]", output: Path | None, record: Path | None) -> None:
+    from dpgcli.files.tables import record_batch, schema, write_run, write_table
+    from dpgcli.studies.bench import COLUMNS, as_columns
+
+    if output is not None:
+        batch = record_batch(COLUMNS, as_columns(rows))
+        write_table(output, schema(COLUMNS), [batch], {"dpg.bench": json.dumps(_machine())})
+    if record is not None:
+        plain = [{k: v if v == v else None for k, v in row.items()} for row in rows]
+        write_run(record, {**_machine(), "rows": plain})
+
+
+def _machine() -> dict[str, Any]:
+    import platform
+
+    import numpy as np
+
+    return {
+        "machine": platform.machine(),
+        "host": platform.node(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "command": sys.argv,
+    }
+
+
+def _changes(then: "Sequence[Row]", now: "Sequence[Row]") -> list[str]:
+    """What takes a larger multiple of the NumPy kernel's time than it took when recorded."""
+    key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
+    before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
+    slower, n_compared = [], 0
+    for row in now:
+        old = before.get(tuple(row[name] for name in key))
+        if not old or not row["relative_time"] > 0.0:
+            continue
+        n_compared += 1
+        ratio = row["relative_time"] / old
+        if ratio > SLOWER:
+            slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, n={row['n_units']}")
+    verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWER}"
+    return [verdict, *slower]

@@ -1,0 +1,132 @@
+"""Error against run time: a figure, the same in plain text, and what it comes to."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dpgcli.files.output import whole_file
+
+Row = dict[str, Any]
+
+WIDTH, HEIGHT = 64, 18
+SMALLEST = 1e-16  # mm: what is exact is drawn here
+MARKS = "abcdefghijklmnopqrstuvwxyz"
+COLORS = {"ladder": "#0072B2", "one finger": "#56B4E9", "peer": "#D55E00"}  # Okabe and Ito
+MARKERS = {"ladder": "o", "one finger": "s", "peer": "^"}
+LABELS = {"ladder": "dpg, in a batch", "one finger": "dpg, one finger", "peer": "state by state"}
+
+
+def points(rows: Sequence[Row]) -> list[Row]:
+    """The rows that are points of the figure."""
+    return [
+        row
+        for row in rows
+        if row["group"] in COLORS and math.isfinite(row["max_tip_error_mm"] * row["seconds"])
+    ]
+
+
+def model_error(rows: Sequence[Row]) -> float | None:
+    """Largest error of the lattice against given data (mm), if there are any."""
+    found = [row["max_tip_error_mm"] for row in rows if row["group"] == "model"]
+    return found[0] if found else None
+
+
+def cheapest_way(rows: Sequence[Row], target: float) -> str:
+    """A sentence: which way is the cheapest below an error (mm)."""
+    meets = [
+        row
+        for row in rows
+        if row["group"] == "ladder" and row["max_tip_error_mm"] <= target and not row["n_missing"]
+    ]
+    if not meets:
+        return f"no way is below {target:g} mm"
+    best = min(meets, key=lambda row: float(row["seconds_per_state"]))
+    return (
+        f"cheapest below {target:g} mm: {best['way']}, "
+        f"{best['seconds_per_state'] * 1e6:.3g} µs a state, error {best['max_tip_error_mm']:.1e} mm"
+    )
+
+
+def text_figure(rows: Sequence[Row]) -> list[str]:
+    """Largest tip error (mm) over seconds a state, both logarithmic, as lines of text."""
+    shown = points(rows)
+    if not shown:
+        return []
+    across = [math.log10(row["seconds_per_state"]) for row in shown]
+    up = [math.log10(max(row["max_tip_error_mm"], SMALLEST)) for row in shown]
+    model = model_error(rows)
+    top = max(up) if model is None else max(*up, math.log10(model))
+    left, right = math.floor(min(across)), math.ceil(max(across))
+    low, high = math.floor(min(up)), math.ceil(top)
+    grid = [[" "] * WIDTH for _ in range(HEIGHT)]
+    if model:
+        grid[_place(math.log10(model), high, low, HEIGHT)] = list("-" * WIDTH)
+    for x, y, mark in zip(across, up, MARKS, strict=False):
+        grid[_place(y, high, low, HEIGHT)][_place(x, left, right, WIDTH)] = mark
+    heads = {0: f"1e{high:+03d}", HEIGHT - 1: f"1e{low:+03d}"}
+    lines = ["largest tip error, mm"]
+    lines += [f"{heads.get(i, ''):>6} |{''.join(line)}".rstrip() for i, line in enumerate(grid)]
+    lines.append(f"{'':>6} +{'-' * WIDTH}")
+    axis = f"1e{left:+03d}".ljust(WIDTH - 6) + f"1e{right:+03d}"
+    lines.append(f"{'':>7}{axis}  s a state")
+    lines += [
+        f"{'':>7}{mark}  {row['way']} ({LABELS[row['group']]})"
+        for mark, row in zip(MARKS, shown, strict=False)
+    ]
+    if model:
+        lines.append(f"{'':>7}-  the lattice's own error against the data given, {model:.2g} mm")
+    return lines
+
+
+def _place(value: float, first: float, last: float, size: int) -> int:
+    """Where a value lies between the first and the last of `size` places."""
+    share = (value - first) / (last - first) if last != first else 0.0
+    return min(size - 1, max(0, round(share * (size - 1))))
+
+
+def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
+    """Draw the figure to an SVG or PNG file."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"svg.hashsalt": "dpg", "svg.fonttype": "none"}):
+        figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot(
+            xlabel="wall time per state (s)", ylabel="largest tip error (mm)", title=name
+        )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.grid(visible=True, alpha=0.25)
+        _draw_points(axes, points(rows))
+        model = model_error(rows)
+        if model:
+            label = f"the model against data: {model:.2g} mm"
+            axes.axhline(model, color="#009E73", ls="--", label=label)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+        kind = path.suffix.lower().removeprefix(".")
+        metadata = {"Date": None} if kind == "svg" else {"Software": None}
+        with whole_file(path) as temporary:
+            figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
+
+
+def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
+    """Numbered marks, named in the legend: names beside them would overlap."""
+    for number, row in enumerate(shown, start=1):
+        x, y = row["seconds_per_state"], max(row["max_tip_error_mm"], SMALLEST)
+        group = row["group"]
+        axes.errorbar(
+            x,
+            y,
+            xerr=[
+                [x - row["seconds_min"] / row["n_states"]],
+                [row["seconds_max"] / row["n_states"] - x],
+            ],
+            fmt=MARKERS[group],
+            color=COLORS[group],
+            ms=6,
+            label=f"{number}  {row['way']} ({LABELS[group]})",
+        )
+        axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(5, 5), fontsize=8)

@@ -1,0 +1,147 @@
+"""What a plan leaves out, put back: what it costs and what it changes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.errors import UsageError
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.plan import Plan, Request, explain
+from dpgcli.states.predict import predict
+
+STIFF_BARS = 1e3  # times the stiffest spring: where rigid bars are put back as elastic ones
+STATES_ONLY = Request(columns=("states",))
+
+
+class Variant(NamedTuple):
+    """A scene and a request, and how often they are predicted."""
+
+    scene: Scene
+    request: Request
+    times: int = 1
+
+
+class KeptWay(NamedTuple):
+    """A prediction that can be repeated; the change (mm) of its tips, and the bound on that."""
+
+    name: str
+    run: Callable[[], object]
+    n_states: int
+    change: float
+    bound: float
+
+
+def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Plan, Variant]:
+    """The plan, and the variant that puts something back.
+
+    Raises UsageError for a name that is none of `KEEPABLE`, or that the scene does not leave out.
+    """
+    if name not in KEEPABLE:
+        raise UsageError(f"--keep {name}: expected {', '.join(KEEPABLE)}")
+    plan = explain(scene, replace(STATES_ONLY, target_error=target_error))
+    kept = KEEPABLE[name](plan)
+    if kept is None:
+        raise UsageError(f"--keep {name}: this scene does not leave it out")
+    return plan, kept
+
+
+def kept_ways(scene: Scene, name: str, target_error: float | None) -> tuple[KeptWay, KeptWay]:
+    """A prediction as planned, for the target error (mm) if any, and with something put back."""
+    plan, kept = check_kept(scene, name, target_error)
+    planned = Variant(scene, _request(plan))
+    rows, other = (predict(v.scene, v.request).arrays() for v in (planned, kept))
+    both = (rows["status"] == "stable") & (other["status"] == "stable")
+    moved = np.hypot(*(rows[key] - other[key] for key in ("tip_x_mm", "tip_y_mm")))
+    bound = (rows["tip_error_mm"] + other["tip_error_mm"])[both].max(initial=0.0)
+    if name == "rigid-bars" and scene.finger.is_rigid:
+        bound += plan.bar_flexibility
+    return (
+        KeptWay(f"{name} left out", _runner(planned), plan.n_states, 0.0, 0.0),
+        KeptWay(
+            f"{name} put back",
+            _runner(kept),
+            plan.n_states,
+            float(moved[both].max(initial=0.0)),
+            float(bound),
+        ),
+    )
+
+
+def _runner(variant: Variant) -> Callable[[], object]:
+    def run() -> None:
+        for _ in range(variant.times):
+            for _ in predict(variant.scene, variant.request).blocks():
+                pass
+
+    return run
+
+
+def _request(plan: Plan) -> Request:
+    """What the plan answers: tips and certificates, for its target error."""
+    return replace(STATES_ONLY, target_error=plan.request.target_error)
+
+
+def _with_elastic_bars(plan: Plan) -> Variant | None:
+    """Bars that were dropped; rigid ones as springs a thousand times as stiff as the domes."""
+    scene, finger = plan.scene, plan.scene.finger
+    if plan.rung is not None and plan.rung.drops_bars:
+        return Variant(scene, STATES_ONLY)
+    if not finger.is_rigid:
+        return None
+    stiffness = STIFF_BARS * float(finger.bistable_stiffness.max())
+    return Variant(replace(scene, finger=finger.with_bars(stiffness)), STATES_ONLY)
+
+
+def _with_hinges(plan: Plan) -> Variant | None:
+    """Hinges whose stiffness is zero, as terms of the smallest stiffness there is."""
+    scene, finger = plan.scene, plan.scene.finger
+    if finger.hinge_stiffness.any():
+        return None
+    smallest = np.full_like(finger.hinge_stiffness, np.finfo(float).tiny)
+    arrays = {**finger.arrays(), "hinge_stiffness": smallest}
+    return Variant(replace(scene, finger=Finger(finger.n_units, **arrays)), _request(plan))
+
+
+def _with_every_unit(plan: Plan) -> Variant | None:
+    """Equal units, each solved for itself."""
+    scene, finger = plan.scene, plan.scene.finger
+    if not finger.is_uniform or finger.n_units == 1:
+        return None
+    shared = ("segment_height", "linear_stiffness")
+    arrays = {
+        name: values if name in shared else np.repeat(values, finger.n_units, axis=0)
+        for name, values in finger.arrays().items()
+    }
+    return Variant(replace(scene, finger=Finger(finger.n_units, **arrays)), _request(plan))
+
+
+def _with_whole_fingers(plan: Plan) -> Variant | None:
+    """Every pattern solved as a whole, instead of as a pair of half-fingers."""
+    if plan.split is None:
+        return None
+    return Variant(plan.scene, replace(_request(plan), patterns=("*",)))
+
+
+def _with_second_finger(plan: Plan) -> Variant | None:
+    """A gripper's other finger, solved instead of mirrored."""
+    if plan.scene.gripper is None:
+        return None
+    return Variant(plan.scene, _request(plan), times=2)
+
+
+def _with_every_column(plan: Plan) -> Variant | None:
+    """All that is known of a state, instead of tips and certificates alone."""
+    return Variant(plan.scene, replace(_request(plan), columns=("all",)))
+
+
+KEEPABLE: dict[str, Callable[[Plan], Variant | None]] = {
+    "rigid-bars": _with_elastic_bars,
+    "hinges": _with_hinges,
+    "every-unit": _with_every_unit,
+    "whole-fingers": _with_whole_fingers,
+    "second-finger": _with_second_finger,
+    "every-column": _with_every_column,
+}
