@@ -1,0 +1,125 @@
+"""`dpg bench`: tables, files, figures and messages."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+from dpgcli.studies import bench as module
+
+BENCH = ("bench", "three_unit.yaml", "--repeats", "1")
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short growth tables and small batches."""
+    monkeypatch.setattr(module, "GROWTH_UNITS", (1,))
+    monkeypatch.setattr(module, "GROWTH_DESIGNS", (2,))
+    monkeypatch.setattr(module, "GROWTH_RATIOS", (1e4,))
+    monkeypatch.setattr(module, "BATCH", 8)
+    monkeypatch.setattr(module, "PEER_STATES", 1)
+    monkeypatch.setattr("dpgcli.accuracy.timing.SHORTEST", 0.0)
+
+
+def test_tables_a_figure_in_text_and_the_cheapest_way(call: Any) -> None:
+    result = call(*BENCH, "--target-error", "1um", "--keep", "every-unit")
+    assert result.exit_code == ExitCode.DONE
+    for title in ("Ways to the states", "state by state", "Stiffer bars", "put back"):
+        assert title in result.stdout
+    assert "largest tip error, mm" in result.stdout
+    assert result.stdout.splitlines()[-1].startswith("cheapest below 0.001 mm: ")
+    assert result.stderr == ""
+
+
+def test_all_rows_in_files(call: Any, folder: Path) -> None:
+    options = ("-o", "b.parquet", "--json", "b.json", "--plot", "b.svg", "--format", "csv")
+    result = call(*BENCH, *options)
+    assert result.exit_code == ExitCode.DONE
+    table = pd.read_parquet(folder / "b.parquet")
+    record = json.loads((folder / "b.json").read_text())
+    assert list(table) == [column.name for column in module.COLUMNS]
+    assert len(record["rows"]) == len(table) == len(result.stdout.splitlines()) - 1
+    assert record["numpy"] == np.__version__
+    ladder = table[table["group"] == "ladder"].set_index("way")
+    assert ladder.loc["chain, 1e-12", "max_tip_error_mm"] < 1e-12
+    figure = (folder / "b.svg").read_text()
+    assert "largest tip error (mm)" in figure
+    assert "wall time per state (s)" in figure
+
+
+def test_what_got_slower_is_said(call: Any, folder: Path) -> None:
+    assert call(*BENCH, "--json", "b.json", "-q").exit_code == ExitCode.DONE
+    record = json.loads((folder / "b.json").read_text())
+    for row in record["rows"]:
+        row["relative_time"] *= 1e-3 if row["way"] == "chain, 1e-09" else 1e3
+    (folder / "b.json").write_text(json.dumps(record))
+    result = call(*BENCH, "--compare", "b.json", "--format", "json")
+    assert json.loads(result.stdout)
+    verdict, *slower = result.stderr.splitlines()
+    assert verdict.endswith("2 slower by more than 2.0")
+    assert all("chain, 1e-09, 3 units" in line for line in slower)
+
+
+def test_the_models_own_error(call: Any, folder: Path) -> None:
+    (folder / "fe.csv").write_text(
+        "# measured by hand\npattern,tip_y_mm,tip_x_mm\n111,-14,36\n000,0,40.5\n"
+    )
+    result = call(*BENCH, "--against", "fe.csv")
+    assert "the lattice's own error against the data given, 3.3 mm" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("pattern,tip_x_mm\n111,3\n", "no column tip_y_mm; found pattern, tip_x_mm"),
+        ("pattern,tip_x_mm,tip_y_mm\n", "no states in it"),
+        ("pattern,tip_x_mm,tip_y_mm\n11,1,2\n", "fe.csv:2: expected a pattern of 3 digits"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,2\n101,x,2\n", "fe.csv:3: expected numbers in mm"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: expected numbers in mm"),
+        ("", "cannot read fe.csv"),
+    ],
+)
+def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: str) -> None:
+    (folder / "fe.csv").write_text(content)
+    result = call(*BENCH, "--against", "fe.csv")
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--keep", "gravity"), "--keep gravity: expected rigid-bars, hinges, "),
+        (("--keep", "second-finger"), "this scene does not leave it out"),
+        (("--plot", "b.pdf"), "expected a name that ends in .svg or .png"),
+        (("--target-error", "soon"), "--target-error soon: expected a length in mm"),
+        (("--against", "none.csv"), "cannot read none.csv"),
+        (("--compare", "three_unit.yaml"), "not JSON"),
+        (("--compare", "none.json"), "no record of dpg bench --json"),
+        (("--repeats", "0"), "--repeats"),
+    ],
+)
+def test_options_that_make_no_sense(call: Any, options: tuple[str, ...], said: str) -> None:
+    result = call(*BENCH, *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+    assert result.stdout == ""
+
+
+def test_without_mpmath(call: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    result = call(*BENCH)
+    assert result.exit_code == ExitCode.USAGE
+    assert "dpg bench needs mpmath: pip install 'dpgcli[bench]'" in result.stderr
+
+
+def test_rigid_bars_have_no_peers(call: Any) -> None:
+    options = ("-s", "finger.linear_stiffness_N_per_mm=.inf", "--keep", "rigid-bars")
+    result = call(*BENCH, *options)
+    assert result.exit_code == ExitCode.DONE
+    assert "What one would do instead" not in result.stdout
+    assert "rigid-bars put back" in result.stdout
