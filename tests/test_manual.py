@@ -10,16 +10,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from dpgcli.cli import check, explain, init, merge, predict, report, schema, sweep, validate
+from dpgcli.cli import bench, check, explain, init, merge, predict, report, schema, sweep, validate
 from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.main import app
 from dpgcli.files.spec import json_schema, read_spec
 from dpgcli.files.sweep import read_sweep
 from dpgcli.mechanics.scene import Origin
 from dpgcli.states.columns import Group, declared
 from dpgcli.states.designs import DESIGN_COLUMNS
 from dpgcli.states.solve import Status
-from dpgcli.studies.evaluation import DesignStatus
+from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.studies.kept import KEEPABLE
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -27,6 +30,7 @@ COMMANDS = (
     predict.predict,
     explain.explain,
     sweep.sweep,
+    bench.bench,
     merge.merge,
     check.check,
     report.report,
@@ -89,6 +93,21 @@ def test_the_example_in_python_runs(
     assert "'101' '111'" in capsys.readouterr().out
 
 
+def test_the_examples_of_reading_tables_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a folder with the tables that the commands before them have made."""
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke
+    sweep_file = ROOT / "configs" / "sweeps" / "height_separation.yaml"
+    assert run(app, ["sweep", str(sweep_file), "-o", "out", "--executor", "serial"]).exit_code == 0
+    spec = ROOT / "configs" / "five_unit.yaml"
+    assert run(app, ["predict", str(spec), "-o", "states.parquet"]).exit_code == 0
+    for example in blocks("python")[:-1]:
+        exec(example, {})
+    assert "tip_y_mm" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.__name__)
 def test_every_command_and_option_is_named(command: object) -> None:
     name = getattr(command, "__name__", "")
@@ -111,6 +130,6 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in README}
-    named = {c.name for c in DESIGN_COLUMNS} | set(DesignStatus)
+    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *KEEPABLE}
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

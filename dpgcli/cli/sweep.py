@@ -87,32 +87,18 @@ def sweep(
         _start_fork_server_early()
     from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
-    from dpgcli.files.sweep import read_sweep
-    from dpgcli.states.rungs import DEFAULT_TOLERANCE
-    from dpgcli.studies.sweep import Study
 
     part = _shard(shard)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
-    if tolerance is not None and target_error is not None:
-        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
-    study = Study(
-        read_sweep(spec, settings or ()),
-        output,
-        tolerance or DEFAULT_TOLERANCE,
-        None if target_error is None else millimeters("--target-error", target_error),
-    )
+    study = _study(spec, settings or (), output, tolerance, target_error)
     rules = _rules(study, require or [])
     if depfile is not None:
         write_depfile(depfile, study)
     with sole_use(output):
         is_new = part is not None or not study.is_up_to_date
         if is_new:
-            if restart:
-                study.drop_unfinished()
-            study.check_unfinished()
-            if not force:
-                study.check_room()
+            _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)
         elif not quiet:
@@ -132,6 +118,33 @@ def _start_fork_server_early() -> None:
     from dpgcli.exploration.executors import start_fork_server
 
     start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
+
+
+def _study(
+    spec: Path,
+    settings: Sequence[str],
+    output: Path,
+    tolerance: float | None,
+    target_error: str | None,
+) -> "Study":
+    from dpgcli.errors import UsageError
+    from dpgcli.files.sweep import read_sweep
+    from dpgcli.states.rungs import DEFAULT_TOLERANCE
+    from dpgcli.studies.sweep import Study
+
+    if tolerance is not None and target_error is not None:
+        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    return Study(read_sweep(spec, settings), output, tolerance or DEFAULT_TOLERANCE, target)
+
+
+def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:
+    """Refuse what is unfinished there, unless it is to go, and what has no room."""
+    if restart:
+        study.drop_unfinished()
+    study.check_unfinished()
+    if not force:
+        study.check_room()
 
 
 def _rules(study: "Study", require: list[str]) -> "list[Expression]":
