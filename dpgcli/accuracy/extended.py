@@ -15,15 +15,12 @@ from dpgcli.accuracy.extended_energy import (
     ElasticBars,
     Expansion,
     RigidBars,
-    Well,
     cells,
     corners,
     cross,
-    extended_units,
-    inverted_well,
     measured,
-    starting_nodes,
 )
+from dpgcli.accuracy.extended_units import Unit, Well, extended_units, inverted_well
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 
@@ -98,7 +95,9 @@ def extended_states(
         rows = []
         for state, pattern in enumerate(inverted.T):
             start = (
-                starting_nodes(wells, units, pattern) if nodes is None else nodes[:, state].tolist()
+                _starting_nodes(wells, units, pattern)
+                if nodes is None
+                else nodes[:, state].tolist()
             )
             found = _minimum(bars, [mpmath.mpf(value) for value in start], tolerance)
             rows.append(_missing(n) if found is None else _row(found, wells, pattern))
@@ -110,6 +109,12 @@ def _digits_lost(finger: Finger) -> int:
     if finger.is_rigid:
         return 0
     return max(0, ceil(log10(finger.linear_stiffness.max() / finger.bistable_stiffness.min())))
+
+
+def _starting_nodes(wells: list[Well], units: list[Unit], pattern: Flags) -> list["mpf"]:
+    """The nodes of the pattern with rigid bars."""
+    angles = [well.angle * int(on) for well, on in zip(wells, pattern, strict=True)]
+    return RigidBars(units).nodes([angle for angle in angles for _ in "ab"])
 
 
 class Factorization(NamedTuple):
