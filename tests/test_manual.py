@@ -12,7 +12,21 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from dpgcli.cli import bench, check, explain, init, merge, predict, report, schema, sweep, validate
+from dpgcli.accuracy.families import FAMILIES, PATTERNS
+from dpgcli.accuracy.stress import Verdict
+from dpgcli.cli import (
+    bench,
+    check,
+    explain,
+    init,
+    merge,
+    predict,
+    report,
+    schema,
+    stress,
+    sweep,
+    validate,
+)
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.main import app
 from dpgcli.files.spec import json_schema, read_spec
@@ -31,6 +45,7 @@ COMMANDS = (
     explain.explain,
     sweep.sweep,
     bench.bench,
+    stress.stress,
     merge.merge,
     check.check,
     report.report,
@@ -131,5 +146,6 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in README}
     named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *KEEPABLE}
+    named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

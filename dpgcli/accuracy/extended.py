@@ -86,20 +86,20 @@ def extended_states(
         raise ValueError(f"inverted has shape {inverted.shape}, not ({n}, one or more states)")
     if nodes is not None and nodes.shape != (4 * n, inverted.shape[1]):
         raise ValueError(f"nodes has shape {nodes.shape}, not {(4 * n, inverted.shape[1])}")
-    with mpmath.workdps(digits + _digits_lost(finger)):
+    lost = _digits_lost(finger)
+    with mpmath.workdps(digits + lost):
         units = extended_units(finger)
         well_of = {unit: inverted_well(unit) for unit in set(units)}
         wells = [well_of[unit] for unit in units]
         bars = RigidBars(units) if finger.is_rigid else ElasticBars(units)
         tolerance = mpmath.mpf(10) ** -(digits // 2 + 5)
+        smallest = tolerance / mpmath.mpf(10) ** lost
         rows = []
         for state, pattern in enumerate(inverted.T):
-            start = (
-                _starting_nodes(wells, units, pattern)
-                if nodes is None
-                else nodes[:, state].tolist()
-            )
-            found = _minimum(bars, [mpmath.mpf(value) for value in start], tolerance)
+            start = _starting_nodes(wells, units, pattern)
+            if nodes is not None:
+                start = [mpmath.mpf(value) for value in nodes[:, state].tolist()]
+            found = _minimum(bars, start, tolerance, smallest)
             rows.append(_missing(n) if found is None else _row(found, wells, pattern))
     return ExtendedStates(*(np.stack(column, axis=-1) for column in zip(*rows, strict=True)))
 
@@ -128,9 +128,13 @@ class Factorization(NamedTuple):
     is_positive: bool
 
 
-def factorize(band: list[list["mpf"]]) -> Factorization:
-    """Factorize a symmetric band without pivoting."""
-    from mpmath import eps, fdot
+def factorize(band: list[list["mpf"]], smallest: "mpf") -> Factorization:
+    """Factorize a symmetric band without pivoting.
+
+    Pivots below `smallest` of their diagonal may be what is left of zeros where the search
+    ended.
+    """
+    from mpmath import fdot
 
     below: list[list[mpf]] = []
     pivots: list[mpf] = []
@@ -143,7 +147,7 @@ def factorize(band: list[list["mpf"]]) -> Factorization:
             scaled.append(entry - fdot(scaled, known))
         below.append([value / pivot for value, pivot in zip(scaled, pivots[first:], strict=True)])
         pivot = diagonal - fdot(scaled, below[row])
-        is_positive &= bool(pivot > ROUNDING * eps * abs(diagonal))
+        is_positive &= bool(pivot > smallest * abs(diagonal))
         pivots.append(pivot)
     return Factorization(below, pivots, is_positive)
 
@@ -182,9 +186,12 @@ class Stationary(NamedTuple):
 
 
 def _minimum(
-    bars: ElasticBars | RigidBars, start: list["mpf"], tolerance: "mpf"
+    bars: ElasticBars | RigidBars, start: list["mpf"], tolerance: "mpf", smallest: "mpf"
 ) -> Stationary | None:
-    """Walk downhill from the nodes `start`; None if that does not converge."""
+    """Walk downhill from the nodes `start`; None if that does not converge.
+
+    Pivots are positive from `smallest` of their diagonal on.
+    """
     from mpmath import isfinite
 
     if not all(map(isfinite, start)):
@@ -193,7 +200,7 @@ def _minimum(
         here = bars.unknowns(start)
         expansion = bars.at(here)
         for _ in range(MOST_ITERATIONS):
-            factorization = factorize(expansion.band)
+            factorization = factorize(expansion.band, smallest)
             step = _downhill(factorization, expansion.gradient)
             if max(map(abs, step)) <= tolerance * bars.scale:
                 return Stationary(bars, here, expansion, factorization)
@@ -214,7 +221,8 @@ def _further(
 
     fraction = 1 / max(1, bars.boldness(here, step) / BOLDEST)
     slope = SUFFICIENT_DECREASE * fdot(step, expansion.gradient)
-    allowed = expansion.energy * (1 + ROUNDING * eps)
+    springs = sum(unit.bistable * unit.stroke**2 for unit in bars.units)
+    allowed = expansion.energy + ROUNDING * eps * (expansion.energy + springs)
     for _ in range(MOST_HALVINGS):
         trial = bars.moved(here, [fraction * part for part in step])
         there = bars.at(trial)

@@ -6,7 +6,19 @@ from typing import Annotated
 import typer
 
 from dpgcli import __version__
-from dpgcli.cli import check, explain, init, merge, predict, report, schema, sweep, validate
+from dpgcli.cli import (
+    bench,
+    check,
+    explain,
+    init,
+    merge,
+    predict,
+    report,
+    schema,
+    stress,
+    sweep,
+    validate,
+)
 from dpgcli.cli.exits import command, run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
@@ -16,8 +28,9 @@ for _library in ("OPENBLAS", "MKL", "OMP"):
 app = typer.Typer(
     name="dpg",
     help="Stable shapes of multistable soft grippers, predicted by a lumped spring lattice.",
-    epilog="Exit codes: 0 done, 1 a requirement is not met, 2 usage or spec, 3 internal error, "
-    "4 more failed cases than --max-failed, 5 nothing selected, 130/143 interrupted.",
+    epilog="Exit codes: 0 done, 1 a requirement is not met or a hard case fails, 2 usage or spec, "
+    "3 internal error, 4 more failed cases than --max-failed, 5 nothing selected, "
+    "130/143 interrupted.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -30,6 +43,8 @@ for _function in (
     merge.merge,
     check.check,
     report.report,
+    bench.bench,
+    stress.stress,
     validate.validate,
     init.init,
     schema.schema,

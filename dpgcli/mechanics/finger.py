@@ -91,6 +91,16 @@ class Finger:
         return Finger(stop - first, **cut)
 
 
+STUDY = {  # published; mm, N/mm, N mm/rad
+    "segment_length": 13.5,
+    "segment_height": 10.75,
+    "stroke": 3.5,
+    "bistable_stiffness": 12.84,
+    "force_linearity": 0.043,
+    "hinge_stiffness": 24.2,
+}
+
+
 def uniform_finger(
     n_units: int,
     *,

@@ -21,7 +21,7 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.terms import evaluate
 from dpgcli.states.solve import TIP_ROUNDING, Units, reach
-from dpgcli.states.wells import as_single_units
+from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
 LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are too soft for a bound
@@ -100,15 +100,16 @@ def _softness(units: Units) -> Array:
 
 def _corner_stiffness(units: Units) -> Array:
     """Smallest eigenvalue λ (N mm/rad) by a unit's two corners, in any well, (unit, design)."""
+    finger, shape = single_units(units.finger)
     angle = np.where(units.wells.exists, units.wells.angle, 0.0)
-    finger = as_single_units(units.finger, angle.shape)
+    angle = np.broadcast_to(angle, shape).reshape(1, -1)
     chain = Chain(finger.with_bars(np.inf))
     rest = np.zeros((1, 1))
-    least = np.full((1, angle.size), np.inf)
-    for corner in (np.zeros((1, angle.size)), angle.reshape(1, -1)):
+    least = np.full_like(angle, np.inf)
+    for corner in (np.zeros_like(angle), angle):
         band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
-    return np.where(least > 0.0, least, 0.0).reshape(angle.shape)
+    return np.where(least > 0.0, least, 0.0).reshape(shape)
 
 
 def _is_bounded(units: Units) -> Array:

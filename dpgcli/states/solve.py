@@ -175,8 +175,9 @@ class Tip:
 def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     """Pose, error and compliance C = J H⁻¹ Jᵀ of the tip from the factorization at hand.
 
-    The error is the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a few
-    units in the last place, more for many units and where the curvature is small.
+    The error is twice the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a
+    few units in the last place, more for many units and where the curvature is small. Twice,
+    since between very stiff bars of the lattice that step itself has lost its digits.
     """
     equilibrium = batch.equilibrium
     finger = batch.formulation.finger
@@ -189,8 +190,8 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
         slenderness = (finger.stroke / finger.segment_height).max(axis=0)
         softness = slenderness / equilibrium.curvature
         rounding = TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + np.abs(softness))
-        error = np.hypot(step[0], step[1]) + rounding * reach(finger)
-        angle_error = np.abs(step[2]) + rounding
+        error = 2.0 * np.hypot(step[0], step[1]) + rounding * reach(finger)
+        angle_error = 2.0 * np.abs(step[2]) + rounding * (1.0 + np.abs(pose[2]))
         if not with_compliance:
             return Tip(pose, error, angle_error)
         compliance = np.stack([total(sides[:, p] * scaled[:, q]) for p, q in COMPLIANCE_PAIRS])

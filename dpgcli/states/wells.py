@@ -156,12 +156,12 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     With A the Hessian by the two corners, C its columns by a bar and g the force on the bar,
     a bar extends by −g/k_L and the corners follow by −A⁻¹C times that.
     """
-    zero = np.zeros_like(wells.angle)
+    flat, (units, designs) = single_units(finger)
+    rigid_angle = np.broadcast_to(wells.angle, (units, designs))
+    zero = np.zeros((units, designs))
     if finger.is_rigid:
-        return FirstOrder(wells.angle, zero, zero, zero, zero, zero, zero)
-    units, designs = wells.angle.shape
-    flat = as_single_units(finger, (units, designs))
-    angle = wells.angle.reshape(1, -1)
+        return FirstOrder(rigid_angle, zero, zero, zero, zero, zero, zero)
+    angle = rigid_angle.reshape(1, -1)
     rest = np.zeros_like(angle)
     chain = Chain(flat)
     at_well = evaluate(chain, chain.coordinates(Internal(rest, angle, angle, rest)))
@@ -176,10 +176,10 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
         + (np.abs(by_near_strut) + np.abs(by_far_strut)) * 2.0 * np.abs(strut).max(axis=0)
     )
     # `turn` is of both corners, and may be infinite
-    scale = np.minimum(1.0, 0.2 * wells.angle / np.maximum(turn, np.finfo(float).tiny))
+    scale = np.minimum(1.0, 0.2 * rigid_angle / np.maximum(turn, np.finfo(float).tiny))
     scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
     by_chord, by_near_strut, by_far_strut = scaled
-    return FirstOrder(wells.angle, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+    return FirstOrder(rigid_angle, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
 
 
 def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
@@ -201,10 +201,12 @@ def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
     return by_chord, by_near, by_far
 
 
-def as_single_units(finger: Finger, shape: tuple[int, ...]) -> Finger:
-    """Every unit of every design as a design of its own."""
-    arrays = {k: np.broadcast_to(v, shape).reshape(1, -1) for k, v in finger.arrays().items()}
-    return Finger(1, **arrays)
+def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
+    """Every unit of every design as a design of its own, and how many units and designs."""
+    arrays = finger.arrays()
+    units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
+    flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
+    return Finger(1, **flat), (units, designs)
 
 
 def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Internal:

@@ -18,16 +18,9 @@ from dpgcli.accuracy.extended_units import Unit, extended_units, inverted_well
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import ARRAYS, Finger, uniform_finger
+from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.states.solve import Units, min_eigenvalues, solve, tip
 
-REFERENCE = {
-    "segment_length": 13.5,
-    "segment_height": 10.75,
-    "stroke": 3.5,
-    "bistable_stiffness": 12.84,
-    "force_linearity": 0.043,
-    "hinge_stiffness": 24.2,
-}
 FOLD = 0.0964682337467354  # α at which the reference unit with rigid bars loses its second well
 LONG_DOUBLE = 4.0 * float(np.finfo(np.longdouble).eps)
 

@@ -10,7 +10,7 @@ from dpgcli.accuracy import peers
 from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.accuracy.peers import Solve, tip_pose
 from dpgcli.arrays import Array
-from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
@@ -19,15 +19,7 @@ from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
 from dpgcli.states.wells import stroke_guess
 
-REFERENCE = {
-    "segment_length": 13.5,
-    "segment_height": 10.75,
-    "stroke": 3.5,
-    "bistable_stiffness": 12.84,
-    "force_linearity": 0.043,
-    "hinge_stiffness": 24.2,
-    "linear_stiffness": 1e4,
-}
+REFERENCE = {**STUDY, "linear_stiffness": 1e4}
 TOLERANCES = {  # mm, of the tip; 10 to 1000 times what was measured
     "SciPy BFGS, numerical gradient": 1e-4,
     "SciPy BFGS, analytic gradient": 5e-6,

@@ -14,7 +14,7 @@ import pytest
 from dpgcli.arrays import keep_freed_memory
 from dpgcli.files.tables import write_states
 from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.patterns import inverted_units
@@ -22,15 +22,7 @@ from dpgcli.states.predict import predict
 from dpgcli.states.solve import Status, Units, certify, lanes_at_once, solve, tip
 
 pytestmark = pytest.mark.benchmark
-REFERENCE = {
-    "segment_length": 13.5,
-    "segment_height": 10.75,
-    "stroke": 3.5,
-    "bistable_stiffness": 12.84,
-    "force_linearity": 0.043,
-    "hinge_stiffness": 24.2,
-    "linear_stiffness": 1e4,
-}
+REFERENCE = {**STUDY, "linear_stiffness": 1e4}
 
 
 def varied_designs(n_units: int, n_designs: int) -> Finger:

@@ -13,10 +13,15 @@ from dpgcli.cli.exits import ExitCode
 Call = Callable[..., Any]
 COMMANDS = {
     "predict": "--output --format --pattern --set --columns --nodes --formulation --tolerance "
-    "--plot --quiet",
-    "explain": "--format --pattern --set --columns --nodes --formulation --tolerance",
-    "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --restart --force "
+    "--target-error --plot --quiet",
+    "explain": "--format --pattern --set --columns --nodes --formulation --tolerance "
+    "--target-error",
+    "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --target-error "
+    "--restart --force "
     "--depfile --require --max-failed --summary-file --quiet",
+    "bench": "--set --repeats --target-error --keep --against --format --output --plot --json "
+    "--compare --quiet",
+    "stress": "--only --set --format --output --quiet",
     "merge": "--output --quiet",
     "check": "--require --format --summary-file",
     "report": "--output",

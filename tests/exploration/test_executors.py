@@ -79,7 +79,7 @@ def test_workers_that_always_die_end_the_run(deadly: Any, tmp_path: Path) -> Non
     """Then it is not the cases' fault, and none of them is reported as failed."""
     runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(64)))
     found = []
-    with pytest.raises(WorkplaceError, match="17 cases in a row .* is there memory enough"):
+    with pytest.raises(WorkplaceError, match=r"17 cases in a row .* is there memory enough"):
         found += runner.run(chunked([(0, 64)], 8))
     assert found == []
 

@@ -10,33 +10,10 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import settings
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.finger import Finger, uniform_finger
-
-settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
-settings.load_profile("repeatable")
-
-REFERENCE = {
-    "segment_length": 13.5,
-    "segment_height": 10.75,
-    "stroke": 3.5,
-    "bistable_stiffness": 12.84,
-    "force_linearity": 0.043,
-    "hinge_stiffness": 24.2,
-}
-
-
-@pytest.fixture(scope="session")
-def reference_finger() -> Callable[..., Finger]:
-    """The study's finger with changes: `reference_finger(n, linear_stiffness, stroke=1.0)`."""
-
-    def build(n_units: int, linear_stiffness: float = np.inf, **changes: float) -> Finger:
-        values = {**REFERENCE, **changes}
-        return uniform_finger(n_units, **values, linear_stiffness=linear_stiffness)
-
-    return build
+from dpgcli.mechanics.finger import STUDY as REFERENCE
+from dpgcli.mechanics.finger import Finger
 
 
 @pytest.fixture(scope="session")

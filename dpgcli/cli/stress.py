@@ -1,0 +1,249 @@
+"""`dpg stress`: stiff and extreme cases, held against extended precision."""
+
+import math
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.options import Quiet, Settings
+from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.progress import ProgressLine
+from dpgcli.cli.streams import patient_output, say
+
+if TYPE_CHECKING:
+    from dpgcli.accuracy.gauntlet import Case
+    from dpgcli.accuracy.outcomes import FamilySummary
+    from dpgcli.accuracy.stress import Outcome
+    from dpgcli.files.spec import Spec
+    from dpgcli.mechanics.finger import Finger
+    from dpgcli.states.rows import Columns
+
+MISSED = "Missed, where node coordinates or the guess that was given end"
+MARGINS = "How far each unit's values may rise before it loses its second well (bars as if rigid)"
+
+
+def stress(
+    spec: Annotated[
+        Path | None,
+        typer.Argument(metavar="SPEC", help="YAML spec; none: the built-in cases alone"),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="FAMILY", help="Only these families; repeatable"),
+    ] = None,
+    settings: Settings = None,
+    printed_as: Annotated[
+        Format, typer.Option("--format", help="A summary, or every case as json or csv")
+    ] = Format.TABLE,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write every case to this Parquet file")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Hold stiff and extreme cases against extended precision."""
+    from dpgcli.files.spec import scene_of
+
+    _check_extras()
+    checked = _spec(spec, settings or ())
+    finger = None if checked is None else scene_of(checked).finger
+    cases = _cases(finger, only or ())
+    _check_output(spec, output)
+    began = perf_counter()
+    with patient_output():
+        outcomes = _printed(printed_as, _progress(cases, quiet), finger)
+        if output is not None:
+            _write(output, outcomes, checked)
+    if not quiet:
+        sys.stdout.flush()
+        say(_summary(outcomes, perf_counter() - began))
+    if any(outcome.is_failure for outcome in outcomes):
+        raise typer.Exit(ExitCode.REQUIREMENT)
+
+
+def _check_extras() -> None:
+    from dpgcli.errors import UsageError
+
+    if find_spec("mpmath") is None:
+        raise UsageError("dpg stress needs mpmath: pip install 'dpgcli[bench]'")
+
+
+def _spec(spec: Path | None, settings: Sequence[str]) -> "Spec | None":
+    from dpgcli.errors import UsageError
+    from dpgcli.files.spec import read_spec
+
+    if spec is None and settings:
+        raise UsageError("--set changes a spec: give one")
+    return None if spec is None else read_spec(spec, settings)
+
+
+def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
+    from dpgcli.accuracy.gauntlet import all_cases, check_families
+    from dpgcli.errors import NothingSelectedError
+
+    check_families(only)
+    cases = all_cases(finger, only)
+    if not cases:
+        raise NothingSelectedError(f"--only {', '.join(only)}: there are none without a spec")
+    return cases
+
+
+def _check_output(spec: Path | None, output: Path | None) -> None:
+    """Before any work: a file that can be written, and is not the spec."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.output import check_writable
+
+    if output is None:
+        return
+    check_writable(output)
+    if spec is not None and output.exists() and spec.exists() and output.samefile(spec):
+        raise UsageError(f"{output} is the spec itself: give another name")
+    if output.suffix.lower() in (".csv", ".json"):
+        raise UsageError(f"--output {output}: writes Parquet; use --format with > FILE")
+
+
+def _progress(cases: Sequence["Case"], quiet: bool) -> Iterator["Outcome"]:
+    """Outcomes as they come, with progress."""
+    from dpgcli.accuracy import stress as accuracy
+
+    line = ProgressLine(len(cases), "cases", quiet=quiet)
+    for done, outcome in enumerate(accuracy.stress(cases), start=1):
+        yield outcome
+        line.show(done)
+    line.clear()
+
+
+def _printed(
+    printed_as: Format, coming: Iterator["Outcome"], finger: "Finger | None"
+) -> list["Outcome"]:
+    """All outcomes: printed one by one as they come, or in tables at the end."""
+    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
+
+    outcomes: list[Outcome] = []
+
+    def blocks() -> Iterator["Columns"]:
+        for outcome in coming:
+            outcomes.append(outcome)
+            yield rows([outcome])
+
+    if printed_as is Format.TABLE:
+        outcomes += coming
+        _print_tables(outcomes, finger)
+    else:
+        printer = print_csv if printed_as is Format.CSV else print_json
+        for _ in printer(STRESS_COLUMNS, blocks()):
+            pass
+    return outcomes
+
+
+def _print_tables(outcomes: list["Outcome"], finger: "Finger | None") -> None:
+    """Families by whose finger it is, cases that matter in full, and the finger's margins."""
+    from dpgcli.accuracy.outcomes import summarized
+
+    summaries = summarized(outcomes)
+    titles = {"spec": "The spec's finger", "built-in": "The study's finger"}
+    for subject in dict.fromkeys(summary.subject for summary in summaries):
+        own = [_family(summary) for summary in summaries if summary.subject == subject]
+        _print_table(titles[subject], own)
+    failing = [outcome for outcome in outcomes if outcome.is_failure]
+    missed = [o for o in outcomes if o.verdict == "missed" and not o.is_failure]
+    _print_table("Failures", _in_full(failing))
+    _print_table(MISSED, _in_full(missed))
+    if finger is not None:
+        _print_table(MARGINS, _margins(finger))
+
+
+def _print_table(title: str, records: list[dict[str, str]]) -> None:
+    """Print records of the same names under a title, if there are any."""
+    left = ("subject", "family", "case", "formulation", "pattern", "verdict", "status", "units")
+    if records:
+        texts = {name: [record[name] for record in records] for name in records[0]}
+        print(f"{title}\n")
+        print_grid(texts, left=(*left, "reached_pattern"))
+        print()
+
+
+def _family(summary: "FamilySummary") -> dict[str, str]:
+    counts = {verdict.value: str(n) for verdict, n in summary.verdicts.items()}
+    return {
+        "family": summary.family,
+        "formulation": summary.formulation,
+        "cases": str(summary.n_cases),
+        **counts,
+        "failures": str(summary.n_failures),
+        "residual_N": _rounded(summary.residual),
+        "over_floor": _rounded(summary.residual_over_floor),
+        "condition": _rounded(summary.condition),
+        "true_tip_error_mm": _rounded(summary.true_tip_error),
+        "iterations": f"{summary.iterations:.0f}" if summary.iterations >= 0 else "-",
+    }
+
+
+def _in_full(outcomes: list["Outcome"]) -> list[dict[str, str]]:
+    """All that is known of some cases."""
+    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
+    from dpgcli.states.columns import Kind
+    from dpgcli.states.rows import as_text
+
+    values = rows(outcomes)
+    texts = {
+        column.name: [
+            _rounded(value) if column.kind is Kind.NUMBER else str(value)
+            for value in as_text(column, values[column.name]).tolist()
+        ]
+        for column in STRESS_COLUMNS
+        if column.kind is not Kind.FLAG
+    }
+    return [dict(zip(texts, row, strict=True)) for row in zip(*texts.values(), strict=True)]
+
+
+def _margins(finger: "Finger") -> list[dict[str, str]]:
+    """One record for each run of equal units."""
+    from dpgcli.accuracy.margins import margins
+
+    own = margins(finger)
+    by_unit = zip(own.force_linearity, own.hinge_stiffness, own.stroke, strict=True)
+    records = []
+    for (linearity, hinge, stroke), members in groupby(enumerate(by_unit, 1), itemgetter(1)):
+        units = [unit for unit, _ in members]
+        records.append(
+            {
+                "units": "-".join(str(unit) for unit in sorted({units[0], units[-1]})),
+                "force_linearity": f"{linearity:.6f}",
+                "hinge_stiffness_N_mm_per_rad": f"{hinge:.4f}",
+                "stroke_mm": f"{stroke:.5f}",
+            }
+        )
+    return records
+
+
+def _rounded(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.1e}"
+
+
+def _write(output: Path, outcomes: list["Outcome"], spec: "Spec | None") -> None:
+    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
+    from dpgcli.files.spec import canonical_json
+    from dpgcli.files.tables import SCHEMA_VERSION, record_batch, schema, versions, write_table
+
+    metadata = {"dpg.schema_version": str(SCHEMA_VERSION), "dpg.versions": versions()}
+    if spec is not None:
+        metadata["dpg.spec"] = canonical_json(spec)
+    batch = record_batch(STRESS_COLUMNS, rows(outcomes))
+    write_table(output, schema(STRESS_COLUMNS), [batch], metadata)
+
+
+def _summary(outcomes: list["Outcome"], seconds: float) -> str:
+    counts = Counter(outcome.verdict.value for outcome in outcomes)
+    verdicts = ", ".join(f"{n:,} {verdict}" for verdict, n in counts.most_common())
+    n_failures = sum(outcome.is_failure for outcome in outcomes)
+    failures = f"{n_failures} failure{'s' * (n_failures != 1)}"
+    return f"{len(outcomes):,} cases in {seconds:.0f} s: {verdicts}; {failures}"
