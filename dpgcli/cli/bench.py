@@ -69,20 +69,23 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
-    from dpgcli.files.reading import read_record, read_tips
-    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.files.output import check_outputs
+    from dpgcli.files.reading import read_tips
+    from dpgcli.files.spec import canonical_json, read_spec, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
 
     _check_extras(plot)
-    scene = scene_of(read_spec(spec, settings or ()))
+    check_outputs(output, record, plot)
+    checked = read_spec(spec, settings or ())
+    scene, said = scene_of(checked), canonical_json(checked)
     target = None if target_error is None else millimeters("--target-error", target_error)
     patterns, tips = (None, None) if against is None else read_tips(against, scene.finger.n_units)
-    then = None if compare is None else read_record(compare)
+    then = None if compare is None else _recorded(compare, said)
     study = Bench(scene, repeats, tuple(keep or ()), target, patterns, tips)
     study.check()
     rows = list(_watched(study.rows(), quiet))
-    _write(rows, output, record)
+    _write(rows, said, output, record)
     if plot is not None:
         draw_precision(rows, str(spec), plot)
     _PRINTERS[printed_as](rows)
@@ -91,6 +94,20 @@ def bench(
     if then is not None:
         for line in _changes(then, rows):
             _tell(printed_as, line)
+
+
+def _recorded(path: Path, said: str) -> "Sequence[Row]":
+    """The rows of a record of the same finger."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.reading import read_record
+    from dpgcli.studies.sweep import differences
+
+    facts = read_record(path)
+    changed = differences({"spec": str(facts.get("spec"))}, {"spec": said})
+    if changed:
+        raise UsageError(f"--compare {path}: of another finger, differs in {', '.join(changed)}")
+    rows: Sequence[Row] = facts["rows"]
+    return rows
 
 
 def _check_extras(plot: Path | None) -> None:
@@ -178,16 +195,26 @@ def _print_by(printer: Any, rows: "Sequence[Row]") -> None:
 _PRINTERS = {Format.TABLE: _print_tables, Format.CSV: _print_csv, Format.JSON: _print_json}
 
 
-def _write(rows: "Sequence[Row]", output: Path | None, record: Path | None) -> None:
+def _write(rows: "Sequence[Row]", said: str, output: Path | None, record: Path | None) -> None:
     from dpgcli.files.tables import record_batch, schema, write_run, write_table
     from dpgcli.studies.bench import COLUMNS, as_columns
 
     if output is not None:
         batch = record_batch(COLUMNS, as_columns(rows))
-        write_table(output, schema(COLUMNS), [batch], {"dpg.bench": json.dumps(_machine())})
+        metadata = {"dpg.bench": json.dumps(_machine()), "dpg.spec": said}
+        write_table(output, schema(COLUMNS), [batch], metadata)
     if record is not None:
-        plain = [{k: v if v == v else None for k, v in row.items()} for row in rows]
-        write_run(record, {**_machine(), "rows": plain})
+        plain = [{key: _plain(value) for key, value in row.items()} for row in rows]
+        write_run(record, {**_machine(), "spec": said, "rows": plain})
+
+
+def _plain(value: Any) -> Any:
+    """As JSON can say it: null for what was not measured, and .inf as in a spec."""
+    from dpgcli.files.spec import spelled
+
+    if not isinstance(value, float):
+        return value
+    return None if value != value else spelled(value)
 
 
 def _machine() -> dict[str, Any]:
@@ -229,7 +256,7 @@ def _changes(then: "Sequence[Row]", now: "Sequence[Row]") -> list[str]:
     before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
     slower, n_compared = [], 0
     for row in now:
-        old = before.get(tuple(row[name] for name in key))
+        old = before.get(tuple(_plain(row[name]) for name in key))
         if not old or not row["relative_time"] > 0.0:
             continue
         n_compared += 1

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.options import Quiet
+from dpgcli.cli.options import MaxFailed, Quiet
 from dpgcli.cli.report import summarize
+from dpgcli.cli.run import check_failed
 from dpgcli.cli.streams import say
 
 
@@ -15,12 +16,13 @@ def merge(
         list[Path], typer.Argument(metavar="FOLDER...", help="Output folders of the shards")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
+    max_failed: MaxFailed = 0,
     quiet: Quiet = False,
 ) -> None:
     """Join shards into the tables of the whole sweep."""
     from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
-    from dpgcli.studies.sweep import assemble, stores
+    from dpgcli.studies.sweep import assemble, drop_parts, stores
 
     found = []
     for folder in shards:
@@ -33,7 +35,9 @@ def merge(
         found += here
     with sole_use(output):
         assemble(found, output)
-        _, text = summarize(output, is_new=True)
+        drop_parts(output)  # its own, if it was one of the shards
+        designs, text = summarize(output, is_new=True)
     if not quiet:
         print(text, end="")
         say(f"{output}: {len(found)} shards joined")
+    check_failed(int((designs["status"] == "failed").sum()), max_failed)

@@ -32,12 +32,18 @@ Tolerance = Annotated[
 ]
 
 
-LENGTHS = {"": 1.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6, "m": 1e3}  # in mm
+MICRO = ("um", "\u00b5m", "\u03bcm")  # the micro sign and the Greek letter
+LENGTHS = {"": 1.0, "mm": 1.0, **dict.fromkeys(MICRO, 1e-3), "nm": 1e-6, "m": 1e3}  # in mm
 TargetError = Annotated[
     str | None,
     typer.Option(
         "--target-error", metavar="LENGTH", help="Cheapest way whose tips are this exact: 0.01mm"
     ),
+]
+
+
+MaxFailed = Annotated[
+    int, typer.Option("--max-failed", min=0, help="Designs that may kill their worker")
 ]
 
 
@@ -81,8 +87,9 @@ def millimeters(option: str, text: str) -> float:
     """A length with its unit as a number of mm: 0.01mm, 10um; a plain number is mm."""
     from dpgcli.errors import UsageError
 
-    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)(e[-+]?\d+)?\s*([a-zµ]*)\s*", text)
-    if match is None or match[3] not in LENGTHS:
-        units = ", ".join(filter(None, LENGTHS))
-        raise UsageError(f"{option} {text}: expected a length in {units}, such as 0.01mm")
-    return float(match[1] + (match[2] or "")) * LENGTHS[match[3]]
+    number = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
+    match = re.fullmatch(rf"\s*({number})\s*(\w*)\s*", text)
+    length = float(match[1]) * LENGTHS.get(match[2], 0.0) if match else 0.0
+    if not 0.0 < length < float("inf"):
+        raise UsageError(f"{option} {text}: expected a length > 0 in mm, um, nm or m: 0.01mm")
+    return length

@@ -102,19 +102,14 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 def _check_outputs(spec: Path, output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_writable
+    from dpgcli.files.output import check_outputs
 
-    written = [path for path in (output, plot) if path is not None]
-    for path in written:
-        check_writable(path)
-    if output is not None:
-        written.append(_run_file(output))
-        check_writable(written[-1])
-    for path in written:
+    check_outputs(output, plot)
+    run_file = None if output is None else _run_file(output)
+    check_outputs(output, plot, run_file)
+    for path in filter(None, (output, plot, run_file)):
         if path.exists() and spec.exists() and path.samefile(spec):
             raise UsageError(f"{path} is the spec itself: give another name")
-    if len({path.resolve() for path in written}) < len(written):
-        raise UsageError(f"--output {output} and --plot {plot}: expected two names")
     if output is not None and output.suffix.lower() in (".csv", ".json", ".svg", ".png"):
         raise UsageError(
             f"--output {output}: writes Parquet; for {output.suffix} use --format with > FILE, "

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dpgcli.cli.exits import ExitCode, fail
+
 if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard
 
@@ -35,6 +37,13 @@ def run_facts(progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
         "python": platform.python_version(),
         "command": sys.argv,
     }
+
+
+def check_failed(n_failed: int, max_failed: int) -> None:
+    """End the command with its exit code if more designs failed than may."""
+    if n_failed > max_failed:
+        designs = "design" if n_failed == 1 else "designs"
+        fail(ExitCode.FAILED_CASES, f"{n_failed:,} {designs} failed; --max-failed is {max_failed}")
 
 
 def run_summary(output: Path, progress: "Progress", part: "Shard | None") -> str:

@@ -12,11 +12,11 @@ import typer
 
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
-from dpgcli.cli.exits import ExitCode, Terminated, fail
-from dpgcli.cli.options import Quiet, Settings, TargetError, Tolerance, millimeters
+from dpgcli.cli.exits import ExitCode, Terminated
+from dpgcli.cli.options import MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
-from dpgcli.cli.run import run_facts, run_summary
+from dpgcli.cli.run import check_failed, run_facts, run_summary
 from dpgcli.cli.streams import say
 from dpgcli.cli.validate import ProblemFormat
 
@@ -56,9 +56,6 @@ Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
 ]
-MaxFailed = Annotated[
-    int, typer.Option("--max-failed", min=0, help="Designs that may kill their worker")
-]
 SummaryFile = Annotated[
     Path | None, typer.Option("--summary-file", help="Append the report to this file")
 ]
@@ -86,9 +83,12 @@ def sweep(
     if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
         _start_fork_server_early()
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import sole_use
+    from dpgcli.files.output import check_appendable, sole_use
 
     part = _shard(shard)
+    _check_executor(executor, scheduler)
+    if summary_file is not None:
+        check_appendable(summary_file)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     study = _study(spec, settings or (), output, tolerance, target_error)
@@ -96,7 +96,7 @@ def sweep(
     if depfile is not None:
         write_depfile(depfile, study)
     with sole_use(output):
-        is_new = part is not None or not study.is_up_to_date
+        is_new = not study.is_up_to_date
         if is_new:
             _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
@@ -106,9 +106,8 @@ def sweep(
         if part is None:
             n_failed, is_met = _judge(study, rules, summary_file, is_new, quiet)
         else:
-            n_failed, is_met = len(progress.failures), True
-    if n_failed > max_failed:
-        fail(ExitCode.FAILED_CASES, f"{n_failed:,} designs failed; --max-failed is {max_failed}")
+            n_failed, is_met = study.n_failed, True
+    check_failed(n_failed, max_failed)
     if not is_met:
         raise typer.Exit(ExitCode.REQUIREMENT)
 
@@ -127,15 +126,15 @@ def _study(
     tolerance: float | None,
     target_error: str | None,
 ) -> "Study":
-    from dpgcli.errors import UsageError
     from dpgcli.files.sweep import read_sweep
+    from dpgcli.states.plan import check_exactness
     from dpgcli.states.rungs import DEFAULT_TOLERANCE
     from dpgcli.studies.sweep import Study
 
-    if tolerance is not None and target_error is not None:
-        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
     target = None if target_error is None else millimeters("--target-error", target_error)
-    return Study(read_sweep(spec, settings), output, tolerance or DEFAULT_TOLERANCE, target)
+    exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
+    check_exactness(exactness, target)
+    return Study(read_sweep(spec, settings), output, exactness, target)
 
 
 def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:
@@ -231,12 +230,17 @@ def _shard(text: str | None) -> "Shard | None":
     return Shard(int(match[1]), int(match[2]))
 
 
+def _check_executor(executor: ExecutorName, scheduler: str | None) -> None:
+    from dpgcli.errors import UsageError
+
+    if (executor is ExecutorName.DASK) != (scheduler is not None):
+        raise UsageError("--executor dask and --scheduler tcp://host:port go together")
+
+
 def _workplace(executor: ExecutorName, jobs: int | None, scheduler: str | None) -> "Workplace":
     from dpgcli.errors import UsageError
     from dpgcli.exploration import executors
 
-    if (executor is ExecutorName.DASK) != (scheduler is not None):
-        raise UsageError("--executor dask and --scheduler tcp://host:port go together")
     if scheduler is not None:
         try:
             return executors.dask_cluster(scheduler)

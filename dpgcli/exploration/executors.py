@@ -33,6 +33,7 @@ Arguments = Callable[["Chunk"], tuple[Any, ...]]
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
 CLUSTER_PATIENCE = 10  # s
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GO_ON = "What is done is kept, and the same command goes on from there."
 
 
@@ -112,7 +113,7 @@ class Runner(Generic[T]):
         waiting = deque(chunks)
         while waiting:
             suspects = yield from self._run_until_broken(waiting)
-            if suspects:
+            if suspects or waiting:  # it broke
                 self._check_that_a_worker_starts()
             for chunk in suspects:
                 yield from self._run_alone(chunk)
@@ -192,7 +193,8 @@ def serial() -> Workplace:
 
 def processes(n_workers: int) -> Workplace:
     """A pool of processes on this machine."""
-    return Workplace("the pool of processes", process_pool, n_workers)
+    broken = (BrokenExecutor, EOFError)  # the latter of a fork server that is gone
+    return Workplace("the pool of processes", process_pool, n_workers, broken=broken)
 
 
 def dask_cluster(scheduler: str) -> Workplace:
@@ -244,12 +246,15 @@ def start_fork_server(*modules: str) -> None:
     """
     from multiprocessing import forkserver, resource_tracker
 
-    resource_tracker.ensure_running()  # which would unblock the signal below
     if modules:
         forkserver.set_forkserver_preload(list(modules))
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    # what a terminal sends to all its processes is for this one to answer: the others inherit
+    # that it is blocked; the tracker comes first, since starting it unblocks Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGHUP])
     try:
-        forkserver.ensure_running()  # workers inherit from it that Ctrl-C is blocked
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -277,7 +282,7 @@ def _held_signals() -> Iterator[None]:
     held: list[int] = []
     handlers = {
         number: signal.signal(number, lambda caught, _: held.append(caught))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in STOP_SIGNALS
     }
     try:
         yield

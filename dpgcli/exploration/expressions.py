@@ -59,15 +59,24 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Expression:
-    """A checked expression and the names it needs."""
+    """A checked expression, the names it needs, and whether it is true or false."""
 
     text: str
     names: frozenset[str]
+    is_comparison: bool
 
     def __call__(self, values: Values) -> Any:
-        """The value for these names, numbers or arrays; division by zero gives inf or NaN."""
+        """The value for these names, numbers or arrays.
+
+        NaN where any part of it has no finite value, as in a division by zero: then neither a
+        comparison nor its opposite holds.
+        """
+        undefined: list[Any] = []
         with np.errstate(all="ignore"):
-            return _value(ast.parse(_without_digits(self.text), mode="eval").body, values)
+            body = ast.parse(_without_digits(self.text), mode="eval").body
+            value = _value(body, values, undefined)
+        is_undefined = reduce(np.logical_or, undefined, np.False_)
+        return np.where(is_undefined, np.nan, value) if np.any(is_undefined) else value
 
 
 def expression(text: str) -> Expression:
@@ -85,7 +94,10 @@ def expression(text: str) -> Expression:
         body = ast.parse(_without_digits(text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"not an expression: {text!r}") from error
-    return Expression(text.strip(), frozenset(_names(body, DEEPEST)))
+    is_comparison = isinstance(body, ast.Compare | ast.BoolOp) or (
+        isinstance(body, ast.UnaryOp) and isinstance(body.op, ast.Not)
+    )
+    return Expression(text.strip(), frozenset(_names(body, DEEPEST)), is_comparison)
 
 
 def _without_digits(text: str) -> str:
@@ -157,14 +169,16 @@ def _as_number(value: Any) -> Any:
     return np.multiply(value, 1.0)
 
 
-def _value(node: ast.expr, values: Values) -> Any:
+def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
+    """The value of a node; where finite parts have none, `undefined` learns of it."""
     if (number := _number(node)) is not None:
         return float(number)
     if name := _dotted(node):
         return values[name]
-    parts = [_value(part, values) for part in _parts(node)]
+    parts = [_value(part, values, undefined) for part in _parts(node)]
     if isinstance(node, ast.BinOp):
-        return _ARITHMETIC[type(node.op)](*map(_as_number, parts))
+        parts = list(map(_as_number, parts))
+        return _defined(_ARITHMETIC[type(node.op)](*parts), parts, undefined)
     if isinstance(node, ast.UnaryOp):
         operand = parts[0] if isinstance(node.op, ast.Not) else _as_number(parts[0])
         return _UNARY[type(node.op)](operand)
@@ -175,4 +189,10 @@ def _value(node: ast.expr, values: Values) -> Any:
         pairs = zip(node.ops, parts[:-1], parts[1:], strict=True)
         return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
     assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name), "checked before"
-    return _FUNCTIONS[node.func.id](*parts)
+    return _defined(_FUNCTIONS[node.func.id](*parts), parts, undefined)
+
+
+def _defined(value: Any, parts: list[Any], undefined: list[Any]) -> Any:
+    are_finite = reduce(np.logical_and, map(np.isfinite, parts))
+    undefined.append(are_finite & ~np.isfinite(value))
+    return value

@@ -32,6 +32,23 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def check_outputs(*paths: Path | None) -> None:
+    """Fail before the work: files that can be written, under names that differ."""
+    given = [path for path in paths if path is not None]
+    for path in given:
+        check_writable(path)
+    if len({path.resolve() for path in given}) < len(given):
+        raise UsageError(f"{', '.join(map(str, given))}: expected names that differ")
+
+
+def check_appendable(path: Path) -> None:
+    """Fail before the work rather than after it."""
+    try:
+        path.open("ab").close()
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
 def check_writable(path: Path) -> None:
     """Fail before the work rather than after it."""
     try:
@@ -53,6 +70,8 @@ def sole_use(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY)
+    except FileExistsError as error:
+        raise OutputError(f"cannot write {folder}: it is no folder") from error
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror}") from error
     try:

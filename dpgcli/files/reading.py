@@ -1,6 +1,8 @@
 """Tables of designs and facts of runs, read back."""
 
+import csv
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.errors import UsageError
 
 TIP_COLUMNS = ("pattern", "tip_x_mm", "tip_y_mm")
+LONGEST = 1e12  # mm
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 
 
@@ -61,36 +64,71 @@ def read_run(path: Path) -> dict[str, Any] | None:
 def read_tips(path: Path, n_units: int) -> tuple[Flags, Array]:
     """Known tips: patterns, (unit, state), and their tips x, y in mm, (2, state), from CSV.
 
-    Raises UsageError, with the line, for what is no such file.
+    Lines that start with # are comments. Raises UsageError, with the line, for what is no such
+    file.
     """
     try:
-        table = pd.read_csv(path, dtype={"pattern": str}, comment="#")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:  # pandas' own are its children
-        raise UsageError(f"cannot read {path}: {error}") from error
-    missing = [name for name in TIP_COLUMNS if name not in table]
+    except UnicodeDecodeError as error:
+        raise UsageError(f"cannot read {path}: not UTF-8 text") from error
+    lines = enumerate(text.splitlines(), start=1)
+    rows = [
+        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        for number, line in lines
+        if line.strip() and not line.startswith("#")
+    ]
+    (_, names), *states = rows or [(1, [""])]
+    missing = [name for name in TIP_COLUMNS if name not in names]
     if missing:
-        found = ", ".join(map(str, table.columns))
-        raise UsageError(f"{path}: no column {', '.join(missing)}; found {found}")
-    tips = table[["tip_x_mm", "tip_y_mm"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
-    for line, (pattern, tip) in enumerate(zip(table["pattern"], tips, strict=True), start=2):
-        if not re.fullmatch(f"[01]{{{n_units}}}", str(pattern)):
-            raise UsageError(
-                f"{path}:{line}: expected a pattern of {n_units} digits 0 and 1, found {pattern}"
-            )
-        if not np.isfinite(tip).all():
-            raise UsageError(f"{path}:{line}: expected numbers in mm, found no number")
-    if table.empty:
+        hint = "; separate columns with commas" if ";" in names[0] else ""
+        found = ", ".join(names)
+        raise UsageError(f"{path}: no column {', '.join(missing)}; found {found}{hint}")
+    if not states:
         raise UsageError(f"{path}: no states in it")
-    flags = np.array([[digit == "1" for digit in pattern] for pattern in table["pattern"]]).T
-    return flags, tips.T
+    tips: dict[str, tuple[float, float]] = {}
+    for number, cells in states:
+        if len(cells) != len(names):
+            raise UsageError(f"{path}:{number}: expected {len(names)} cells, found {len(cells)}")
+        pattern, tip = _tip(dict(zip(names, cells, strict=True)), n_units, f"{path}:{number}")
+        if pattern in tips:
+            raise UsageError(f"{path}:{number}: {pattern} for the second time")
+        tips[pattern] = tip
+    flags = np.array([[digit == "1" for digit in pattern] for pattern in tips]).T
+    return flags, np.array(list(tips.values())).T
 
 
-def read_record(path: Path) -> list[dict[str, Any]]:
-    """The rows of a benchmark that was recorded. Raises UsageError for other content."""
+def _tip(cells: dict[str, str], n_units: int, place: str) -> tuple[str, tuple[float, float]]:
+    """The pattern and the tip of one line."""
+    pattern = cells["pattern"]
+    if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
+        raise UsageError(f"{place}: pattern: expected {n_units} digits 0 and 1, found {pattern!r}")
+    x, y = (_number(cells, name, place) for name in TIP_COLUMNS[1:])
+    return pattern, (x, y)
+
+
+def _number(cells: dict[str, str], name: str, place: str) -> float:
+    try:
+        value = float(cells[name])
+    except ValueError:
+        value = math.nan
+    if not abs(value) < LONGEST:
+        raise UsageError(f"{place}: {name}: expected a length in mm, found {cells[name]!r}")
+    return value
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """A benchmark that was recorded. Raises UsageError for other content."""
     facts = read_run(path)
     rows = None if facts is None else facts.get("rows")
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+    if facts is None or not isinstance(rows, list) or not all(map(_is_measured, rows)):
         raise UsageError(f"{path} is no record of dpg bench --json")
-    return rows
+    return facts
+
+
+def _is_measured(row: Any) -> bool:
+    if not isinstance(row, dict):
+        return False
+    time = row.get("relative_time")
+    return isinstance(row.get("way"), str) and isinstance(time, int | float | None)

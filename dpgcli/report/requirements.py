@@ -74,12 +74,12 @@ def requirement(text: str, columns: Collection[str]) -> Expression:
             raise UsageError(
                 f"--require {text!r}: no column {name} of numbers; the nearest is {nearest[0]}"
             )
-        truth = np.asarray(rule(dict.fromkeys(rule.names, 1.0)))
+        rule(dict.fromkeys(rule.names, 1.0))
     except ExpressionError as error:
         raise UsageError(f"--require {text!r}: {error}") from error
     except (TypeError, ValueError, RecursionError) as error:
         raise UsageError(f"--require {text!r}: cannot be evaluated") from error
-    if truth.dtype != bool:
+    if not rule.is_comparison:
         raise UsageError(f"--require {text!r}: expected a comparison, found a number")
     return rule
 
@@ -98,13 +98,14 @@ def swept_names(designs: pd.DataFrame) -> list[str]:
 def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
     """Numbers of the rows that do not meet a requirement; excluded designs are left aside.
 
-    A design without a stable state meets none, nor does one where a value is NaN.
+    A design without a stable state meets none, nor does one where a value is NaN or has none.
     """
     values = {name: designs[name].to_numpy() for name in rule.names}
     met = designs["n_stable"].to_numpy() > 0
     for column in values.values():
         met &= ~np.isnan(column)
-    met &= np.broadcast_to(rule(values), len(designs))
+    truth = np.broadcast_to(np.asarray(rule(values), float), len(designs))
+    met &= np.isfinite(truth) & (truth != 0.0)
     return np.flatnonzero(~met & _in_question(designs))
 
 

@@ -190,22 +190,24 @@ def _check(scene: Scene, request: Request) -> None:
             "--formulation lattice needs a finite finger.linear_stiffness_N_per_mm: "
             "node coordinates cannot drop rigid bars; use the chain"
         )
-    if not SMALLEST_TOLERANCE <= request.tolerance <= 1e-3:
+    check_exactness(request.tolerance, request.target_error)
+    if request.target_error is not None and request.formulation != "chain":
+        raise UsageError("--target-error chooses among ways of the chain: drop --formulation")
+
+
+def check_exactness(tolerance: float, target_error: float | None) -> None:
+    """Raise UsageError for a tolerance or a target error (mm) that makes no sense."""
+    if not SMALLEST_TOLERANCE <= tolerance <= 1e-3:
         raise UsageError(
-            f"--tolerance {request.tolerance}: expected {SMALLEST_TOLERANCE} … 0.001 "
+            f"--tolerance {tolerance}: expected {SMALLEST_TOLERANCE} … 0.001 "
             "of the forces in play; below, rounding decides"
         )
-    if request.target_error is not None:
-        _check_target(request)
-
-
-def _check_target(request: Request) -> None:
-    if not request.target_error or not 0.0 < request.target_error < np.inf:
-        raise UsageError(f"--target-error {request.target_error}: expected a length > 0")
-    if request.tolerance != DEFAULT_TOLERANCE or request.formulation != "chain":
-        raise UsageError(
-            "--target-error chooses the tolerance, in the chain: drop --tolerance and --formulation"
-        )
+    if target_error is None:
+        return
+    if not 0.0 < target_error < np.inf:
+        raise UsageError(f"--target-error {target_error} mm: expected a length > 0")
+    if tolerance != DEFAULT_TOLERANCE:
+        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
 
 
 def _rung(units: Units, target: float | None) -> tuple[Rung | None, float]:

@@ -20,7 +20,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.plan import Request
+from dpgcli.states.plan import Request, check_exactness
 from dpgcli.states.predict import predict
 from dpgcli.states.rows import Columns
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
@@ -84,7 +84,8 @@ class Bench:
         return self.scene.finger
 
     def check(self) -> None:
-        """Raise UsageError for what cannot be put back."""
+        """Raise UsageError for a target that makes no sense, and what cannot be put back."""
+        check_exactness(DEFAULT_TOLERANCE, self.target_error)
         for name in self.keep:
             check_kept(self.scene, name, self.target_error)
 

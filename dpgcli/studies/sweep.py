@@ -18,7 +18,7 @@ from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.studies.evaluation import Evaluation, Numbers, Tables, value_columns
+from dpgcli.studies.evaluation import DesignStatus, Evaluation, Numbers, Tables, value_columns
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
@@ -132,6 +132,12 @@ class Study:
             for name in (STATES, DESIGNS)
         )
 
+    @property
+    def n_failed(self) -> int:
+        """How many designs of the parts that are there have failed."""
+        batches = (batch for part in self.store.parts() for batch in part.batches(1))
+        return sum(batch["status"].to_pylist().count(DesignStatus.FAILED) for batch in batches)
+
     def check_room(self) -> None:
         """Refuse a sweep whose tables the disk cannot hold; raises UsageError."""
         missing = self.store.missing([(0, self.sweep.space.size)])
@@ -157,7 +163,7 @@ class Study:
 
     def drop_unfinished(self) -> None:
         """Remove what unfinished sweeps left in the folder."""
-        shutil.rmtree(self.folder / PARTS, ignore_errors=True)
+        drop_parts(self.folder)
 
     def compute(
         self, workplace: Workplace, watch: Callable[[Progress], None], shard: Shard | None = None
@@ -231,6 +237,11 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     for which, name in enumerate((STATES, DESIGNS)):
         batches = (batch for part in parts for batch in part.batches(which))
         write_table(folder / name, parts[0].schema(which), batches, metadata)
+
+
+def drop_parts(folder: Path) -> None:
+    """Remove what unfinished sweeps left in a folder."""
+    shutil.rmtree(folder / PARTS, ignore_errors=True)
 
 
 def stores(folder: Path) -> list[PartStore]:

@@ -64,6 +64,26 @@ def test_what_got_slower_is_said(call: Any, folder: Path) -> None:
     assert all("chain, 1e-09, 3 units" in line for line in slower)
 
 
+def test_a_record_of_another_finger_or_of_nothing_is_refused(call: Any, folder: Path) -> None:
+    assert call(*BENCH, "--json", "b.json", "-q").exit_code == ExitCode.DONE
+    other = ("-s", "finger.geometry.chamber_length_mm=20", "--compare", "b.json")
+    result = call(*BENCH, *other)
+    assert result.exit_code == ExitCode.USAGE
+    assert "of another finger, differs in spec.finger.geometry.chamber_length_mm" in result.stderr
+    for rows in ([{"group": []}], [{"way": "chain", "relative_time": "1"}], [3], {}):
+        (folder / "b.json").write_text(json.dumps({"rows": rows}))
+        result = call(*BENCH, "--compare", "b.json")
+        assert result.exit_code == ExitCode.USAGE
+        assert "b.json is no record of dpg bench --json" in result.stderr
+
+
+def test_a_record_is_json_as_the_standard_has_it(call: Any, folder: Path) -> None:
+    options = ("-s", "finger.linear_stiffness_N_per_mm=.inf", "--json", "b.json", "-q")
+    assert call(*BENCH, *options).exit_code == ExitCode.DONE
+    record = json.loads((folder / "b.json").read_text(), parse_constant=pytest.fail)
+    assert {row["stiffness_ratio"] for row in record["rows"]} >= {".inf"}
+
+
 def test_the_models_own_error(call: Any, folder: Path) -> None:
     (folder / "fe.csv").write_text(
         "# measured by hand\npattern,tip_y_mm,tip_x_mm\n111,-14,36\n000,0,40.5\n"
@@ -77,10 +97,20 @@ def test_the_models_own_error(call: Any, folder: Path) -> None:
     [
         ("pattern,tip_x_mm\n111,3\n", "no column tip_y_mm; found pattern, tip_x_mm"),
         ("pattern,tip_x_mm,tip_y_mm\n", "no states in it"),
-        ("pattern,tip_x_mm,tip_y_mm\n11,1,2\n", "fe.csv:2: expected a pattern of 3 digits"),
-        ("pattern,tip_x_mm,tip_y_mm\n111,1,2\n101,x,2\n", "fe.csv:3: expected numbers in mm"),
-        ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: expected numbers in mm"),
-        ("", "cannot read fe.csv"),
+        (
+            "pattern,tip_x_mm,tip_y_mm\n11,1,2\n",
+            "fe.csv:2: pattern: expected 3 digits 0 and 1",
+        ),
+        (
+            "pattern,tip_x_mm,tip_y_mm\n111,1,2\n101,x,2\n",
+            "fe.csv:3: tip_x_mm: expected a length",
+        ),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: tip_y_mm: expected a length"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,1e300\n", "fe.csv:2: tip_y_mm: expected a length"),
+        ("pattern,tip_x_mm,tip_y_mm\n\n# b\n111,1,2\n111,1,2\n", "fe.csv:5: 111 for the second"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,2,3\n", "fe.csv:2: expected 3 cells, found 4"),
+        ("pattern;tip_x_mm;tip_y_mm\n111;1;2\n", "separate columns with commas"),
+        ("", "no column pattern, tip_x_mm, tip_y_mm"),
     ],
 )
 def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: str) -> None:
@@ -96,7 +126,11 @@ def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: s
         (("--keep", "gravity"), "--keep gravity: expected rigid-bars, hinges, "),
         (("--keep", "second-finger"), "this scene does not leave it out"),
         (("--plot", "b.pdf"), "expected a name that ends in .svg or .png"),
-        (("--target-error", "soon"), "--target-error soon: expected a length in mm"),
+        (("--target-error", "soon"), "--target-error soon: expected a length > 0 in mm"),
+        (("--target-error", "0"), "--target-error 0: expected a length > 0 in mm"),
+        (("--output", "b", "--json", "b"), "expected names that differ"),
+        (("--json", "none/b.json"), "cannot write none/b.json"),
+        (("--plot", "none/b.svg"), "cannot write none/b.svg"),
         (("--against", "none.csv"), "cannot read none.csv"),
         (("--compare", "three_unit.yaml"), "not JSON"),
         (("--compare", "none.json"), "no record of dpg bench --json"),

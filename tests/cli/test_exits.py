@@ -22,7 +22,7 @@ COMMANDS = {
     "bench": "--set --repeats --target-error --keep --against --format --output --plot --json "
     "--compare --quiet",
     "stress": "--only --set --format --output --quiet",
-    "merge": "--output --quiet",
+    "merge": "--output --max-failed --quiet",
     "check": "--require --format --summary-file",
     "report": "--output",
     "validate": "--format --set",

@@ -286,7 +286,7 @@ def test_a_design_that_kills_its_worker_is_a_row_and_has_its_exit_code(
 ) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
     assert result.exit_code == ExitCode.FAILED_CASES
-    assert "dpg: 1 designs failed; --max-failed is 0" in result.stderr
+    assert "dpg: 1 design failed; --max-failed is 0" in result.stderr
     designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
     expected = ["stable", "invalid", "failed", "stable", "stable", "stable"]
     assert designs["status"].tolist() == expected
@@ -348,3 +348,57 @@ def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:
     assert facts["states_per_second"] == pytest.approx(
         40 / (facts["seconds"] + facts["tables_seconds"])
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--tolerance", "0"), "--tolerance 0.0: expected 1e-14"),
+        (("--tolerance", "nan"), "--tolerance nan: expected 1e-14"),
+        (("--tolerance", "1"), "--tolerance 1.0: expected 1e-14"),
+        (("--target-error", "0"), "--target-error 0: expected a length > 0"),
+        (("--target-error", "1e400mm"), "--target-error 1e400mm: expected a length > 0"),
+        (("--target-error", "1mm", "--tolerance", "1e-6"), "drop --tolerance"),
+        (("--scheduler", "tcp://x:1"), "go together"),
+        (("--summary-file", "none/s.md"), "cannot write none/s.md"),
+    ],
+)
+def test_options_are_checked_even_if_all_is_up_to_date(
+    call: Any, sweep: Path, options: tuple[str, ...], said: str
+) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    result = call("sweep", "sweep.yaml", *SERIAL, *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+
+
+def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
+    out = sweep.parent / "out"
+    result = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "10nm")
+    assert result.exit_code == ExitCode.DONE
+    fine = pd.read_parquet(out / "designs.parquet").dropna()
+    assert set(fine["rung"]) <= {"tolerance 1e-09", "tolerance 1e-12"}
+    assert (fine["error_bound_mm"] <= 1e-5).all()
+    again = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "0.00001mm")
+    assert "up to date" in again.stderr
+    assert call("sweep", "sweep.yaml", *SERIAL, "--target-error", "1mm").exit_code == 0
+    rough = pd.read_parquet(out / "designs.parquet").dropna()
+    assert set(rough["rung"]) == {"rigid bars"}
+    assert (rough["max_tip_error_mm"] <= rough["error_bound_mm"]).all()
+    assert (rough["error_bound_mm"] <= 1.0).all()
+    moved = abs(rough["reach_max_mm"] - fine["reach_max_mm"]).max()
+    assert 1e-6 < moved <= rough["error_bound_mm"].max()
+
+
+@pytest.mark.usefixtures("design_2_kills")
+def test_shards_with_failed_designs_have_the_exit_code_every_time(call: Any, sweep: Path) -> None:
+    for number in (1, 2, 1, 2):
+        shard = ("--shard", f"{number}/2", "-o", f"s{number}", *SERIAL[2:])
+        found = call("sweep", "sweep.yaml", *shard).exit_code
+        assert found == (ExitCode.FAILED_CASES if number == 1 else ExitCode.DONE)
+    merged = call("merge", "s1", "s2", "-o", "s1")
+    assert merged.exit_code == ExitCode.FAILED_CASES
+    assert not (sweep.parent / "s1" / ".parts").exists()
+    assert call("merge", "s1", "s2", "-o", "s3").exit_code == ExitCode.USAGE
+    again = call("sweep", "sweep.yaml", "-o", "s1", "--shard", "1/2", *SERIAL[2:])
+    assert "up to date" in again.stderr

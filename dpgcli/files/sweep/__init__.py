@@ -249,6 +249,8 @@ class _SpaceReader:
         except ExpressionError as error:
             self.wrong(path, "an expression over keys", shown(text), str(error))
             return None
+        if not rule.is_comparison:
+            self.wrong(path, "a comparison, such as dome_height_mm > 5", shown(text))
         numbers = {k for k, v in flattened(data).items() if type(v) in (int, float)}
         known = self.keys | numbers
         last = Counter(name.rsplit(".", 1)[-1] for name in known)
