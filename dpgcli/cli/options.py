@@ -1,6 +1,8 @@
 """Arguments and options that several commands share."""
 
 import re
+from contextlib import suppress
+from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,7 +35,7 @@ Tolerance = Annotated[
 
 
 MICRO = ("um", "\u00b5m", "\u03bcm")  # the micro sign and the Greek letter
-LENGTHS = {"": 1.0, "mm": 1.0, **dict.fromkeys(MICRO, 1e-3), "nm": 1e-6, "m": 1e3}  # in mm
+POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of ten, in mm
 TargetError = Annotated[
     str | None,
     typer.Option(
@@ -89,7 +91,10 @@ def millimeters(option: str, text: str) -> float:
 
     number = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
     match = re.fullmatch(rf"\s*({number})\s*(\w*)\s*", text)
-    length = float(match[1]) * LENGTHS.get(match[2], 0.0) if match else 0.0
+    length = 0.0
+    if match is not None and match[2] in POWERS:
+        with suppress(ArithmeticError):  # beyond what a number can be
+            length = float(Decimal(match[1]).scaleb(POWERS[match[2]]))
     if not 0.0 < length < float("inf"):
         raise UsageError(f"{option} {text}: expected a length > 0 in mm, um, nm or m: 0.01mm")
     return length

@@ -386,7 +386,7 @@ def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
     assert set(rough["rung"]) == {"rigid bars"}
     assert (rough["max_tip_error_mm"] <= rough["error_bound_mm"]).all()
     assert (rough["error_bound_mm"] <= 1.0).all()
-    moved = abs(rough["reach_max_mm"] - fine["reach_max_mm"]).max()
+    moved = abs(rough["reach_min_mm"] - fine["reach_min_mm"]).max()
     assert 1e-6 < moved <= rough["error_bound_mm"].max()
 
 
