@@ -6,6 +6,7 @@ Arrays become columns without a copy; `pyarrow.array` is avoided, since it impor
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -67,14 +68,21 @@ def write_states(
 
 
 def write_table(
-    path: Path, described: Any, batches: Iterable[Any], metadata: dict[str, str]
+    path: Path,
+    described: Any,
+    batches: Iterable[Any],
+    metadata: dict[str, str],
+    *,
+    in_thread: bool = False,
 ) -> None:
     """Write record batches, as they come, to a Parquet file.
 
-    The same rows give the same bytes, however they are cut into batches. Raises OutputError,
-    and leaves no half-written file whatever happens.
+    The same rows give the same bytes, however they are cut into batches. Batches that may be
+    made in another thread are made `in_thread` while those before are compressed. Raises
+    OutputError, and leaves no half-written file whatever happens.
     """
     digest = hashlib.sha256()
+    groups = _hashed(_row_groups(batches, described), digest)
     with (
         whole_file(path) as temporary,
         temporary.open("wb") as stream,  # pyarrow takes no name that is not text
@@ -89,9 +97,7 @@ def write_table(
             use_byte_stream_split=[f.name for f in described if pa.types.is_floating(f.type)],
         ) as writer,
     ):
-        for group in _row_groups(batches, described):
-            for column in group.columns:
-                _hash(digest, column)
+        for group in _ahead(groups) if in_thread else groups:
             writer.write_batch(group, row_group_size=ROWS_PER_GROUP)
         writer.add_key_value_metadata({"dpg.content_sha256": digest.hexdigest()})
 
@@ -147,6 +153,22 @@ def _row_groups(batches: Iterable[Any], described: Any) -> Iterator[Any]:
             waiting = joined.slice(ROWS_PER_GROUP).to_batches()
             n_waiting -= ROWS_PER_GROUP
     yield _one_batch(pa.Table.from_batches(waiting, described), described)
+
+
+def _hashed(groups: Iterable[Any], digest: Any) -> Iterator[Any]:
+    for group in groups:
+        for column in group.columns:
+            _hash(digest, column)
+        yield group
+
+
+def _ahead(items: Iterator[Any]) -> Iterator[Any]:
+    """The items, each made in a thread while the caller still works on the one before."""
+    with ThreadPoolExecutor(1) as thread:
+        coming = thread.submit(next, items, None)
+        while (item := coming.result()) is not None:
+            coming = thread.submit(next, items, None)
+            yield item
 
 
 def _one_batch(table: Any, described: Any) -> Any:

@@ -236,7 +236,7 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
         covered = part.stop if part else covered
     for which, name in enumerate((STATES, DESIGNS)):
         batches = (batch for part in parts for batch in part.batches(which))
-        write_table(folder / name, parts[0].schema(which), batches, metadata)
+        write_table(folder / name, parts[0].schema(which), batches, metadata, in_thread=True)
 
 
 def drop_parts(folder: Path) -> None:
