@@ -21,6 +21,8 @@ from dpgcli.cli.streams import say
 from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from dpgcli.exploration.executors import Workplace
     from dpgcli.exploration.expressions import Expression
     from dpgcli.report.requirements import Verdict
@@ -192,12 +194,22 @@ def _judge(
     designs, text = summarize(study.folder, is_new=is_new)
     if is_new and not quiet:
         print(text, end="")
+        if study.target_error is not None:
+            say(_chosen(designs))
     verdicts: Sequence[Verdict] = check_requirements(designs, rules) if rules else ()
     if summary_file is not None:
         append_summary(summary_file, text + ("\n" + verdicts_markdown(verdicts) if rules else ""))
     print_verdicts(verdicts, ProblemFormat.TEXT)
     is_met = all(verdict.is_met for verdict in verdicts)
     return int((designs["status"] == "failed").sum()), is_met
+
+
+def _chosen(designs: "pd.DataFrame") -> str:
+    """What the designs took for the target error."""
+    counts = designs.loc[designs["rung"] != "", "rung"].value_counts()
+    ways = ", ".join(f"{count:,} {rung}" for rung, count in counts.items())
+    bound = designs["error_bound_mm"].max()
+    return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 
 
 def _computed(

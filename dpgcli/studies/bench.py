@@ -28,7 +28,7 @@ from dpgcli.states.solve import Units, certify, solve, tip
 from dpgcli.studies.kept import check_kept, kept_ways
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
-PEER_STATES = 8
+PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
 BATCH = 4096  # states of a call, as in a sweep
 GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16)
 GROWTH_DESIGNS = (1, 4, 16, 64, 256, 1024)
@@ -102,7 +102,8 @@ class Bench:
         yield from self._ladder(patterns, reference)
         yield from self._alone(patterns, reference)
         if not self.finger.is_rigid:
-            few = slice(None, None, max(1, patterns.shape[1] // PEER_STATES))
+            most = max(1, PEER_STATES // math.ceil(self.finger.n_units / MANY_UNITS))
+            few = slice(None, None, -(-patterns.shape[1] // most))
             for way in other_ways(self.finger, patterns[:, few]):
                 yield self._row(way, _only(reference, few))
         if self.measured_tips is not None and self.measured_patterns is not None:

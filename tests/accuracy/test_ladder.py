@@ -83,6 +83,13 @@ def test_times_are_ordered_and_of_one_call() -> None:
     assert times.wall < 0.1, "a call, not a round of calls"
 
 
+def test_a_long_call_is_timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dpgcli.accuracy.timing.LONGEST", 0.0)
+    calls = []
+    times = measured(lambda: calls.append(1), 9)
+    assert (len(calls), times.wall_min) == (1, times.wall_max)
+
+
 def test_the_kernel_is_fixed_work() -> None:
     assert numpy_kernel()() == pytest.approx(numpy_kernel()())
 

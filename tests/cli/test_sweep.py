@@ -376,6 +376,7 @@ def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
     out = sweep.parent / "out"
     result = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "10nm")
     assert result.exit_code == ExitCode.DONE
+    assert "chosen for the target error: " in result.stderr
     fine = pd.read_parquet(out / "designs.parquet").dropna()
     assert set(fine["rung"]) <= {"tolerance 1e-09", "tolerance 1e-12"}
     assert (fine["error_bound_mm"] <= 1e-5).all()
