@@ -12,6 +12,7 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 # A shell that starts the tests in the background makes them, and what they start, deaf to
 # Ctrl-C; a handler of our own is reset to the default in every program that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup would have ignored
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")

@@ -130,13 +130,19 @@ def undisturbed(launch: Launch, folder: Path) -> tuple[dict[str, bytes], float]:
 
 
 def stop(process: "subprocess.Popen[bytes]", way: str) -> None:
-    if way == "ctrl-c":
-        os.killpg(process.pid, signal.SIGINT)
+    if way in GROUP_SIGNALS:
+        os.killpg(process.pid, GROUP_SIGNALS[way])
     else:
         process.send_signal(getattr(signal, way))
 
 
+def number_of(way: str) -> int:
+    return int(GROUP_SIGNALS.get(way) or getattr(signal, way))
+
+
+GROUP_SIGNALS = {"ctrl-c": signal.SIGINT, "hang-up": signal.SIGHUP}
 WAYS = {
+    "hang-up": (ExitCode.TERMINATED, "terminated"),
     "ctrl-c": (ExitCode.INTERRUPTED, "interrupted"),
     "SIGINT": (ExitCode.INTERRUPTED, "interrupted"),
     "SIGTERM": (ExitCode.TERMINATED, "terminated"),
@@ -162,7 +168,7 @@ def disturb(
         assert wait_until(lambda: not family(mark), 10), f"orphans after {way}"
         if process.returncode not in (0, 1) or was_running:
             code, word = WAYS[way]
-            assert process.returncode in (code, 0, -getattr(signal, way, 2)), (way, errors)
+            assert process.returncode in (code, 0, -number_of(way)), (way, errors)
             if way != "SIGKILL":  # then Python's resource tracker complains
                 assert "Traceback" not in errors, (way, errors)
                 assert len(errors.splitlines()) <= 1, (way, errors)
@@ -188,7 +194,7 @@ def test_stopped_at_random_many_times(
     assert disturb(launch, folder, mark, seconds, seed, n_times=8) == expected
 
 
-@pytest.mark.parametrize("way", ["ctrl-c", "SIGTERM"])
+@pytest.mark.parametrize("way", ["ctrl-c", "SIGTERM", "hang-up"])
 def test_an_interrupt_under_way_says_how_to_go_on(
     launch: Launch, folder: Path, mark: str, way: str
 ) -> None:
@@ -204,7 +210,7 @@ def test_an_interrupt_under_way_says_how_to_go_on(
     assert wait_until(lambda: not family(mark), 5)
 
 
-@pytest.mark.parametrize("way", ["ctrl-c", "SIGTERM"])
+@pytest.mark.parametrize("way", ["ctrl-c", "SIGTERM", "hang-up"])
 def test_an_interrupt_while_the_workers_start(
     launch: Launch, folder: Path, mark: str, way: str
 ) -> None:
