@@ -100,7 +100,7 @@ def _recorded(path: Path, said: str) -> "Sequence[Row]":
     """The rows of a record of the same finger."""
     from dpgcli.errors import UsageError
     from dpgcli.files.reading import read_record
-    from dpgcli.studies.sweep import differences
+    from dpgcli.studies.differences import differences
 
     facts = read_record(path)
     changed = differences({"spec": str(facts.get("spec"))}, {"spec": said})

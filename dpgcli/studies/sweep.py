@@ -7,18 +7,19 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import perf_counter, process_time
-from typing import Any, NamedTuple
+from time import perf_counter
 
 from dpgcli.errors import UsageError
-from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
-from dpgcli.files.parts import PartStore, encoded
+from dpgcli.exploration.executors import Runner, Workplace, chunked
+from dpgcli.files.parts import PartStore
 from dpgcli.files.spec import spelled
 from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.studies.evaluation import DesignStatus, Evaluation, Numbers, Tables, value_columns
+from dpgcli.studies.differences import differences
+from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
+from dpgcli.studies.work import Work
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
@@ -249,48 +250,6 @@ def stores(folder: Path) -> list[PartStore]:
     return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
 
 
-class Done(NamedTuple):
-    """What a worker sends back: counts, CPU seconds, and the part if it could not store it.
-
-    Without the bytes it is shorter than what a pipe takes at once: a worker that is killed
-    while it sends leaves no half of a message, for the rest of which the pool would wait.
-    """
-
-    n_states: int
-    core_seconds: float
-    writing_seconds: float
-    content: bytes | None
-
-
-@dataclass(frozen=True)
-class Work:
-    """What a worker does with a chunk; `store` is None where it sees no common disk."""
-
-    evaluation: Evaluation
-    store: PartStore | None
-
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers]) -> Done:
-        """Evaluate a chunk's designs, with these values by key, into a part."""
-        began = process_time()
-        tables = self.evaluation(chunk.start, values)
-        return self.stored(chunk, tables, process_time() - began)
-
-    def stored(self, chunk: Chunk, tables: Tables, core_seconds: float) -> Done:
-        """Store the part, or send it along."""
-        began = process_time()
-        n_states = len(tables.states["design"])
-        content = encoded(
-            self.evaluation.state_columns,
-            tables.states,
-            self.evaluation.design_columns,
-            tables.designs,
-        )
-        if self.store is None:
-            return Done(n_states, core_seconds, process_time() - began, content)
-        self.store.write(chunk.start, chunk.stop, content)
-        return Done(n_states, core_seconds, process_time() - began, None)
-
-
 def _size(n_bytes: float) -> str:
     """A number of bytes as people say it."""
     for unit in ("bytes", "KiB", "MiB", "GiB"):
@@ -304,35 +263,3 @@ def _existing(folder: Path) -> Path:
     """The folder, or the nearest above it that exists."""
     folder = folder.absolute()
     return folder if folder.exists() else _existing(folder.parent)
-
-
-def differences(old: dict[str, str], new: dict[str, str]) -> list[str]:
-    """Dotted keys in which two sweeps' metadata differ; JSON texts are looked into."""
-    plain = [
-        {key: _parsed(text) for key, text in said.items() if key != "dpg.fingerprint"}
-        for said in (old, new)
-    ]
-    return [path.removeprefix("dpg.") for path in _changes(plain[0], plain[1])]
-
-
-def _parsed(text: str) -> Any:
-    """A JSON text as data, JSON texts within it too; other text as it is."""
-    try:
-        data = json.loads(text)
-    except ValueError:
-        return text
-    if isinstance(data, dict):
-        return {k: _parsed(v) if isinstance(v, str) else v for k, v in data.items()}
-    return data
-
-
-def _changes(old: Any, new: Any, path: str = "") -> list[str]:
-    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        old, new = (dict(enumerate(part)) for part in (old, new))
-    if isinstance(old, dict) and isinstance(new, dict):
-        return [
-            change
-            for key in sorted({*old, *new})
-            for change in _changes(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
-        ]
-    return [] if old == new else [path]

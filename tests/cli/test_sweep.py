@@ -21,7 +21,8 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.exploration.executors import Chunk
 from dpgcli.files.output import sole_use
 from dpgcli.files.sweep import read_sweep
-from dpgcli.studies.sweep import Study, Work
+from dpgcli.studies.sweep import Study
+from dpgcli.studies.work import Work
 
 HEIGHT = "finger.geometry.dome_height_mm"
 SEPARATION = "finger.geometry.unit_separation_mm"
