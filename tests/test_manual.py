@@ -17,6 +17,7 @@ from dpgcli.accuracy.stress import Verdict
 from dpgcli.cli import (
     bench,
     check,
+    compare,
     explain,
     init,
     merge,
@@ -45,6 +46,7 @@ COMMANDS = (
     explain.explain,
     sweep.sweep,
     bench.bench,
+    compare.compare,
     stress.stress,
     merge.merge,
     check.check,

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dpgcli.cli.options import Quiet, Settings, SpecPath, TargetError, millimeters
+from dpgcli.cli.options import (
+    FirstStation,
+    Quiet,
+    Settings,
+    SpecPath,
+    TargetError,
+    TipOffset,
+    frame_of,
+    millimeters,
+)
 from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
 from dpgcli.cli.streams import say
 
@@ -51,6 +60,8 @@ def bench(
     against: Annotated[
         Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
     ] = None,
+    first_station: FirstStation = None,
+    tip_offset: TipOffset = None,
     printed_as: Annotated[
         Format, typer.Option("--format", help="How to print what was measured")
     ] = Format.TABLE,
@@ -80,9 +91,11 @@ def bench(
     checked = read_spec(spec, settings or ())
     scene, said = scene_of(checked), canonical_json(checked)
     target = None if target_error is None else millimeters("--target-error", target_error)
-    patterns, tips = (None, None) if against is None else read_tips(against, scene.finger.n_units)
+    known = None if against is None else read_tips(against, scene.finger.n_units)
     then = None if compare is None else _recorded(compare, said)
-    study = Bench(scene, repeats, tuple(keep or ()), target, patterns, tips)
+    study = Bench(
+        scene, repeats, tuple(keep or ()), target, known, frame_of(first_station, tip_offset)
+    )
     study.check()
     rows = list(_watched(study.rows(), quiet))
     _write(rows, said, output, record)

@@ -9,6 +9,7 @@ from dpgcli import __version__
 from dpgcli.cli import (
     bench,
     check,
+    compare,
     explain,
     init,
     merge,
@@ -44,6 +45,7 @@ for _function in (
     check.check,
     report.report,
     bench.bench,
+    compare.compare,
     stress.stress,
     validate.validate,
     init.init,

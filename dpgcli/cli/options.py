@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from dpgcli.accuracy.comparison import Frame
     from dpgcli.states.plan import Request
 
 SpecPath = Annotated[Path, typer.Argument(metavar="SPEC", help="YAML spec; - reads standard input")]
@@ -49,6 +50,18 @@ MaxFailed = Annotated[
 ]
 
 
+FirstStation = Annotated[
+    str | None,
+    typer.Option("--first-station", metavar="X,Y", help="Lattice's first node in the data, mm"),
+]
+TipOffset = Annotated[
+    str | None,
+    typer.Option(
+        "--tip-offset", metavar="X,Y", help="Data's tip from the last node, along the phalanx, mm"
+    ),
+]
+
+
 class FormulationName(StrEnum):
     """The two formulations of one finger."""
 
@@ -83,6 +96,28 @@ def request_of(
         tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
         target_error=None if target_error is None else millimeters("--target-error", target_error),
     )
+
+
+def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
+    """Where the lattice lies in given data."""
+    from dpgcli.accuracy.comparison import Frame
+
+    return Frame(
+        _point("--first-station", first_station or "0,0"),
+        _point("--tip-offset", tip_offset or "0,0"),
+    )
+
+
+def _point(option: str, text: str) -> tuple[float, float]:
+    from dpgcli.errors import UsageError
+
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        x, y = float("nan"), 0.0
+    if not abs(x) + abs(y) < float("inf"):
+        raise UsageError(f"{option} {text}: expected two numbers in mm, such as 5.375,-0.75")
+    return x, y
 
 
 def millimeters(option: str, text: str) -> float:

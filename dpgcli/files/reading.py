@@ -12,11 +12,12 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.accuracy.comparison import KnownTips
 from dpgcli.errors import UsageError
 
 TIP_COLUMNS = ("pattern", "tip_x_mm", "tip_y_mm")
-LONGEST = 1e12  # mm
+LARGEST = 1e12
+MORE_TIP_COLUMNS = ("tip_angle_rad", "seconds")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 
 
@@ -61,8 +62,8 @@ def read_run(path: Path) -> dict[str, Any] | None:
     return facts
 
 
-def read_tips(path: Path, n_units: int) -> tuple[Flags, Array]:
-    """Known tips: patterns, (unit, state), and their tips x, y in mm, (2, state), from CSV.
+def read_tips(path: Path, n_units: int) -> KnownTips:
+    """Known tips from CSV; columns for the angle and the time of a state may be missing.
 
     Lines that start with # are comments. Raises UsageError, with the line, for what is no such
     file.
@@ -87,7 +88,7 @@ def read_tips(path: Path, n_units: int) -> tuple[Flags, Array]:
         raise UsageError(f"{path}: no column {', '.join(missing)}; found {found}{hint}")
     if not states:
         raise UsageError(f"{path}: no states in it")
-    tips: dict[str, tuple[float, float]] = {}
+    tips: dict[str, tuple[float, ...]] = {}
     for number, cells in states:
         if len(cells) != len(names):
             raise UsageError(f"{path}:{number}: expected {len(names)} cells, found {len(cells)}")
@@ -95,17 +96,19 @@ def read_tips(path: Path, n_units: int) -> tuple[Flags, Array]:
         if pattern in tips:
             raise UsageError(f"{path}:{number}: {pattern} for the second time")
         tips[pattern] = tip
-    flags = np.array([[digit == "1" for digit in pattern] for pattern in tips]).T
-    return flags, np.array(list(tips.values())).T
+    patterns = np.array([[digit == "1" for digit in pattern] for pattern in tips]).T
+    x, y, angle, seconds = np.array(list(tips.values())).T
+    return KnownTips(patterns, np.stack((x, y)), angle, seconds)
 
 
-def _tip(cells: dict[str, str], n_units: int, place: str) -> tuple[str, tuple[float, float]]:
-    """The pattern and the tip of one line."""
+def _tip(cells: dict[str, str], n_units: int, place: str) -> tuple[str, tuple[float, ...]]:
+    """The pattern of one line, and its tip x, y, angle and time."""
     pattern = cells["pattern"]
     if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
         raise UsageError(f"{place}: pattern: expected {n_units} digits 0 and 1, found {pattern!r}")
-    x, y = (_number(cells, name, place) for name in TIP_COLUMNS[1:])
-    return pattern, (x, y)
+    needed = [_number(cells, name, place) for name in TIP_COLUMNS[1:]]
+    more = [_number(cells, n, place) if cells.get(n) else math.nan for n in MORE_TIP_COLUMNS]
+    return pattern, (*needed, *more)
 
 
 def _number(cells: dict[str, str], name: str, place: str) -> float:
@@ -113,8 +116,8 @@ def _number(cells: dict[str, str], name: str, place: str) -> float:
         value = float(cells[name])
     except ValueError:
         value = math.nan
-    if not abs(value) < LONGEST:
-        raise UsageError(f"{place}: {name}: expected a length in mm, found {cells[name]!r}")
+    if not abs(value) < LARGEST:
+        raise UsageError(f"{place}: {name}: expected a number, found {cells[name]!r}")
     return value
 
 

@@ -6,11 +6,12 @@ that have a state. Times are of one warm call in this process.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from dpgcli.accuracy.comparison import Frame, KnownTips, compare
 from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
@@ -69,15 +70,15 @@ class Bench:
 
     `target_error` (mm) is that of the plan from which something is put back.
 
-    `measured_tips` are tips x, y (mm), (2, state), of the patterns `measured_patterns`.
+    `known` tips lie in a `frame` of their own.
     """
 
     scene: Scene
     repeats: int
     keep: tuple[str, ...] = ()
     target_error: float | None = None
-    measured_patterns: Flags | None = None
-    measured_tips: Array | None = None
+    known: KnownTips | None = None
+    frame: Frame = field(default_factory=Frame)
 
     @property
     def finger(self) -> Finger:
@@ -106,8 +107,8 @@ class Bench:
             few = slice(None, None, -(-patterns.shape[1] // most))
             for way in other_ways(self.finger, patterns[:, few]):
                 yield self._row(way, _only(reference, few))
-        if self.measured_tips is not None and self.measured_patterns is not None:
-            yield self._model_error(self.measured_patterns, self.measured_tips)
+        if self.known is not None:
+            yield self._model_error(self.known)
         yield from self._by_units()
         yield from self._by_designs()
         yield from self._by_stiffness()
@@ -149,18 +150,15 @@ class Bench:
             "n_states": n_states,
         }
 
-    def _model_error(self, patterns: Flags, tips: Array) -> Row:
+    def _model_error(self, known: KnownTips) -> Row:
         """The lattice's own error: its states beside those that were given."""
-        units = Units.of(self.finger)
-        batch = solve(units, Chain, patterns, DEFAULT_TOLERANCE)
-        is_state = certify(batch, units.wells, DEFAULT_TOLERANCE) == 0
-        pose = tip(batch, with_compliance=False).pose
-        distance = np.hypot(*(pose[:2] - tips))[is_state]
+        found = compare(self.finger, known, self.frame)
+        is_state = np.isfinite(found.distance)
         return {
-            **self._facts("model", "lattice against the data given", patterns.shape[1]),
+            **self._facts("model", "lattice against the data given", len(is_state)),
             "n_missing": int((~is_state).sum()),
-            "max_tip_error_mm": _largest(distance),
-            "rms_tip_error_mm": _rms(distance),
+            "max_tip_error_mm": _largest(found.distance[is_state]),
+            "rms_tip_error_mm": _rms(found.distance[is_state]),
         }
 
     def _by_units(self) -> Iterator[Row]:

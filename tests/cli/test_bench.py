@@ -103,10 +103,10 @@ def test_the_models_own_error(call: Any, folder: Path) -> None:
         ),
         (
             "pattern,tip_x_mm,tip_y_mm\n111,1,2\n101,x,2\n",
-            "fe.csv:3: tip_x_mm: expected a length",
+            "fe.csv:3: tip_x_mm: expected a number",
         ),
-        ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: tip_y_mm: expected a length"),
-        ("pattern,tip_x_mm,tip_y_mm\n111,1,1e300\n", "fe.csv:2: tip_y_mm: expected a length"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: tip_y_mm: expected a number"),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,1e300\n", "fe.csv:2: tip_y_mm: expected a number"),
         ("pattern,tip_x_mm,tip_y_mm\n\n# b\n111,1,2\n111,1,2\n", "fe.csv:5: 111 for the second"),
         ("pattern,tip_x_mm,tip_y_mm\n111,1,2,3\n", "fe.csv:2: expected 3 cells, found 4"),
         ("pattern;tip_x_mm;tip_y_mm\n111;1;2\n", "separate columns with commas"),

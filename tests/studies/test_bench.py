@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dpgcli.accuracy.comparison import KnownTips
 from dpgcli.accuracy.extended import extended_states
 from dpgcli.accuracy.ladder import Found
 from dpgcli.errors import UsageError
@@ -59,7 +60,8 @@ def test_every_row_has_every_column_and_sound_times() -> None:
 def test_the_models_error_stands_beside_the_solvers() -> None:
     patterns = np.array([[True, True], [False, True]])
     tips = np.array([[26.0, 25.0], [-4.0, -7.0]])
-    study = Bench(Scene(finger(2), ()), 1, (), None, patterns, tips)
+    none = np.full(2, np.nan)
+    study = Bench(Scene(finger(2), ()), 1, known=KnownTips(patterns, tips, none, none))
     (row,) = (row for row in study.rows() if row["group"] == "model")
     pose = extended_states(study.finger, patterns).pose[:2]
     assert row["max_tip_error_mm"] == pytest.approx(float(np.hypot(*(pose - tips)).max()))

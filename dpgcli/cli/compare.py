@@ -1,0 +1,156 @@
+"""`dpg compare`: predictions beside finite elements or measurements."""
+
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dpgcli.cli.options import FirstStation, Quiet, Settings, SpecPath, TipOffset, frame_of
+from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.streams import say
+
+if TYPE_CHECKING:
+    from dpgcli.accuracy.comparison import Comparison, KnownTips
+    from dpgcli.mechanics.finger import Finger
+
+REPEATS = 5
+
+
+def compare(
+    spec: SpecPath,
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="CSV of known tips")],
+    settings: Settings = None,
+    first_station: FirstStation = None,
+    tip_offset: TipOffset = None,
+    printed_as: Annotated[
+        Format, typer.Option("--format", help="How to print the states")
+    ] = Format.TABLE,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw shapes and known tips: a .svg or .png file")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Hold predicted tips against finite elements or measurements."""
+    from dpgcli.accuracy import comparison
+    from dpgcli.files.reading import read_tips
+    from dpgcli.files.spec import read_spec, scene_of
+
+    scene = scene_of(read_spec(spec, settings or ()))
+    finger, frame = scene.finger, frame_of(first_station, tip_offset)
+    known = read_tips(data, finger.n_units)
+    if plot is not None:
+        _check_plot(plot)
+    found = comparison.compare(finger, known, frame)
+    _PRINTERS[printed_as](_columns(known, found))
+    if plot is not None:
+        from dpgcli.report.comparison import draw_comparison
+
+        draw_comparison(finger, known, frame, str(data), plot)
+    if not quiet:
+        sys.stdout.flush()
+        for line in _summary(finger, known, found):
+            say(line)
+
+
+def _check_plot(plot: Path) -> None:
+    from importlib.util import find_spec
+
+    from dpgcli.errors import UsageError
+    from dpgcli.files.output import check_outputs
+
+    if plot.suffix.lower() not in (".svg", ".png"):
+        raise UsageError(f"--plot {plot}: expected a name that ends in .svg or .png")
+    if find_spec("matplotlib") is None:
+        raise UsageError("--plot needs matplotlib: pip install 'dpgcli[plot]'")
+    check_outputs(plot)
+
+
+def _columns(known: "KnownTips", found: "Comparison") -> dict[str, Any]:
+    from dpgcli.states.patterns import texts
+
+    return {
+        "pattern": texts(known.patterns),
+        "status": found.status,
+        "tip_x_mm": found.predicted[0],
+        "tip_y_mm": found.predicted[1],
+        "known_x_mm": known.position[0],
+        "known_y_mm": known.position[1],
+        "error_mm": found.distance,
+        "error_percent": 100.0 * found.relative,
+        "angle_error_rad": found.angle,
+    }
+
+
+def _print_table(columns: dict[str, Any]) -> None:
+    from dpgcli.states.solve import Status
+
+    statuses = [Status(code).text for code in columns["status"]]
+    texts = {"pattern": [p.decode() for p in columns["pattern"]], "status": statuses}
+    numbers = {name: v for name, v in columns.items() if name not in texts}
+    shown = {name: [_number(name, value) for value in v] for name, v in numbers.items()}
+    print_grid({**texts, **shown}, left=tuple(texts))
+
+
+def _number(name: str, value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    return f"{value:.1f}" if name == "error_percent" else f"{value:.4f}"
+
+
+def _print_by(printer: Any) -> Any:
+    def printed(columns: dict[str, Any]) -> None:
+        from dpgcli.states.columns import Column, Group, Kind
+
+        kinds = {"pattern": Kind.PATTERN, "status": Kind.STATUS}
+        declared = [Column(n, "", "", Group.STATES, kinds.get(n, Kind.NUMBER)) for n in columns]
+        for _ in printer(tuple(declared), [columns]):
+            pass
+
+    return printed
+
+
+_PRINTERS = {
+    Format.TABLE: _print_table,
+    Format.CSV: _print_by(print_csv),
+    Format.JSON: _print_by(print_json),
+}
+
+
+def _summary(finger: "Finger", known: "KnownTips", found: "Comparison") -> Iterator[str]:
+    """Worst and mean errors of the states that are in both, and the ratio of run times."""
+    import numpy as np
+
+    is_state = np.isfinite(found.distance)
+    if not is_state.any():
+        yield f"none of the {len(is_state)} states exists in the lattice"
+        return
+    distance = found.distance[is_state]
+    relative = found.relative[is_state & np.isfinite(found.relative)]
+    text = (
+        f"{len(distance)} states: error {distance.max():.3g} mm at worst, {distance.mean():.3g} mm"
+    )
+    text += " in the mean"
+    if len(relative):
+        worst, mean = 100.0 * relative.max(), 100.0 * relative.mean()
+        text += f"; of the deflection {worst:.3g} % at worst, {mean:.3g} % in the mean"
+    yield text + " (the model's error; published law, pushing and pulling)"
+    if n_missing := int((~is_state).sum()):
+        yield f"{n_missing} states of the data do not exist in the lattice"
+    if np.isfinite(known.seconds).any():
+        yield _times(finger, known)
+
+
+def _times(finger: "Finger", known: "KnownTips") -> str:
+    import numpy as np
+
+    from dpgcli.accuracy.comparison import Frame, compare
+    from dpgcli.accuracy.timing import measured
+
+    own = measured(lambda: compare(finger, known, Frame()), REPEATS).wall / known.patterns.shape[1]
+    theirs = float(np.nanmean(known.seconds))
+    return (
+        f"{theirs:.3g} s a state in the data, {own:.2g} s here: {theirs / own:,.0f} times as long"
+    )
