@@ -14,6 +14,7 @@ from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
     from dpgcli.accuracy.comparison import Comparison, KnownTips
+    from dpgcli.arrays import Array
     from dpgcli.mechanics.finger import Finger
 
 REPEATS = 5
@@ -129,18 +130,18 @@ def _summary(finger: "Finger", known: "KnownTips", found: "Comparison") -> Itera
         return
     distance = found.distance[is_state]
     relative = found.relative[is_state & np.isfinite(found.relative)]
-    text = (
-        f"{len(distance)} states: error {distance.max():.3g} mm at worst, {distance.mean():.3g} mm"
-    )
-    text += " in the mean"
+    text = f"{len(distance)} states: error {_worst_and_mean(distance, 'mm')}"
     if len(relative):
-        worst, mean = 100.0 * relative.max(), 100.0 * relative.mean()
-        text += f"; of the deflection {worst:.3g} % at worst, {mean:.3g} % in the mean"
+        text += f"; of the deflection {_worst_and_mean(100.0 * relative, '%')}"
     yield text + " (the model's error; published law, pushing and pulling)"
     if n_missing := int((~is_state).sum()):
         yield f"{n_missing} states of the data do not exist in the lattice"
     if np.isfinite(known.seconds).any():
         yield _times(finger, known)
+
+
+def _worst_and_mean(errors: "Array", unit: str) -> str:
+    return f"{errors.max():.3g} {unit} at worst, {errors.mean():.3g} {unit} in the mean"
 
 
 def _times(finger: "Finger", known: "KnownTips") -> str:
@@ -151,6 +152,5 @@ def _times(finger: "Finger", known: "KnownTips") -> str:
 
     own = measured(lambda: compare(finger, known, Frame()), REPEATS).wall / known.patterns.shape[1]
     theirs = float(np.nanmean(known.seconds))
-    return (
-        f"{theirs:.3g} s a state in the data, {own:.2g} s here: {theirs / own:,.0f} times as long"
-    )
+    ratio = f"{theirs / own:,.0f} times as long"
+    return f"{theirs:.3g} s a state in the data, {own:.2g} s here: {ratio}"

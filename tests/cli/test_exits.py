@@ -19,7 +19,8 @@ COMMANDS = {
     "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --target-error "
     "--restart --force "
     "--depfile --require --max-failed --summary-file --quiet",
-    "bench": "--set --repeats --target-error --keep --against --first-station --tip-offset --format --output --plot --json "
+    "bench": "--set --repeats --target-error --keep --against --first-station --tip-offset "
+    "--format --output --plot --json "
     "--compare --quiet",
     "compare": "--set --first-station --tip-offset --format --plot --quiet",
     "stress": "--only --set --format --output --quiet",
