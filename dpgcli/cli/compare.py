@@ -65,7 +65,7 @@ def _check_plot(plot: Path) -> None:
     if plot.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"--plot {plot}: expected a name that ends in .svg or .png")
     if find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install 'dpgcli[plot]'")
+        raise UsageError("--plot needs matplotlib: pip install matplotlib")
     check_outputs(plot)
 
 

@@ -46,7 +46,7 @@ TargetError = Annotated[
 
 
 MaxFailed = Annotated[
-    int, typer.Option("--max-failed", min=0, help="Designs that may kill their worker")
+    int, typer.Option("--max-failed", min=0, help="Failed designs up to which the exit code is 0")
 ]
 
 
@@ -73,7 +73,7 @@ FormulationOption = Annotated[
     FormulationName,
     typer.Option("--formulation", help="Internal coordinates, or the study's node coordinates"),
 ]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No summary on standard error")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No summary, no report, no progress")]
 
 
 def request_of(

@@ -171,7 +171,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
 
 def _chosen(rung: "Rung", bound: float, target: float) -> str:
     """What a target error chose, in words."""
-    promise = f"bound on the tips' error {bound:.1e} mm (the model's left aside)"
+    promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = "no way is bounded by that before the work: tip_error_mm says what was reached"
     return f"chosen for the target error: {rung.name}; {promise}"
@@ -194,7 +194,7 @@ def _check_plot(path: Path, n_states: int) -> None:
             f"--plot draws at most {ROWS_SHOWN} states, not {n_states:,}: select with --pattern"
         )
     if find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install 'dpgcli[plot]'")
+        raise UsageError("--plot needs matplotlib: pip install matplotlib")
 
 
 def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from dpgcli.states.rows import Columns
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
-MARGINS = "How far each unit's values may rise before it loses its second well (bars as if rigid)"
+MARGINS = (
+    "Values of each unit, and where each alone would cost it its second well (bars as if rigid)"
+)
 
 
 def stress(
@@ -73,7 +75,7 @@ def _check_extras() -> None:
     from dpgcli.errors import UsageError
 
     if find_spec("mpmath") is None:
-        raise UsageError("dpg stress needs mpmath: pip install 'dpgcli[bench]'")
+        raise UsageError("dpg stress needs mpmath: pip install mpmath")
 
 
 def _spec(spec: Path | None, settings: Sequence[str]) -> "Spec | None":
@@ -207,22 +209,28 @@ def _in_full(outcomes: list["Outcome"]) -> list[dict[str, str]]:
 
 def _margins(finger: "Finger") -> list[dict[str, str]]:
     """One record for each run of equal units."""
-    from dpgcli.accuracy.margins import margins
+    import numpy as np
 
-    own = margins(finger)
-    by_unit = zip(own.force_linearity, own.hinge_stiffness, own.stroke, strict=True)
+    from dpgcli.accuracy.margins import NAMES, limits
+
+    ends = limits(finger)
+    columns = []
+    for name in NAMES:
+        values = np.broadcast_to(finger.arrays()[name], (finger.n_units, 1))[:, 0]
+        pairs = zip(values, getattr(ends, name), strict=True)
+        columns.append([_to_the_end(value, end) for value, end in pairs])
     records = []
-    for (linearity, hinge, stroke), members in groupby(enumerate(by_unit, 1), itemgetter(1)):
-        units = [unit for unit, _ in members]
-        records.append(
-            {
-                "units": "-".join(str(unit) for unit in sorted({units[0], units[-1]})),
-                "force_linearity": f"{linearity:.6f}",
-                "hinge_stiffness_N_mm_per_rad": f"{hinge:.4f}",
-                "stroke_mm": f"{stroke:.5f}",
-            }
-        )
+    for cells, members in groupby(enumerate(zip(*columns, strict=True), 1), itemgetter(1)):
+        units = sorted({unit for unit, _ in members})
+        named = f"{units[0]}-{units[-1]}" if len(units) > 1 else str(units[0])
+        heads = ("force_linearity", "hinge_stiffness_N_mm_per_rad", "stroke_mm")
+        records.append({"units": named, **dict(zip(heads, cells, strict=True))})
     return records
+
+
+def _to_the_end(value: float, end: float) -> str:
+    """A value, and the one at which the second well goes."""
+    return f"{value:.6g} (goes at {end:.6g})" if end > -math.inf else f"{value:.6g} (none)"
 
 
 def _rounded(value: float) -> str:

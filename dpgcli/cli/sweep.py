@@ -257,7 +257,7 @@ def _workplace(executor: ExecutorName, jobs: int | None, scheduler: str | None) 
         try:
             return executors.dask_cluster(scheduler)
         except ImportError as error:
-            raise UsageError("--executor dask needs Dask: pip install 'dpgcli[dask]'") from error
+            raise UsageError("--executor dask needs Dask: pip install distributed") from error
         except (OSError, ValueError) as error:
             raise UsageError(f"--scheduler {scheduler}: no scheduler answers: {error}") from error
     n_workers = jobs or os.cpu_count() or 1

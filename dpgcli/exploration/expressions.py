@@ -138,6 +138,8 @@ def _parts(node: ast.expr) -> list[ast.expr]:
         if node.func.id in _FUNCTIONS:
             raise ExpressionError(f"{node.func.id} does not take {len(node.args)} values")
         raise ExpressionError(f"unknown function {node.func.id}; known: {', '.join(_FUNCTIONS)}")
+    if isinstance(node, ast.Constant):
+        raise ExpressionError(f"only numbers can be compared, not {node.value!r}")
     raise ExpressionError(f"not allowed here: {type(node).__name__}")
 
 

@@ -18,7 +18,7 @@ MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
 SVG_SETTINGS: Any = {"svg.hashsalt": "dpg", "svg.fonttype": "none", "font.size": 9}
 NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install 'dpgcli[plot]'."
+NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
 def figures(space: DesignSpace) -> str:

@@ -63,7 +63,7 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     if model:
         grid[_place(math.log10(model), high, low, HEIGHT)] = list("-" * WIDTH)
     for x, y, mark in zip(across, up, MARKS, strict=False):
-        grid[_place(y, high, low, HEIGHT)][_place(x, left, right, WIDTH)] = mark
+        _mark(grid[_place(y, high, low, HEIGHT)], _place(x, left, right, WIDTH), mark)
     heads = {0: f"1e{high:+03d}", HEIGHT - 1: f"1e{low:+03d}"}
     lines = ["largest tip error, mm"]
     lines += [f"{heads.get(i, ''):>6} |{''.join(line)}".rstrip() for i, line in enumerate(grid)]
@@ -77,6 +77,12 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     if model:
         lines.append(f"{'':>7}-  the lattice's own error against the data given, {model:.2g} mm")
     return lines
+
+
+def _mark(line: list[str], place: int, mark: str) -> None:
+    """Put a mark into a line, or behind those that stand there."""
+    free = (i for i in range(place, WIDTH) if line[i] in " -")
+    line[next(free, place)] = mark
 
 
 def _place(value: float, first: float, last: float, size: int) -> int:

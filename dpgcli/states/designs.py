@@ -91,7 +91,13 @@ def design_states(
         of_lanes = units.designs(lanes) if len(scenes) > 1 else units
         blocks.append(solved_rows(of_lanes, inverted, wanted))
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    if drops_bars:  # without them stiffness would be wrong
+        rows |= {name: np.full_like(v, np.nan) for name, v in rows.items() if _is_stiffness(name)}
     return rows, _metrics(rows, units, len(scenes))
+
+
+def _is_stiffness(name: str) -> bool:
+    return name.startswith(("tip_stiffness", "tip_compliance"))
 
 
 def _stacked(fingers: Sequence[Finger]) -> Finger:

@@ -33,6 +33,7 @@ FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice
 SMALLEST_TOLERANCE = 1e-14  # of the forces in play; below, rounding decides
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
+STIFF = ("stiffness", "tip_stiffness", "tip_compliance")  # columns that rigid bars falsify
 MOST_STATES_WITH = {
     Group.EIGENVALUE: 2**10,
     Group.STIFFNESS: 2**16,
@@ -135,7 +136,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     n = scene.finger.n_units
     units = Units.of(scene.finger)
     flexibility = _flexibility(units)
-    rung, bound = _rung(units, request.target_error)
+    rung, bound = _rung(units, request)
     if rung is not None:
         request = replace(request, tolerance=rung.tolerance)
         units = Units.of(scene.finger.with_bars(np.inf)) if rung.drops_bars else units
@@ -147,7 +148,8 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     formulation = FORMULATIONS[request.formulation](finger)
     terms = tuple(term.kind for term in formulation.terms)
     available = declared(n, terms, scene.gripper is not None)
-    columns, left_out = _columns(available, request.columns, n_states)
+    dropped = rung is not None and rung.drops_bars
+    columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
     groups = {column.group for column in columns}
     split = _split(units, request, codes is None, n_states, groups)
     n_solves = n_states if split is None else split.n_solves
@@ -210,17 +212,22 @@ def check_exactness(tolerance: float, target_error: float | None) -> None:
         raise UsageError("--target-error chooses the tolerance: drop --tolerance")
 
 
-def _rung(units: Units, target: float | None) -> tuple[Rung | None, float]:
-    """The cheapest rung for a target error (mm), and what it is bounded by."""
+def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
+    """The cheapest rung for a target error, and its bound (mm): of tips, and of the chain only.
+
+    Stiffness that was asked for needs the bars.
+    """
     bounds = error_bounds(units)
-    if target is None:
-        return None, float(bounds[-1, 0])
-    (index,) = cheapest(bounds, target)
+    if request.target_error is None:
+        return None, float(bounds[-1, 0]) if request.formulation == "chain" else np.inf
+    if any(name == "all" or name.startswith(STIFF) for name in request.columns):
+        bounds[0] = np.inf
+    (index,) = cheapest(bounds, request.target_error)
     return RUNGS[index], float(bounds[index, 0])
 
 
 def _columns(
-    available: tuple[Column, ...], names: Sequence[str], n_states: int
+    available: tuple[Column, ...], names: Sequence[str], n_states: int, *, has_bars: bool
 ) -> tuple[tuple[Column, ...], tuple[Omission, ...]]:
     """Columns asked for; by default all but nodes and what is costly in a large map."""
     wanted: set[str] = {"pattern", "status", *names} - {"default", "all"}
@@ -232,18 +239,24 @@ def _columns(
         cheap = [
             g
             for g in groups
-            if g is not Group.NODES and n_states <= MOST_STATES_WITH.get(g, n_states)
+            if g is not Group.NODES
+            and n_states <= MOST_STATES_WITH.get(g, n_states)
+            and (has_bars or g is not Group.STIFFNESS)
         ]
         left_out = tuple(
-            Omission(f"{g} columns", _why_left_out(g)) for g in groups if g not in {*cheap, *names}
+            Omission(f"{g} columns", _why_left_out(g, n_states))
+            for g in groups
+            if g not in {*cheap, *names}
         )
         wanted |= set(cheap)
     return named(available, sorted(wanted)), left_out
 
 
-def _why_left_out(group: Group) -> str:
+def _why_left_out(group: Group, n_states: int) -> str:
     if group is Group.NODES:
         return "given on request: --nodes"
+    if n_states <= MOST_STATES_WITH[group]:
+        return "the target error drops the bars, without which they would be wrong"
     return f"left out above {MOST_STATES_WITH[group]:,} states: --columns default,{group}"
 
 

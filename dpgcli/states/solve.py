@@ -177,7 +177,8 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
 
     The error is twice the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a
     few units in the last place, more for many units and where the curvature is small. Twice,
-    since between very stiff bars of the lattice that step itself has lost its digits.
+    since between very stiff bars of the lattice that step itself has lost its digits; infinite
+    for a marginal state.
     """
     equilibrium = batch.equilibrium
     finger = batch.formulation.finger
@@ -191,6 +192,7 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
         softness = slenderness / equilibrium.curvature
         rounding = TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + np.abs(softness))
         error = 2.0 * np.hypot(step[0], step[1]) + rounding * reach(finger)
+        error = np.where(equilibrium.curvature > MARGINAL_CURVATURE, error, np.inf)
         angle_error = 2.0 * np.abs(step[2]) + rounding * (1.0 + np.abs(pose[2]))
         if not with_compliance:
             return Tip(pose, error, angle_error)

@@ -208,12 +208,15 @@ class _Solved(NamedTuple):
 
 
 def value_columns(space: Space) -> dict[str, Column]:
-    """A column for each key of a space: named by its last part where that is enough."""
+    """A column for each key of a space: named by its last part where that is enough.
+
+    What some units override keeps its whole key: the last part is that of the others too.
+    """
     last = [key.rsplit(".", 1)[-1] for key in space.keys]
     first = space.designs(0, 1)
     return {
         key: Column(
-            short if last.count(short) == 1 else key,
+            short if last.count(short) == 1 and ".overrides." not in key else key,
             _unit_of(key),
             f"value of {key}",
             Group.STATES,

@@ -44,7 +44,8 @@ def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Pla
     plan = explain(scene, replace(STATES_ONLY, target_error=target_error))
     kept = KEEPABLE[name](plan)
     if kept is None:
-        raise UsageError(f"--keep {name}: this scene does not leave it out")
+        others = ", ".join(other for other in KEEPABLE if KEEPABLE[other](plan) is not None)
+        raise UsageError(f"--keep {name}: this scene leaves out {others}")
     return plan, kept
 
 
@@ -56,7 +57,7 @@ def kept_ways(scene: Scene, name: str, target_error: float | None) -> tuple[Kept
     both = (rows["status"] == "stable") & (other["status"] == "stable")
     moved = np.hypot(*(rows[key] - other[key] for key in ("tip_x_mm", "tip_y_mm")))
     bound = (rows["tip_error_mm"] + other["tip_error_mm"])[both].max(initial=0.0)
-    if name == "rigid-bars" and scene.finger.is_rigid:
+    if name == "bars" and scene.finger.is_rigid:
         bound += plan.bar_flexibility
     return (
         KeptWay(f"{name} left out", _runner(planned), plan.n_states, 0.0, 0.0),
@@ -138,7 +139,7 @@ def _with_every_column(plan: Plan) -> Variant | None:
 
 
 KEEPABLE: dict[str, Callable[[Plan], Variant | None]] = {
-    "rigid-bars": _with_elastic_bars,
+    "bars": _with_elastic_bars,
     "hinges": _with_hinges,
     "every-unit": _with_every_unit,
     "whole-fingers": _with_whole_fingers,

@@ -378,16 +378,18 @@ def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "10nm")
     assert result.exit_code == ExitCode.DONE
     assert "chosen for the target error: " in result.stderr
-    fine = pd.read_parquet(out / "designs.parquet").dropna()
+    fine = pd.read_parquet(out / "designs.parquet").dropna(subset="error_bound_mm")
     assert set(fine["rung"]) <= {"tolerance 1e-09", "tolerance 1e-12"}
     assert (fine["error_bound_mm"] <= 1e-5).all()
     again = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "0.00001mm")
     assert "up to date" in again.stderr
     assert call("sweep", "sweep.yaml", *SERIAL, "--target-error", "1mm").exit_code == 0
-    rough = pd.read_parquet(out / "designs.parquet").dropna()
+    rough = pd.read_parquet(out / "designs.parquet").dropna(subset="error_bound_mm")
     assert set(rough["rung"]) == {"rigid bars"}
     assert (rough["max_tip_error_mm"] <= rough["error_bound_mm"]).all()
     assert (rough["error_bound_mm"] <= 1.0).all()
+    assert rough["stiffness_max_N_per_mm"].isna().all(), "the bars carry it"
+    assert fine["stiffness_max_N_per_mm"].notna().all()
     moved = abs(rough["reach_min_mm"] - fine["reach_min_mm"]).max()
     assert 1e-6 < moved <= rough["error_bound_mm"].max()
 
@@ -404,3 +406,17 @@ def test_shards_with_failed_designs_have_the_exit_code_every_time(call: Any, swe
     assert call("merge", "s1", "s2", "-o", "s3").exit_code == ExitCode.USAGE
     again = call("sweep", "sweep.yaml", "-o", "s1", "--shard", "1/2", *SERIAL[2:])
     assert "up to date" in again.stderr
+
+
+def test_setting_what_the_space_varies_is_refused(call: Any, sweep: Path) -> None:
+    result = call("sweep", "sweep.yaml", *SERIAL, "-s", f"{HEIGHT}=5")
+    assert result.exit_code == ExitCode.USAGE
+    assert f"--set {HEIGHT}: the space varies it" in result.stderr
+
+
+def test_what_some_units_override_keeps_its_whole_key(call: Any, sweep: Path) -> None:
+    key = "finger.overrides.2.geometry.dome_height_mm"
+    sweep.write_text(f"base: three_unit.yaml\nspace:\n  - {{key: {key}, values: [6, 7]}}\n")
+    result = call("sweep", "sweep.yaml", *SERIAL, "--require", f"{key} > 5")
+    assert result.exit_code == ExitCode.DONE
+    assert pd.read_parquet(sweep.parent / "out" / "designs.parquet")[key].tolist() == [6.0, 7.0]

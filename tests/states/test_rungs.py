@@ -147,3 +147,26 @@ def test_long_fingers_in_pairs_meet_it_too(reference_finger: Fingers) -> None:
 def test_targets_that_make_no_sense(reference_finger: Fingers, request_: Request) -> None:
     with pytest.raises(UsageError, match="--target-error"):
         explain(Scene(reference_finger(2, 1e4), ()), request_)
+
+
+def test_stiffness_that_is_asked_for_keeps_the_bars(reference_finger: Fingers) -> None:
+    scene = Scene(reference_finger(3, 1e4), ())
+    for names in (("default", "stiffness"), ("tip_stiffness_min_N_per_mm",), ("all",)):
+        plan = explain(scene, Request(columns=names, target_error=0.1))
+        assert plan.rung is not None, names
+        assert not plan.rung.drops_bars, names
+    plan = explain(scene, Request(target_error=0.1))
+    assert plan.rung == RUNGS[0]
+    assert not [column for column in plan.columns if column.name.startswith("tip_stiffness")]
+
+
+def test_no_promise_for_node_coordinates(reference_finger: Fingers) -> None:
+    scene = Scene(reference_finger(3, 1e4), ())
+    assert np.isinf(explain(scene, Request(formulation="lattice")).error_bound)
+
+
+def test_a_marginal_state_has_no_error_estimate(reference_finger: Fingers) -> None:
+    scene = Scene(reference_finger(2, 12.84e15), ())
+    rows = predict(scene, Request(formulation="lattice", columns=("states",))).arrays()
+    assert set(rows["status"]) == {"marginal"}
+    assert np.isinf(rows["tip_error_mm"]).all()

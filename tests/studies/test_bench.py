@@ -105,7 +105,7 @@ def test_repeated_units_and_varied_designs() -> None:
 
 
 KEPT: dict[str, Scene] = {
-    "rigid-bars": Scene(finger(3, np.inf), ()),
+    "bars": Scene(finger(3, np.inf), ()),
     "hinges": Scene(finger(3, hinge_stiffness=0.0), ()),
     "every-unit": Scene(finger(3), ()),
     "whole-fingers": Scene(finger(13), ()),
@@ -121,7 +121,7 @@ def test_the_plans_bound_covers_what_putting_back_changes(name: str) -> None:
     kept.run()
     assert kept.n_states == planned.n_states == 2 ** KEPT[name].finger.n_units
     assert kept.change <= kept.bound
-    if name == "rigid-bars":
+    if name == "bars":
         assert kept.change > 1e-6, "the change is there"
         assert kept.bound < 1.0
     else:
@@ -130,14 +130,14 @@ def test_the_plans_bound_covers_what_putting_back_changes(name: str) -> None:
 
 @pytest.mark.parametrize("target", [1e-2, 1e-1])
 def test_bars_dropped_for_a_target_and_put_back(target: float) -> None:
-    _, kept = kept_ways(Scene(finger(5), ()), "rigid-bars", target)
+    _, kept = kept_ways(Scene(finger(5), ()), "bars", target)
     assert 1e-4 < kept.change <= kept.bound <= target
 
 
 @pytest.mark.parametrize(
     ("name", "scene"),
     [
-        ("rigid-bars", Scene(finger(3), ())),
+        ("bars", Scene(finger(3), ())),
         ("hinges", Scene(finger(3), ())),
         ("every-unit", Scene(finger(1), ())),
         ("whole-fingers", Scene(finger(3), ())),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import Problem, SpecError, UsageError
 from dpgcli.exploration.expressions import Expression, ExpressionError, expression
 from dpgcli.exploration.space import (
     Axis,
@@ -77,6 +77,7 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         raise SpecError(in_order([*document.problems, *problems]))
     base_path = path.parent / spec.base
     base_document = with_settings(read_document(base_path), settings)
+    _check_settings(settings, spec)
     base = checked(base_document)
     reader = _SpaceReader(document, path.parent, base.gripper is not None)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
@@ -96,6 +97,16 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
     )
+
+
+def _check_settings(settings: Sequence[str], spec: SweepSpec) -> None:
+    """Refuse to set what the space varies: it would change nothing."""
+    varied = {axis.key for axis in spec.space}
+    for axis in spec.space:
+        varied |= set(axis.paired or ()) | set(axis.sample.ranges if axis.sample else ())
+    for text in settings:
+        if (key := text.partition("=")[0].strip()) in varied:
+            raise UsageError(f"--set {key}: the space varies it; change it in the sweep's file")
 
 
 def _validated(document: Document) -> tuple[SweepSpec | None, list[Problem]]:
@@ -258,7 +269,7 @@ class _SpaceReader:
         if unknown := sorted(rule.names - known - short):
             close = get_close_matches(unknown[0], [*known, *short], n=1)
             hint = f"did you mean {close[0]}?" if close else ""
-            expected = "keys with numbers, by their last part if no other has it"
+            expected = "numeric keys, by their last part or, if two share that, in full"
             self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
 
