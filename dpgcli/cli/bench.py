@@ -16,6 +16,7 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     TipOffset,
+    check_plot,
     frame_of,
     millimeters,
 )
@@ -130,10 +131,8 @@ def _check_extras(plot: Path | None) -> None:
 
     if find_spec("mpmath") is None:
         raise UsageError("dpg bench needs mpmath: pip install mpmath")
-    if plot is not None and plot.suffix.lower() not in (".svg", ".png"):
-        raise UsageError(f"--plot {plot}: expected a name that ends in .svg or .png")
-    if plot is not None and find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install matplotlib")
+    if plot is not None:
+        check_plot(plot)
 
 
 def _watched(rows: "Iterable[Row]", quiet: bool) -> "Iterable[Row]":

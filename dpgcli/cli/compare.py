@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dpgcli.cli.options import FirstStation, Quiet, Settings, SpecPath, TipOffset, frame_of
+from dpgcli.cli.options import (
+    FirstStation,
+    Quiet,
+    Settings,
+    SpecPath,
+    TipOffset,
+    check_plot,
+    frame_of,
+)
 from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
 from dpgcli.cli.streams import say
 
@@ -36,6 +44,7 @@ def compare(
 ) -> None:
     """Hold predicted tips against finite elements or measurements."""
     from dpgcli.accuracy import comparison
+    from dpgcli.files.output import check_outputs
     from dpgcli.files.reading import read_tips
     from dpgcli.files.spec import read_spec, scene_of
 
@@ -43,7 +52,8 @@ def compare(
     finger, frame = scene.finger, frame_of(first_station, tip_offset)
     known = read_tips(data, finger.n_units)
     if plot is not None:
-        _check_plot(plot)
+        check_plot(plot)
+        check_outputs(plot)
     found = comparison.compare(finger, known, frame)
     _PRINTERS[printed_as](_columns(known, found))
     if plot is not None:
@@ -54,19 +64,6 @@ def compare(
         sys.stdout.flush()
         for line in _summary(finger, known, found):
             say(line)
-
-
-def _check_plot(plot: Path) -> None:
-    from importlib.util import find_spec
-
-    from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_outputs
-
-    if plot.suffix.lower() not in (".svg", ".png"):
-        raise UsageError(f"--plot {plot}: expected a name that ends in .svg or .png")
-    if find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install matplotlib")
-    check_outputs(plot)
 
 
 def _columns(known: "KnownTips", found: "Comparison") -> dict[str, Any]:

@@ -98,6 +98,18 @@ def request_of(
     )
 
 
+def check_plot(path: Path) -> None:
+    """Before any work: a suffix that can be drawn, and what draws it."""
+    from importlib.util import find_spec
+
+    from dpgcli.errors import UsageError
+
+    if path.suffix.lower() not in (".svg", ".png"):
+        raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
+    if find_spec("matplotlib") is None:
+        raise UsageError("--plot needs matplotlib: pip install matplotlib")
+
+
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
     """Where the lattice lies in given data."""
     from dpgcli.accuracy.comparison import Frame

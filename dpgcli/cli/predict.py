@@ -19,6 +19,7 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     Tolerance,
+    check_plot,
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, Printer, print_csv, print_json, table_printer
@@ -62,7 +63,8 @@ def predict(
     request = request_of(patterns, columns, nodes, formulation, tolerance, target_error)
     prediction = states.predict(scene, request)
     if plot is not None:
-        _check_plot(plot, prediction.plan.n_states)
+        check_plot(plot)
+        _check_drawable(prediction.plan.n_states)
     _check_outputs(spec, output, plot)
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
@@ -181,20 +183,14 @@ def _rate(summary: "Summary") -> str:
     return f"{summary.n_states / max(summary.seconds, 1e-9):,.0f} states/s"
 
 
-def _check_plot(path: Path, n_states: int) -> None:
-    """Before any work: the extra, the suffix, and not more shapes than one can see."""
-    from importlib.util import find_spec
-
+def _check_drawable(n_states: int) -> None:
+    """Not more shapes than one can see."""
     from dpgcli.errors import UsageError
 
-    if path.suffix.lower() not in (".svg", ".png"):
-        raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
     if n_states > ROWS_SHOWN:
         raise UsageError(
             f"--plot draws at most {ROWS_SHOWN} states, not {n_states:,}: select with --pattern"
         )
-    if find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install matplotlib")
 
 
 def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:

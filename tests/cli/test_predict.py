@@ -331,4 +331,4 @@ def test_without_matplotlib_it_says_what_to_install(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     result = call("predict", "three_unit.yaml", "--plot", "states.svg")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "dpgcli[plot]" in result.stderr
+    assert "pip install matplotlib" in result.stderr
