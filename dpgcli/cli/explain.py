@@ -76,7 +76,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "rung": plan.rung and plan.rung.name,
         "error_bound_mm": spelled(plan.error_bound),
         "columns": [column.name for column in plan.columns],
-        "left_out": [{"what": o.what, "why": o.why} for o in plan.omissions],
+        "left_out": [{"what": o.what, "why": o.why, "keep": o.keep} for o in plan.omissions],
         "expected_seconds": plan.expected_seconds,
         "expected_bytes": plan.expected_bytes,
         "sources": [
@@ -114,7 +114,8 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  columns         {_column_names(plan)}",
         "",
         "Left out",
-        *(f"  {o.what}: {o.why}" for o in plan.omissions),
+        *(f"  {o.what}: {o.why}" + (f" [{o.keep}]" if o.keep else "") for o in plan.omissions),
+        "  [names] are what dpg bench --keep puts back, to show what it costs and changes",
         "",
         "Error and cost",
         f"  {_bar_error(plan)}",

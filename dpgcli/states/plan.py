@@ -66,10 +66,11 @@ class Request:
 
 @dataclass(frozen=True)
 class Omission:
-    """Something left out, and why."""
+    """Something left out, and why; `keep` is the name by which a benchmark puts it back."""
 
     what: str
     why: str
+    keep: str = ""
 
 
 @dataclass(frozen=True)
@@ -244,7 +245,7 @@ def _columns(
             and (has_bars or g is not Group.STIFFNESS)
         ]
         left_out = tuple(
-            Omission(f"{g} columns", _why_left_out(g, n_states))
+            Omission(f"{g} columns", _why_left_out(g, n_states), "every-column")
             for g in groups
             if g not in {*cheap, *names}
         )
@@ -301,13 +302,14 @@ def _omissions(
                 f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
                 f"{_why_rigid(rung)}; units do not feel each other, "
                 "so the guess is the solution and Newton only certifies it",
+                "bars",
             )
         )
     if not finger.hinge_stiffness.any():
-        omissions.append(Omission("hinge terms", "the hinge stiffness is zero"))
+        omissions.append(Omission("hinge terms", "the hinge stiffness is zero", "hinges"))
     if units.wells.exists.size < n:
         omissions.append(
-            Omission(f"{n - 1} of {n} unit wells", "all units are equal: one is solved")
+            Omission(f"{n - 1} of {n} unit wells", "all are equal: one is solved", "every-unit")
         )
     if split is not None:
         omissions.append(
@@ -315,10 +317,13 @@ def _omissions(
                 f"{2**n - n_solves:,} of {2**n:,} finger solves",
                 f"states are pairs of {split.n_inner}- and {split.n_outer}-unit halves, each "
                 f"solved with {split.context} units of the other; every pair is certified",
+                "whole-fingers",
             )
         )
     if scene.gripper is not None:
-        omissions.append(Omission("the second finger", "a mirror image: solved once"))
+        omissions.append(
+            Omission("the second finger", "a mirror image: solved once", "second-finger")
+        )
     return tuple(omissions)
 
 

@@ -109,11 +109,11 @@ def _with_hinges(plan: Plan) -> Variant | None:
 def _with_every_unit(plan: Plan) -> Variant | None:
     """Equal units, each solved for itself."""
     scene, finger = plan.scene, plan.scene.finger
-    if not finger.is_uniform or finger.n_units == 1:
+    if plan.n_unit_solves == finger.n_units:
         return None
     shared = ("segment_height", "linear_stiffness")
     arrays = {
-        name: values if name in shared else np.repeat(values, finger.n_units, axis=0)
+        name: values if name in shared else np.repeat(values, finger.n_units // len(values), axis=0)
         for name, values in finger.arrays().items()
     }
     return Variant(replace(scene, finger=Finger(finger.n_units, **arrays)), _request(plan))

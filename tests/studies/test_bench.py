@@ -1,5 +1,6 @@
 """What `dpg bench` measures is what it says."""
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from dpgcli.accuracy.ladder import Found
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.scene import Gripper, Scene
+from dpgcli.states.plan import Request, explain
 from dpgcli.studies import bench as module
 from dpgcli.studies.bench import Bench, chosen_patterns, errors, repeated_units, varied
-from dpgcli.studies.kept import KEEPABLE, kept_ways
+from dpgcli.studies.kept import KEEPABLE, check_kept, kept_ways
 
 
 def finger(n_units: int, linear_stiffness: float = 1e4, **changes: float) -> Finger:
@@ -126,6 +128,21 @@ def test_the_plans_bound_covers_what_putting_back_changes(name: str) -> None:
         assert kept.bound < 1.0
     else:
         assert kept.change < 1e-9
+
+
+@pytest.mark.parametrize("scene", KEPT.values(), ids=list(KEPT))
+@pytest.mark.parametrize("target", [None, 1e-2])
+def test_what_explain_leaves_out_is_what_can_be_put_back(
+    scene: Scene, target: float | None
+) -> None:
+    plan = explain(scene, Request(columns=("states",), target_error=target))
+    left_out = {omission.keep for omission in plan.omissions if omission.keep} | {"every-column"}
+    possible = set()
+    for name in KEEPABLE:
+        with suppress(UsageError):
+            check_kept(scene, name, target)
+            possible.add(name)
+    assert possible == left_out
 
 
 @pytest.mark.parametrize("target", [1e-2, 1e-1])
