@@ -259,7 +259,8 @@ def _workplace(executor: ExecutorName, jobs: int | None, scheduler: str | None) 
         except ImportError as error:
             raise UsageError("--executor dask needs Dask: pip install distributed") from error
         except (OSError, ValueError) as error:
-            raise UsageError(f"--scheduler {scheduler}: no scheduler answers: {error}") from error
+            what = f"--scheduler {scheduler}: no scheduler or no worker answers"
+            raise UsageError(f"{what}: {error}") from error
     n_workers = jobs or os.cpu_count() or 1
     if executor is ExecutorName.SERIAL or n_workers == 1:
         return executors.serial()

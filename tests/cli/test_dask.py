@@ -140,6 +140,6 @@ def test_no_scheduler(sweep: Path) -> None:
     process = start(sweep, *on_dask("tcp://127.0.0.1:1"))
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (ExitCode.USAGE, "")
-    assert errors.startswith("dpg: --scheduler tcp://127.0.0.1:1: no scheduler answers")
+    assert errors.startswith("dpg: --scheduler tcp://127.0.0.1:1: no scheduler or no worker")
     assert len(errors.splitlines()) == 1
     assert not (sweep / "out").exists()
