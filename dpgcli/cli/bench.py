@@ -81,14 +81,16 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
-    from dpgcli.files.output import check_outputs
+    from dpgcli.files.output import check_outputs, check_table_name
     from dpgcli.files.reading import read_tips
     from dpgcli.files.spec import canonical_json, read_spec, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
 
     _check_extras(plot)
-    check_outputs(output, record, plot)
+    sources = [path for path in (spec, against, compare) if path is not None]
+    check_outputs(sources, output, record, plot)
+    check_table_name(output)
     checked = read_spec(spec, settings or ())
     scene, said = scene_of(checked), canonical_json(checked)
     target = None if target_error is None else millimeters("--target-error", target_error)

@@ -53,7 +53,7 @@ def compare(
     known = read_tips(data, finger.n_units)
     if plot is not None:
         check_plot(plot)
-        check_outputs(plot)
+        check_outputs((spec, data), plot)
     found = comparison.compare(finger, known, frame)
     _PRINTERS[printed_as](_columns(known, found))
     if plot is not None:

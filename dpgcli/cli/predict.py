@@ -103,20 +103,11 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(spec: Path, output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_outputs
+    from dpgcli.files.output import check_outputs, check_table_name
 
-    check_outputs(output, plot)
-    run_file = None if output is None else _run_file(output)
-    check_outputs(output, plot, run_file)
-    for path in filter(None, (output, plot, run_file)):
-        if path.exists() and spec.exists() and path.samefile(spec):
-            raise UsageError(f"{path} is the spec itself: give another name")
-    if output is not None and output.suffix.lower() in (".csv", ".json", ".svg", ".png"):
-        raise UsageError(
-            f"--output {output}: writes Parquet; for {output.suffix} use --format with > FILE, "
-            "or --plot for figures"
-        )
+    check_outputs((spec,), output, plot)
+    check_outputs((spec,), output, plot, None if output is None else _run_file(output))
+    check_table_name(output)
 
 
 def _run_file(output: Path) -> Path:

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard
 
 
+MOST_HELD = 6  # ranges of designs that are named
+
+
 def run_facts(progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
     """The content of run.json; shares are of the wall time of all workers."""
     import platform
@@ -29,7 +32,7 @@ def run_facts(progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
         "core_share": core,
         "writing_share": writing,
         "pool_share": pool,
-        "worker_deaths": progress.deaths,
+        "held_by_dead_workers": [f"{c.start}-{c.stop - 1}" for c in progress.deaths],
         "failed_designs": progress.failures,
         "replay": list(replays),
         "machine": platform.machine(),
@@ -60,6 +63,10 @@ def run_summary(output: Path, progress: "Progress", part: "Shard | None") -> str
         of = "the worker's time" if progress.n_workers == 1 else "the workers' time"
         text += f"; {core} of {of} in states, {writing} in parts, {pool} in the pool"
         text += f"; tables {progress.tables_seconds:.2g} s" if part is None else ""
+    if progress.deaths:
+        held = ", ".join(f"{chunk.start}-{chunk.stop - 1}" for chunk in progress.deaths[:MOST_HELD])
+        more = ", ..." if len(progress.deaths) > MOST_HELD else ""
+        text += f"; workers died with designs {held}{more} under way, which were evaluated again"
     if part is not None:
         text += f"; part {part.number} of {part.count}: join with dpg merge"
     return text

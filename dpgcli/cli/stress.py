@@ -52,13 +52,15 @@ def stress(
     quiet: Quiet = False,
 ) -> None:
     """Hold stiff and extreme cases against extended precision."""
+    from dpgcli.files.output import check_outputs, check_table_name
     from dpgcli.files.spec import scene_of
 
     _check_extras()
     checked = _spec(spec, settings or ())
     finger = None if checked is None else scene_of(checked).finger
     cases = _cases(finger, only or ())
-    _check_output(spec, output)
+    check_outputs((spec,) if spec else (), output)
+    check_table_name(output)
     began = perf_counter()
     with patient_output():
         outcomes = _printed(printed_as, _progress(cases, quiet), finger)
@@ -96,20 +98,6 @@ def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
     if not cases:
         raise NothingSelectedError(f"--only {', '.join(only)}: there are none without a spec")
     return cases
-
-
-def _check_output(spec: Path | None, output: Path | None) -> None:
-    """Before any work: a file that can be written, and is not the spec."""
-    from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_writable
-
-    if output is None:
-        return
-    check_writable(output)
-    if spec is not None and output.exists() and spec.exists() and output.samefile(spec):
-        raise UsageError(f"{output} is the spec itself: give another name")
-    if output.suffix.lower() in (".csv", ".json"):
-        raise UsageError(f"--output {output}: writes Parquet; use --format with > FILE")
 
 
 def _progress(cases: Sequence["Case"], quiet: bool) -> Iterator["Outcome"]:

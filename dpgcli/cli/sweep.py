@@ -51,7 +51,7 @@ Scheduler = Annotated[
 Part = Annotated[
     str | None, typer.Option("--shard", metavar="K/N", help="Only part K of N; see merge")
 ]
-Restart = Annotated[bool, typer.Option("--restart", help="Drop what an unfinished sweep left")]
+Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
 Depfile = Annotated[Path | None, typer.Option("--depfile", help="Write the files read, for Make")]
 Require = Annotated[
@@ -98,7 +98,7 @@ def sweep(
     if depfile is not None:
         write_depfile(depfile, study)
     with sole_use(output):
-        is_new = not study.is_up_to_date
+        is_new = restart or not study.is_up_to_date
         if is_new:
             _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
@@ -129,8 +129,7 @@ def _study(
     target_error: str | None,
 ) -> "Study":
     from dpgcli.files.sweep import read_sweep
-    from dpgcli.states.plan import check_exactness
-    from dpgcli.states.rungs import DEFAULT_TOLERANCE
+    from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
     from dpgcli.studies.sweep import Study
 
     target = None if target_error is None else millimeters("--target-error", target_error)

@@ -3,7 +3,7 @@
 import fcntl
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -32,13 +32,30 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def check_outputs(*paths: Path | None) -> None:
-    """Fail before the work: files that can be written, under names that differ."""
+def check_outputs(sources: Iterable[Path], *paths: Path | None) -> None:
+    """Fail before the work: files that can be written, under names of their own.
+
+    Raises OutputError for what cannot be written, UsageError for one name twice or for one of
+    the files that are read.
+    """
     given = [path for path in paths if path is not None]
     for path in given:
         check_writable(path)
     if len({path.resolve() for path in given}) < len(given):
         raise UsageError(f"{', '.join(map(str, given))}: expected names that differ")
+    read = [source for source in sources if source.exists()]
+    for path in given:
+        if path.exists() and any(path.samefile(source) for source in read):
+            raise UsageError(f"{path} is the spec or data that is read: give another name")
+
+
+def check_table_name(path: Path | None) -> None:
+    """Refuse a name that promises another format than Parquet; raises UsageError."""
+    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
+        raise UsageError(
+            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
+            "or --plot for figures"
+        )
 
 
 def check_appendable(path: Path) -> None:

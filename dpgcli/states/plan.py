@@ -25,12 +25,12 @@ from dpgcli.states.rungs import (
     Rung,
     bar_flexibility,
     cheapest,
+    check_exactness,
     error_bounds,
 )
 from dpgcli.states.solve import Status, Units
 
 FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
-SMALLEST_TOLERANCE = 1e-14  # of the forces in play; below, rounding decides
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
 STIFF = ("stiffness", "tip_stiffness", "tip_compliance")  # columns that rigid bars falsify
@@ -196,21 +196,6 @@ def _check(scene: Scene, request: Request) -> None:
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
         raise UsageError("--target-error chooses among ways of the chain: drop --formulation")
-
-
-def check_exactness(tolerance: float, target_error: float | None) -> None:
-    """Raise UsageError for a tolerance or a target error (mm) that makes no sense."""
-    if not SMALLEST_TOLERANCE <= tolerance <= 1e-3:
-        raise UsageError(
-            f"--tolerance {tolerance}: expected {SMALLEST_TOLERANCE} … 0.001 "
-            "of the forces in play; below, rounding decides"
-        )
-    if target_error is None:
-        return
-    if not 0.0 < target_error < np.inf:
-        raise UsageError(f"--target-error {target_error} mm: expected a length > 0")
-    if tolerance != DEFAULT_TOLERANCE:
-        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
 
 
 def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:

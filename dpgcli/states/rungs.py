@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.terms import evaluate
@@ -25,7 +26,7 @@ from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
 LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are too soft for a bound
-LARGEST_TOLERANCE = 1e-3
+SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-14, 1e-3  # below, rounding decides
 DEFAULT_TOLERANCE = 1e-12
 
 
@@ -45,6 +46,21 @@ RUNGS = (  # from the cheapest to the most exact
     Rung("rigid bars", True, DEFAULT_TOLERANCE),
     *(Rung(f"tolerance {t:g}", False, t) for t in (1e-3, 1e-6, 1e-9, DEFAULT_TOLERANCE)),
 )
+
+
+def check_exactness(tolerance: float, target_error: float | None) -> None:
+    """Raise UsageError for a tolerance or a target error (mm) that makes no sense."""
+    if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
+        raise UsageError(
+            f"--tolerance {tolerance}: expected {SMALLEST_TOLERANCE} … {LARGEST_TOLERANCE} "
+            "of the forces in play; below, rounding decides"
+        )
+    if target_error is None:
+        return
+    if not 0.0 < target_error < np.inf:
+        raise UsageError(f"--target-error {target_error} mm: expected a length > 0")
+    if tolerance != DEFAULT_TOLERANCE:
+        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
 
 
 def error_bounds(units: Units) -> Array:

@@ -21,10 +21,10 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.plan import Request, check_exactness
+from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.rows import Columns
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
+from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.solve import Units, certify, solve, tip
 from dpgcli.studies.kept import check_kept, kept_ways
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 
 from dpgcli.errors import UsageError
-from dpgcli.exploration.executors import Runner, Workplace, chunked
+from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.files.parts import PartStore
 from dpgcli.files.spec import spelled
 from dpgcli.files.spec.models import MAX_UNITS
@@ -41,8 +41,8 @@ class Progress:
 
     `n_states` were computed in this run. `seconds` is the wall time of that, `tables_seconds`
     of joining the parts into the tables; `core_seconds` and `writing_seconds` are the workers'
-    CPU time for states and parts; `failures` are designs whose worker died twice, `deaths` how
-    many chunks were under way when a worker died.
+    CPU time for states and parts; `failures` are designs whose worker died twice, `deaths` the
+    chunks that were under way when a worker died, all of which were evaluated again.
     """
 
     n_designs: int
@@ -55,7 +55,7 @@ class Progress:
     core_seconds: float = 0.0
     writing_seconds: float = 0.0
     failures: list[int] = field(default_factory=list)
-    deaths: int = 0
+    deaths: Sequence[Chunk] = ()
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class Study:
             progress.writing_seconds += done.writing_seconds
             progress.n_done += chunk.stop - chunk.start
             progress.seconds = perf_counter() - began
-            progress.deaths = len(runner.deaths)
+            progress.deaths = runner.deaths
             watch(progress)
         return progress
 

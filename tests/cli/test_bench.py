@@ -128,6 +128,8 @@ def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: s
         (("--plot", "b.pdf"), "expected a name that ends in .svg or .png"),
         (("--target-error", "soon"), "--target-error soon: expected a length > 0 in mm"),
         (("--target-error", "0"), "--target-error 0: expected a length > 0 in mm"),
+        (("--output", "three_unit.yaml"), "three_unit.yaml is the spec or data that is read"),
+        (("--output", "b.csv"), "--output b.csv: writes Parquet"),
         (("--output", "b", "--json", "b"), "expected names that differ"),
         (("--json", "none/b.json"), "cannot write none/b.json"),
         (("--plot", "none/b.svg"), "cannot write none/b.svg"),

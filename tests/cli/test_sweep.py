@@ -287,6 +287,7 @@ def test_a_design_that_kills_its_worker_is_a_row_and_has_its_exit_code(
 ) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
     assert result.exit_code == ExitCode.FAILED_CASES
+    assert "workers died with designs 0-5 under way, which were evaluated again" in result.stderr
     assert "dpg: 1 design failed; --max-failed is 0" in result.stderr
     designs = pd.read_parquet(sweep.parent / "out" / "designs.parquet")
     expected = ["stable", "invalid", "failed", "stable", "stable", "stable"]
@@ -411,7 +412,14 @@ def test_shards_with_failed_designs_have_the_exit_code_every_time(call: Any, swe
 def test_setting_what_the_space_varies_is_refused(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL, "-s", f"{HEIGHT}=5")
     assert result.exit_code == ExitCode.USAGE
-    assert f"--set {HEIGHT}: the space varies it" in result.stderr
+    assert f"--set: {HEIGHT}: expected a key that the space leaves alone" in result.stderr
+
+
+def test_restart_begins_anew_even_where_all_is_done(call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    result = call("sweep", "sweep.yaml", *SERIAL, "--restart")
+    assert result.exit_code == ExitCode.DONE
+    assert result.stderr.startswith("out: 6 designs, 40 states in ")
 
 
 def test_what_some_units_override_keeps_its_whole_key(call: Any, sweep: Path) -> None:

@@ -4,7 +4,7 @@ import hashlib
 import json
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from dpgcli.errors import Problem, SpecError, UsageError
+from dpgcli.errors import Problem, SpecError
 from dpgcli.exploration.expressions import Expression, ExpressionError, expression
 from dpgcli.exploration.space import (
     Axis,
@@ -25,9 +25,9 @@ from dpgcli.exploration.space import (
     sampled,
 )
 from dpgcli.files.spec import Spec, canonical_json
-from dpgcli.files.spec.places import KeyPath, in_order, shown
+from dpgcli.files.spec.places import KeyPath, in_order, located, shown
 from dpgcli.files.spec.problems import checked, unknown_key
-from dpgcli.files.spec.settings import with_settings
+from dpgcli.files.spec.settings import SETTING, with_settings
 from dpgcli.files.spec.source import Document, read_document
 from dpgcli.files.sweep.models import (
     MANY_KEYS,
@@ -77,7 +77,6 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         raise SpecError(in_order([*document.problems, *problems]))
     base_path = path.parent / spec.base
     base_document = with_settings(read_document(base_path), settings)
-    _check_settings(settings, spec)
     base = checked(base_document)
     reader = _SpaceReader(document, path.parent, base.gripper is not None)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
@@ -85,7 +84,8 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         reader.constraint(place, text, base_document.data)
         for place, text in enumerate(spec.constraints or ())
     ]
-    if problems := [*document.problems, *reader.problems]:
+    problems = [*document.problems, *reader.problems, *_varied(settings, reader.keys)]
+    if problems:
         raise SpecError(in_order(problems))
     return Sweep(
         base,
@@ -99,14 +99,12 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     )
 
 
-def _check_settings(settings: Sequence[str], spec: SweepSpec) -> None:
-    """Refuse to set what the space varies: it would change nothing."""
-    varied = {axis.key for axis in spec.space}
-    for axis in spec.space:
-        varied |= set(axis.paired or ()) | set(axis.sample.ranges if axis.sample else ())
+def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:
+    """Settings of what the space varies, which would change nothing."""
     for text in settings:
-        if (key := text.partition("=")[0].strip()) in varied:
-            raise UsageError(f"--set {key}: the space varies it; change it in the sweep's file")
+        key = text.partition("=")[0].strip()
+        if key in keys:
+            yield located(SETTING, key, "a key that the space leaves alone", "one that it varies")
 
 
 def _validated(document: Document) -> tuple[SweepSpec | None, list[Problem]]:
