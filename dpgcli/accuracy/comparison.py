@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.patterns import texts
+from dpgcli.states.rows import Columns
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.solve import Status, Units, certify, reach, solve, tip
 
@@ -52,13 +55,15 @@ STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight fi
 class Comparison:
     """Predicted tips, in the data's frame, beside known ones, arrays of shape (…, state).
 
-    `predicted` x, y (mm) and angle (rad); `distance` (mm) between the tips, `deflection` (mm) of
+    `predicted` x, y (mm) and angle (rad); `layer` the nodes of the limiting layer, x and y in mm,
+    (2, n + 1, state); `distance` (mm) between the tips, `deflection` (mm) of
     the known tip from where the straight finger's is, `angle` the difference of the angles (rad).
     NaN where the lattice has no such state, or the data no angle.
     """
 
     status: NDArray[np.uint8]
     predicted: Array
+    layer: Array
     distance: Array
     deflection: Array
     angle: Array
@@ -68,6 +73,38 @@ class Comparison:
         """Distance over deflection; NaN for a tip that hardly moves."""
         moved = self.deflection > STRAIGHT * self.deflection.max(initial=0.0)
         return np.where(moved, self.distance / np.where(moved, self.deflection, 1.0), np.nan)
+
+
+def _number(name: str, unit: str, description: str) -> Column:
+    return Column(name, unit, description, Group.STATES)
+
+
+COLUMNS = (
+    Column("pattern", "", "activation pattern", Group.STATES, Kind.PATTERN),
+    Column("status", "", "stable where certified, else why not", Group.STATES, Kind.STATUS),
+    _number("tip_x_mm", "mm", "predicted tip"),
+    _number("tip_y_mm", "mm", "predicted tip"),
+    _number("known_x_mm", "mm", "known tip"),
+    _number("known_y_mm", "mm", "known tip"),
+    _number("error_mm", "mm", "distance between the two"),
+    _number("error_percent", "%", "the same over the deflection of the known tip"),
+    _number("angle_error_rad", "rad", "difference of the tip angles"),
+)
+
+
+def rows(known: KnownTips, found: Comparison) -> Columns:
+    """Columns of `COLUMNS` by name."""
+    return {
+        "pattern": texts(known.patterns),
+        "status": found.status,
+        "tip_x_mm": found.predicted[0],
+        "tip_y_mm": found.predicted[1],
+        "known_x_mm": known.position[0],
+        "known_y_mm": known.position[1],
+        "error_mm": found.distance,
+        "error_percent": 100.0 * found.relative,
+        "angle_error_rad": found.angle,
+    }
 
 
 def compare(finger: Finger, known: KnownTips, frame: Frame) -> Comparison:
@@ -87,10 +124,14 @@ def compare(finger: Finger, known: KnownTips, frame: Frame) -> Comparison:
     pose = tip(batch, with_compliance=False).pose
     pose = np.where(status == Status.STABLE, pose, np.nan)
     predicted = frame.tips(pose)
+    stations = batch.formulation.stations(batch.equilibrium.coordinates)
+    layer = np.stack((stations.base_x, stations.base_y))
+    layer = np.concatenate((np.zeros_like(layer[:, :1]), layer), axis=1)
     straight = frame.tips(np.array([reach(finger), [0.0], [0.0]]))
     return Comparison(
         status=status,
         predicted=np.concatenate((predicted, pose[2:])),
+        layer=layer + np.reshape(frame.first_station, (2, 1, 1)),
         distance=np.hypot(*(predicted - known.position)),
         deflection=np.hypot(*(known.position - straight)),
         angle=np.abs(pose[2] - known.angle),

@@ -16,11 +16,12 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     TipOffset,
+    check_installed,
     check_plot,
     frame_of,
     millimeters,
 )
-from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -43,41 +44,49 @@ SHOWN = {
     "model": ("n_missing", "max_tip_error_mm", "rms_tip_error_mm"),
     "units": ("n_units", "n_states", "seconds", "µs_per_state", "peak_MiB"),
     "designs": ("n_designs", "n_states", "seconds", "µs_per_state", "peak_MiB"),
-    "stiffness": ("stiffness_ratio", "n_missing", "max_tip_error_mm", "µs_per_state"),
+    "stiffness": ("stiffness_ratio", "n_missing", "max_tip_error_mm", "µs_per_state", "peak_MiB"),
     "kept": ("seconds", "µs_per_state", "peak_MiB", "tips_move_mm", "bound_mm"),
 }  # fmt: skip
 SLOWER = 2.0  # times its recorded ratio: more than the noise of a shared machine
 
 
+Repeats = Annotated[int, typer.Option("--repeats", min=1, help="Times each way is timed")]
+Keep = Annotated[
+    list[str] | None,
+    typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
+]
+Against = Annotated[
+    Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
+]
+PrintedAs = Annotated[Format, typer.Option("--format", help="How to print what was measured")]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+]
+Plot = Annotated[
+    Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
+]
+Record = Annotated[
+    Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
+]
+Compare = Annotated[
+    Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
+]
+
+
 def bench(
     spec: SpecPath,
     settings: Settings = None,
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="Times each way is timed")] = 5,
+    repeats: Repeats = 5,
     target_error: TargetError = None,
-    keep: Annotated[
-        list[str] | None,
-        typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
-    ] = None,
-    against: Annotated[
-        Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
-    ] = None,
+    keep: Keep = None,
+    against: Against = None,
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
-    printed_as: Annotated[
-        Format, typer.Option("--format", help="How to print what was measured")
-    ] = Format.TABLE,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
-    ] = None,
-    record: Annotated[
-        Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
-    ] = None,
-    compare: Annotated[
-        Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
-    ] = None,
+    printed_as: PrintedAs = Format.TABLE,
+    output: Output = None,
+    plot: Plot = None,
+    record: Record = None,
+    compare: Compare = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
@@ -87,7 +96,9 @@ def bench(
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
 
-    _check_extras(plot)
+    check_installed("dpg bench", "mpmath")
+    if plot is not None:
+        check_plot(plot)
     sources = [path for path in (spec, against, compare) if path is not None]
     check_outputs(sources, output, record, plot)
     check_table_name(output)
@@ -104,12 +115,10 @@ def bench(
     _write(rows, said, output, record)
     if plot is not None:
         draw_precision(rows, str(spec), plot)
-    _PRINTERS[printed_as](rows)
-    if target is not None:
-        _tell(printed_as, cheapest_way(rows, target))
-    if then is not None:
-        for line in _changes(then, rows):
-            _tell(printed_as, line)
+    _print(printed_as, rows)
+    findings = [] if target is None else [cheapest_way(rows, target)]
+    for line in findings + ([] if then is None else _changes(then, rows)):
+        _tell(printed_as, line)
 
 
 def _recorded(path: Path, said: str) -> "Sequence[Row]":
@@ -124,17 +133,6 @@ def _recorded(path: Path, said: str) -> "Sequence[Row]":
         raise UsageError(f"--compare {path}: of another finger, differs in {', '.join(changed)}")
     rows: Sequence[Row] = facts["rows"]
     return rows
-
-
-def _check_extras(plot: Path | None) -> None:
-    from importlib.util import find_spec
-
-    from dpgcli.errors import UsageError
-
-    if find_spec("mpmath") is None:
-        raise UsageError("dpg bench needs mpmath: pip install mpmath")
-    if plot is not None:
-        check_plot(plot)
 
 
 def _watched(rows: "Iterable[Row]", quiet: bool) -> "Iterable[Row]":
@@ -154,6 +152,16 @@ def _tell(printed_as: Format, line: str) -> None:
         print(line)
     else:
         say(line)
+
+
+def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
+    from dpgcli.studies.bench import COLUMNS, as_columns
+
+    if printed_as is Format.TABLE:
+        _print_tables(rows)
+        return
+    for _ in printer_of(printed_as)(COLUMNS, [as_columns(rows)]):
+        pass
 
 
 def _print_tables(rows: "Sequence[Row]") -> None:
@@ -189,24 +197,6 @@ def _cell(row: "Row", name: str) -> str:
     if name.endswith(("_mm", "_rad", "_mJ")):
         return f"{value:.1e}"
     return f"{value:.3g}"
-
-
-def _print_csv(rows: "Sequence[Row]") -> None:
-    _print_by(print_csv, rows)
-
-
-def _print_json(rows: "Sequence[Row]") -> None:
-    _print_by(print_json, rows)
-
-
-def _print_by(printer: Any, rows: "Sequence[Row]") -> None:
-    from dpgcli.studies.bench import COLUMNS, as_columns
-
-    for _ in printer(COLUMNS, [as_columns(rows)]):
-        pass
-
-
-_PRINTERS = {Format.TABLE: _print_tables, Format.CSV: _print_csv, Format.JSON: _print_json}
 
 
 def _write(rows: "Sequence[Row]", said: str, output: Path | None, record: Path | None) -> None:

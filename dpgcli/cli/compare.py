@@ -1,10 +1,9 @@
 """`dpg compare`: predictions beside finite elements or measurements."""
 
-import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,7 +16,7 @@ from dpgcli.cli.options import (
     check_plot,
     frame_of,
 )
-from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.printing import Format, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -55,66 +54,17 @@ def compare(
         check_plot(plot)
         check_outputs((spec, data), plot)
     found = comparison.compare(finger, known, frame)
-    _PRINTERS[printed_as](_columns(known, found))
+    printer = printer_of(printed_as)
+    for _ in printer(comparison.COLUMNS, [comparison.rows(known, found)]):
+        pass
     if plot is not None:
         from dpgcli.report.comparison import draw_comparison
 
-        draw_comparison(finger, known, frame, str(data), plot)
+        draw_comparison(known, found, str(data), plot)
     if not quiet:
         sys.stdout.flush()
         for line in _summary(finger, known, found):
             say(line)
-
-
-def _columns(known: "KnownTips", found: "Comparison") -> dict[str, Any]:
-    from dpgcli.states.patterns import texts
-
-    return {
-        "pattern": texts(known.patterns),
-        "status": found.status,
-        "tip_x_mm": found.predicted[0],
-        "tip_y_mm": found.predicted[1],
-        "known_x_mm": known.position[0],
-        "known_y_mm": known.position[1],
-        "error_mm": found.distance,
-        "error_percent": 100.0 * found.relative,
-        "angle_error_rad": found.angle,
-    }
-
-
-def _print_table(columns: dict[str, Any]) -> None:
-    from dpgcli.states.solve import Status
-
-    statuses = [Status(code).text for code in columns["status"]]
-    texts = {"pattern": [p.decode() for p in columns["pattern"]], "status": statuses}
-    numbers = {name: v for name, v in columns.items() if name not in texts}
-    shown = {name: [_number(name, value) for value in v] for name, v in numbers.items()}
-    print_grid({**texts, **shown}, left=tuple(texts))
-
-
-def _number(name: str, value: float) -> str:
-    if math.isnan(value):
-        return "-"
-    return f"{value:.1f}" if name == "error_percent" else f"{value:.4f}"
-
-
-def _print_by(printer: Any) -> Any:
-    def printed(columns: dict[str, Any]) -> None:
-        from dpgcli.states.columns import Column, Group, Kind
-
-        kinds = {"pattern": Kind.PATTERN, "status": Kind.STATUS}
-        declared = [Column(n, "", "", Group.STATES, kinds.get(n, Kind.NUMBER)) for n in columns]
-        for _ in printer(tuple(declared), [columns]):
-            pass
-
-    return printed
-
-
-_PRINTERS = {
-    Format.TABLE: _print_table,
-    Format.CSV: _print_by(print_csv),
-    Format.JSON: _print_by(print_json),
-}
 
 
 def _summary(finger: "Finger", known: "KnownTips", found: "Comparison") -> Iterator[str]:

@@ -98,16 +98,23 @@ def request_of(
     )
 
 
-def check_plot(path: Path) -> None:
-    """Before any work: a suffix that can be drawn, and what draws it."""
+def check_installed(what: str, package: str) -> None:
+    """Raise UsageError if what is asked for needs a package that is not there."""
     from importlib.util import find_spec
 
     from dpgcli.errors import UsageError
 
+    if find_spec(package) is None:
+        raise UsageError(f"{what} needs {package}: pip install {package}")
+
+
+def check_plot(path: Path) -> None:
+    """Before any work: a suffix that can be drawn, and what draws it."""
+    from dpgcli.errors import UsageError
+
     if path.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
-    if find_spec("matplotlib") is None:
-        raise UsageError("--plot needs matplotlib: pip install matplotlib")
+    check_installed("--plot", "matplotlib")
 
 
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":

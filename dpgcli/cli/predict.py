@@ -22,7 +22,7 @@ from dpgcli.cli.options import (
     check_plot,
     request_of,
 )
-from dpgcli.cli.printing import ROWS_SHOWN, Format, Printer, print_csv, print_json, table_printer
+from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import patient_output, say
 
@@ -69,7 +69,8 @@ def predict(
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
         principal = columns == "default" and not nodes
-        rows = _printer(printed_as or Format.TABLE, principal)(prediction.plan.columns, rows)
+        printer = printer_of(printed_as or Format.TABLE, principal=principal)
+        rows = printer(prediction.plan.columns, rows)
     if output is None:
         for _ in rows:
             pass
@@ -81,15 +82,6 @@ def predict(
     if not quiet:
         sys.stdout.flush()
         say("\n".join(_summary(prediction)))
-
-
-def _printer(printed_as: Format, principal: bool) -> Printer:
-    printers = {
-        Format.TABLE: table_printer(principal=principal),
-        Format.CSV: print_csv,
-        Format.JSON: print_json,
-    }
-    return printers[printed_as]
 
 
 def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:

@@ -37,6 +37,7 @@ ROUNDED = {
     "mm": ".5f",
     "rad": ".5f",
     "mJ": ".5f",
+    "%": ".1f",
 }
 
 
@@ -105,6 +106,12 @@ def table_printer(*, principal: bool) -> Printer:
             )
 
     return print_table
+
+
+def printer_of(printed_as: Format, *, principal: bool = False) -> Printer:
+    """How to print rows; of a table's many columns the principal ones, if asked for."""
+    printers = {Format.CSV: print_csv, Format.JSON: print_json}
+    return printers.get(printed_as) or table_printer(principal=principal)
 
 
 def _rows(

@@ -4,7 +4,6 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from importlib.util import find_spec
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.options import Quiet, Settings
-from dpgcli.cli.printing import Format, print_csv, print_grid, print_json
+from dpgcli.cli.options import Quiet, Settings, check_installed
+from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import patient_output, say
 
@@ -55,7 +54,7 @@ def stress(
     from dpgcli.files.output import check_outputs, check_table_name
     from dpgcli.files.spec import scene_of
 
-    _check_extras()
+    check_installed("dpg stress", "mpmath")
     checked = _spec(spec, settings or ())
     finger = None if checked is None else scene_of(checked).finger
     cases = _cases(finger, only or ())
@@ -71,13 +70,6 @@ def stress(
         say(_summary(outcomes, perf_counter() - began))
     if any(outcome.is_failure for outcome in outcomes):
         raise typer.Exit(ExitCode.REQUIREMENT)
-
-
-def _check_extras() -> None:
-    from dpgcli.errors import UsageError
-
-    if find_spec("mpmath") is None:
-        raise UsageError("dpg stress needs mpmath: pip install mpmath")
 
 
 def _spec(spec: Path | None, settings: Sequence[str]) -> "Spec | None":
@@ -128,8 +120,7 @@ def _printed(
         outcomes += coming
         _print_tables(outcomes, finger)
     else:
-        printer = print_csv if printed_as is Format.CSV else print_json
-        for _ in printer(STRESS_COLUMNS, blocks()):
+        for _ in printer_of(printed_as)(STRESS_COLUMNS, blocks()):
             pass
     return outcomes
 

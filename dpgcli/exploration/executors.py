@@ -23,11 +23,13 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
 
 T = TypeVar("T")
+R = TypeVar("R")
+P = ParamSpec("P")
 Arguments = Callable[["Chunk"], tuple[Any, ...]]
 
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
@@ -221,9 +223,9 @@ def dask_cluster(scheduler: str) -> Workplace:
 class SerialExecutor(Executor):
     """Runs what is submitted at once, in this process."""
 
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         """Call and keep the result or the exception."""
-        future: Future[object] = Future()
+        future: Future[R] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
         except Exception as error:
@@ -262,7 +264,7 @@ def start_fork_server(*modules: str) -> None:
 class _Pool(ProcessPoolExecutor):
     """A pool that no signal stops halfway through starting or ending its processes."""
 
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         """As of the base."""
         with _held_signals():
             return super().submit(fn, *args, **kwargs)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.files.output import whole_file
+from dpgcli.report.drawing import drawn_to
 from dpgcli.states.predict import Prediction
 
 STATES_LABELLED = 16
@@ -20,23 +20,11 @@ def draw_states(prediction: Prediction, path: Path) -> None:
     Line: limiting layer; dots: its nodes; faint: struts to the dome axis. Colors run with the
     number of inverted units (a perceptually uniform map, fit for color-blind readers).
     """
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     rows = prediction.arrays()
     is_gripper = prediction.plan.scene.gripper is not None
     shapes = list(_shapes(rows, prediction.plan.n_units, is_gripper))
-    with mpl.rc_context({"svg.hashsalt": "dpg", "svg.fonttype": "none"}):
-        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.add_subplot(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
-        axes.grid(visible=True, alpha=0.25)
+    with drawn_to(path, 9.0, 6.0, xlabel="x (mm)", ylabel="y (mm)", aspect="equal") as axes:
         _draw_shapes(axes, shapes, prediction.plan.n_units)
-        kind = path.suffix.lower().removeprefix(".")
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        with whole_file(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dpgcli.files.output import whole_file
+from dpgcli.report.drawing import drawn_to
 
 Row = dict[str, Any]
 
@@ -93,29 +93,14 @@ def _place(value: float, first: float, last: float, size: int) -> int:
 
 def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
     """Draw the figure to an SVG or PNG file."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context({"svg.hashsalt": "dpg", "svg.fonttype": "none"}):
-        figure = Figure(figsize=(9.0, 5.5), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.add_subplot(
-            xlabel="wall time per state (s)", ylabel="largest tip error (mm)", title=name
-        )
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.grid(visible=True, alpha=0.25)
+    words = {"xlabel": "wall time per state (s)", "ylabel": "largest tip error (mm)", "title": name}
+    with drawn_to(path, 9.0, 5.5, xscale="log", yscale="log", **words) as axes:
         _draw_points(axes, points(rows))
         model = model_error(rows)
         if model:
             label = f"the model against data: {model:.2g} mm"
             axes.axhline(model, color="#009E73", ls="--", label=label)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
-        kind = path.suffix.lower().removeprefix(".")
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        with whole_file(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
 
 
 def _draw_points(axes: Any, shown: Sequence[Row]) -> None:

@@ -7,6 +7,8 @@ that have a state. Times are of one warm call in this process.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.arrays import Array, Flags, keep_freed_memory
+from dpgcli.files.tables import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
@@ -31,7 +34,8 @@ from dpgcli.studies.kept import check_kept, kept_ways
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
 BATCH = 4096  # states of a call, as in a sweep
-GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16)
+GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)
+TABLE_UNITS = 20  # of a finger all of whose states go into a Parquet file
 GROWTH_DESIGNS = (1, 4, 16, 64, 256, 1024)
 GROWTH_RATIOS = (1.0, 1e2, 1e4, 1e6, 1e9, 1e12, 1e15, math.inf)
 REFERENCE_DIGITS = 50
@@ -69,7 +73,6 @@ class Bench:
     """What to measure: a scene, how often, with what put back, beside what data.
 
     `target_error` (mm) is that of the plan from which something is put back.
-
     `known` tips lie in a `frame` of their own.
     """
 
@@ -110,6 +113,7 @@ class Bench:
         if self.known is not None:
             yield self._model_error(self.known)
         yield from self._by_units()
+        yield self._to_parquet()
         yield from self._by_designs()
         yield from self._by_stiffness()
         for name in self.keep:
@@ -210,8 +214,25 @@ class Bench:
             wanted = (f"chain, {DEFAULT_TOLERANCE:g}", f"lattice, {DEFAULT_TOLERANCE:g}")
             for way in ways(finger, patterns):
                 if way.name in wanted:
-                    row = self._row(way, reference)
-                    yield {**row, **self._facts("stiffness", way.name, way.n_states, finger)}
+                    yield {
+                        **self._row(way, reference),
+                        **self._facts("stiffness", way.name, way.n_states, finger),
+                        "peak_MiB": peak_bytes(way.run) / 2**20,
+                    }
+
+    def _to_parquet(self) -> Row:
+        """All states of a long finger, computed, certified and written to a file."""
+        finger = repeated_units(self.finger, TABLE_UNITS)
+
+        with TemporaryDirectory() as folder:
+
+            def whole() -> None:
+                write_states(predict(Scene(finger, ())), Path(folder) / "states.parquet", "{}")
+
+            times = measured(whole, self.repeats)
+        n_states = 2**TABLE_UNITS
+        way = "predicted into a Parquet file"
+        return {**self._facts("units", way, n_states, finger), **_times(times, n_states)}
 
     def _kept(self, name: str) -> Iterator[Row]:
         """The scene as planned, and with one thing put back that the plan leaves out."""

@@ -6,7 +6,7 @@ import pytest
 from dpgcli.accuracy.extended import extended_states
 from dpgcli.accuracy.ladder import other_ways, ways
 from dpgcli.accuracy.timing import measured, numpy_kernel, peak_bytes
-from dpgcli.mechanics.finger import uniform_finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.states.patterns import inverted_units
 
 PATTERNS = inverted_units(np.arange(8, dtype=np.uint64), 3)
@@ -22,17 +22,9 @@ WORST = {  # mm
 }
 
 
-def finger(linear_stiffness: float, force_linearity: float = 0.043):  # type: ignore[no-untyped-def]
-    return uniform_finger(
-        3,
-        segment_length=13.5,
-        segment_height=10.75,
-        stroke=3.5,
-        bistable_stiffness=12.84,
-        force_linearity=force_linearity,
-        hinge_stiffness=24.2,
-        linear_stiffness=linear_stiffness,
-    )
+def finger(linear_stiffness: float, force_linearity: float = 0.043) -> Finger:
+    values = {**STUDY, "force_linearity": force_linearity}
+    return uniform_finger(3, **values, linear_stiffness=linear_stiffness)
 
 
 def test_errors_of_the_ladder() -> None:

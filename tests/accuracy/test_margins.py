@@ -78,8 +78,11 @@ def fold(finger: Finger, place: int, name: str, near: float) -> float:
 
     openings = np.linspace(0.5, min(0.75, 0.999 * widest(near)), 200)
     start = min(openings, key=lambda u: r(mpmath.mpf(u), mpmath.mpf(near)))
+
+    def equations(u: mpmath.mpf, value: mpmath.mpf) -> list[mpmath.mpf]:
+        return [r(u, value), slope(u, value)]
+
     with mpmath.workdps(40):
-        equations = lambda u, value: [r(u, value), slope(u, value)]  # noqa: E731
         return float(mpmath.findroot(equations, (start, near))[1])
 
 

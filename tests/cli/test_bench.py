@@ -20,6 +20,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "GROWTH_UNITS", (1,))
     monkeypatch.setattr(module, "GROWTH_DESIGNS", (2,))
     monkeypatch.setattr(module, "GROWTH_RATIOS", (1e4,))
+    monkeypatch.setattr(module, "TABLE_UNITS", 3)
     monkeypatch.setattr(module, "BATCH", 8)
     monkeypatch.setattr(module, "PEER_STATES", 1)
     monkeypatch.setattr("dpgcli.accuracy.timing.SHORTEST", 0.0)

@@ -10,7 +10,7 @@ from dpgcli.accuracy.comparison import KnownTips
 from dpgcli.accuracy.extended import extended_states
 from dpgcli.accuracy.ladder import Found
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.plan import Request, explain
 from dpgcli.studies import bench as module
@@ -19,16 +19,7 @@ from dpgcli.studies.kept import KEEPABLE, check_kept, kept_ways
 
 
 def finger(n_units: int, linear_stiffness: float = 1e4, **changes: float) -> Finger:
-    values = {
-        "segment_length": 13.5,
-        "segment_height": 10.75,
-        "stroke": 3.5,
-        "bistable_stiffness": 12.84,
-        "force_linearity": 0.043,
-        "hinge_stiffness": 24.2,
-        **changes,
-    }
-    return uniform_finger(n_units, **values, linear_stiffness=linear_stiffness)
+    return uniform_finger(n_units, **{**STUDY, **changes}, linear_stiffness=linear_stiffness)
 
 
 @pytest.fixture
@@ -37,6 +28,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "GROWTH_UNITS", (1, 3))
     monkeypatch.setattr(module, "GROWTH_DESIGNS", (1, 3))
     monkeypatch.setattr(module, "GROWTH_RATIOS", (1e4, np.inf))
+    monkeypatch.setattr(module, "TABLE_UNITS", 3)
     monkeypatch.setattr(module, "BATCH", 16)
     monkeypatch.setattr(module, "PEER_STATES", 1)
     monkeypatch.setattr("dpgcli.accuracy.timing.SHORTEST", 0.0)

@@ -54,7 +54,7 @@ class UnitGeometry(Section):
     unit_separation_mm: Positive | None = Field(
         default=None, description="Gap s between neighboring chambers, in mm."
     )
-    elastic_modulus_MPa: Positive | None = Field(  # noqa: N815
+    elastic_modulus_MPa: Positive | None = Field(
         default=None, description="Young's modulus E of the material, in MPa."
     )
 
@@ -82,14 +82,14 @@ class UnitLattice(Section):
     stroke_mm: Positive | None = Field(
         default=None, description="Opening d of an inverted dome, in mm."
     )
-    bistable_stiffness_N_per_mm: Positive | None = Field(  # noqa: N815
+    bistable_stiffness_N_per_mm: Positive | None = Field(
         default=None, description="Stiffness k_b of the bistable spring at rest, in N/mm."
     )
     force_linearity: Fraction | None = Field(
         default=None,
         description="Force linearity alpha, without unit: 0 symmetric wells, 1 a linear spring.",
     )
-    hinge_stiffness_N_mm_per_rad: NotNegative | None = Field(  # noqa: N815
+    hinge_stiffness_N_mm_per_rad: NotNegative | None = Field(
         default=None, description="Stiffness k_theta of the hinge of a unit, in N mm/rad."
     )
 
@@ -115,7 +115,7 @@ class FingerSpec(Section):
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."
     )
-    linear_stiffness_N_per_mm: BarStiffness = Field(  # noqa: N815
+    linear_stiffness_N_per_mm: BarStiffness = Field(
         description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid."
     )
     calibration: Literal["published"] | None = Field(
