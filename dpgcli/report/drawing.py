@@ -1,0 +1,27 @@
+"""Figures in files: the same bytes every time, whole or not at all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from dpgcli.files.output import whole_file
+
+
+@contextmanager
+def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[Any]:
+    """Axes to draw on; when all went well, an SVG or PNG file of that size in inches."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"svg.hashsalt": "dpg", "svg.fonttype": "none"}):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        drawn = figure.add_subplot(**axes)
+        drawn.grid(visible=True, alpha=0.25)
+        yield drawn
+        kind = path.suffix.lower().removeprefix(".")
+        metadata = {"Date": None} if kind == "svg" else {"Software": None}
+        with whole_file(path) as temporary:
+            figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
