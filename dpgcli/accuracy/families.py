@@ -65,21 +65,15 @@ class Family(NamedTuple):
     variants: Callable[[Finger], Iterator[Variant]]
 
 
-def picked(finger: Finger, units: list[int]) -> Finger:
-    """A finger of some units of another; a unit may repeat."""
-    arrays = finger.arrays()
-    return Finger(len(units), **{k: v if len(v) == 1 else v[units] for k, v in arrays.items()})
-
-
 def repeated(finger: Finger, n_units: int) -> Finger:
-    """A finger that goes through the units of another again and again."""
-    return picked(finger, [unit % finger.n_units for unit in range(n_units)])
+    """A finger of n units that goes through those of another again and again."""
+    return finger.with_units([unit % finger.n_units for unit in range(n_units)])
 
 
 def changed(finger: Finger, **values: Array | float) -> Finger:
     """The finger with other values, one for all units or one for each."""
     columns = {name: np.reshape(np.asarray(v, float), (-1, 1)) for name, v in values.items()}
-    return Finger(finger.n_units, **{**finger.arrays(), **columns})
+    return finger.changed(**columns)
 
 
 def rigid(finger: Finger) -> Finger:
@@ -213,7 +207,7 @@ def _guess(base: Finger) -> Iterator[Variant]:
 
 def _fold(base: Finger) -> Iterator[Variant]:
     """The weakest unit alone, up to where it loses its second well, and beyond."""
-    unit = picked(base, [int(np.argmin(margins(base).force_linearity))])
+    unit = base.with_units([int(np.argmin(margins(base).force_linearity))])
     folds = limits(unit)
     stiff = _with_bars(unit, 1e9)
     for name in FOLDING:
@@ -249,7 +243,7 @@ def _last_linearity(unit: Finger) -> float:
 
 def _mirror(base: Finger) -> Iterator[Variant]:
     """One unit, from shapes that no finger takes: each is next to a minimum of the equations."""
-    unit = picked(base, [0])
+    unit = base.with_units([0])
     for name, (corners, pattern) in TURNED.items():
         yield from _both(f"from {name}", unit, patterns=(pattern,), start=Start(corners=corners))
 

@@ -17,7 +17,6 @@ from dpgcli.accuracy.families import (
     Start,
     Variant,
     few_patterns,
-    picked,
 )
 from dpgcli.arrays import Flags
 from dpgcli.errors import UsageError
@@ -76,7 +75,7 @@ def built_in_cases(only: Sequence[str] = ()) -> Iterator[Case]:
 def cases_of(finger: Finger, only: Sequence[str] = ()) -> Iterator[Case]:
     """States of a finger, then every family around its first, middle and last unit."""
     n = finger.n_units
-    few = picked(finger, sorted({0, n // 2, n - 1}))
+    few = finger.with_units(sorted({0, n // 2, n - 1}))
     for family in _chosen((PATTERNS, *FAMILIES), only):
         yield from _cases(GIVEN, family, finger if family is PATTERNS else few)
 

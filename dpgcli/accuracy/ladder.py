@@ -12,7 +12,6 @@ import numpy as np
 from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.accuracy.peers import peers, tip_pose
 from dpgcli.arrays import Array, Flags, total
-from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Internal
@@ -94,9 +93,7 @@ def _looked_up(finger: Finger, inverted: Flags) -> Found:
 
 def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
     """Energy of a shape, mJ, (state,)."""
-    domes = laws.bistable(
-        openings, finger.bistable_stiffness, finger.force_linearity, finger.stroke
-    )
+    domes = finger.springs(openings)
     corners = finger.hinge_stiffness * (shape.near_angle**2 + shape.far_angle**2)
     energy = total(domes.energy + corners)
     if finger.is_rigid:

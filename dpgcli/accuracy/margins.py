@@ -82,7 +82,8 @@ def _are_bistable(units: Finger, values: Array) -> Flags:
     }
     for row, name in enumerate(NAMES):
         arrays[name][row] = values[row]
-    wells = inverted_wells(Finger(1, **{name: own.reshape(1, -1) for name, own in arrays.items()}))
+    flat = {name: own.reshape(1, -1) for name, own in arrays.items()}
+    wells = inverted_wells(units.with_units([0]).changed(**flat))
     return wells.exists.reshape(values.shape)
 
 

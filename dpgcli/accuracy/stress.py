@@ -135,7 +135,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
     arrays = finger.arrays()
     changes = {name: arrays[name] * scale for name in lengths}
     changes |= {name: arrays[name] / scale for name in ("bistable_stiffness", "linear_stiffness")}
-    return Finger(finger.n_units, **(arrays | changes))
+    return finger.changed(**changes)
 
 
 def _batch(case: Case, units: Units) -> Batch:

@@ -95,9 +95,7 @@ class BistableSprings:
     def add_to(self, coordinates: Array, gradient: Array, hessian: Array) -> Array:
         finger = self.finger
         cell = cells(finger, coordinates)
-        energy, force, stiffness = laws.bistable(
-            cell.extension, finger.bistable_stiffness, finger.force_linearity, finger.stroke
-        )
+        energy, force, stiffness = finger.springs(cell.extension)
         along = {
             "a": cell.near_strut * cell.along_near,
             "b": cell.far_strut * cell.along_far,

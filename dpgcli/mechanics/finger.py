@@ -1,10 +1,12 @@
 """The finger as the model sees it: lattice dimensions and spring constants."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.mechanics.laws import PUBLISHED, Dome, Law, SpringResponse
 
 ARRAYS = (
     "segment_length",
@@ -14,6 +16,7 @@ ARRAYS = (
     "force_linearity",
     "hinge_stiffness",
     "linear_stiffness",
+    "contact_travel",
 )
 
 
@@ -29,6 +32,9 @@ class Finger:
     - `bistable_stiffness` k_b: N/mm; `force_linearity` α: 1
     - `hinge_stiffness` k_θ: N mm/rad, of one hinge (two corners in series)
     - `linear_stiffness` k_L: N/mm of every bar, infinite where bars are rigid
+    - `contact_travel` c: mm, see `laws.Dome`; 0 but for domes with a travel of their own
+
+    `law` says how the domes answer.
     """
 
     n_units: int
@@ -39,6 +45,8 @@ class Finger:
     force_linearity: Array
     hinge_stiffness: Array
     linear_stiffness: Array
+    contact_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    law: Law = PUBLISHED
 
     def __post_init__(self) -> None:
         for name, values in self.arrays().items():
@@ -72,23 +80,43 @@ class Finger:
         hinge = self.hinge_stiffness / self.segment_height**2
         return (self.bistable_stiffness + hinge) * self.stroke
 
+    @property
+    def domes(self) -> Dome:
+        """The constants that the law needs."""
+        return Dome(self.bistable_stiffness, self.force_linearity, self.stroke, self.contact_travel)
+
+    def springs(self, extension: Array) -> SpringResponse:
+        """Energy, force and stiffness of the bistable springs at extensions (unit, batch)."""
+        return self.law.response(extension, self.domes)
+
+    def changed(self, **arrays: Array) -> "Finger":
+        """The finger with other arrays."""
+        return replace(self, **{**self.arrays(), **arrays})  # type: ignore[arg-type]
+
+    def with_units(self, places: Sequence[int]) -> "Finger":
+        """A finger of some of the units, counted from 0; a unit may repeat."""
+        picked = {k: v if len(v) == 1 else v[list(places)] for k, v in self.arrays().items()}
+        return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]
+
     def with_bars(self, stiffness: float) -> "Finger":
         """The finger with bars of another stiffness k_L (N/mm); infinite makes them rigid."""
-        return Finger(
-            self.n_units, **{**self.arrays(), "linear_stiffness": np.array([[stiffness]])}
-        )
+        return self.changed(linear_stiffness=np.array([[stiffness]]))
+
+    def with_pattern(self, inverted: Flags) -> "Finger":
+        """The finger in each pattern, (unit, batch): itself, unless only inverted domes act."""
+        if not self.law.pushes_only:
+            return self
+        return self.changed(bistable_stiffness=self.bistable_stiffness * inverted)
 
     def designs(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
-        picked = {
-            k: v if v.shape[1] == 1 else np.take(v, index, axis=1) for k, v in self.arrays().items()
-        }
-        return Finger(self.n_units, **picked)
+        arrays = self.arrays().items()
+        taken = {k: v if v.shape[1] == 1 else np.take(v, index, axis=1) for k, v in arrays}
+        return self.changed(**taken)
 
     def units(self, first: int, stop: int) -> "Finger":
         """The finger cut down to units first+1 … stop, counted from the base."""
-        cut = {k: v if v.shape[0] == 1 else v[first:stop] for k, v in self.arrays().items()}
-        return Finger(stop - first, **cut)
+        return self.with_units(range(first, stop))
 
 
 STUDY = {  # published; mm, N/mm, N mm/rad
@@ -121,4 +149,5 @@ def uniform_finger(
     (True, True, 1)
     """
     values = {name: value for name, value in locals().items() if name != "n_units"}
-    return Finger(n_units, **{name: np.array([[float(v)]]) for name, v in values.items()})
+    arrays = {name: np.array([[float(value)]]) for name, value in values.items()}
+    return Finger(n_units, **arrays)  # type: ignore[arg-type]

@@ -157,12 +157,7 @@ class BistableSprings:
     def add_to(self, coordinates: Array, gradient: Array, hessian: Array) -> Array:
         finger = self.finger
         top = vectors(finger, coordinates).top
-        response = laws.bistable(
-            _extension(top, finger.segment_length, 0),
-            finger.bistable_stiffness,
-            finger.force_linearity,
-            finger.stroke,
-        )
+        response = finger.springs(_extension(top, finger.segment_length, 0))
         slope, bend = _stretch(response, top)
         _add_slope(gradient, _TOP, slope)
         _add_bend(hessian, _TOP, _TOP, bend)

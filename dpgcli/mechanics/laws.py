@@ -1,12 +1,16 @@
 """The laws of single springs: energy, force and stiffness of one spring, elementwise.
 
 Every function takes arrays of any shape that broadcast, in any consistent units
-(mm, N and mJ elsewhere in this package).
+(mm, N and mJ elsewhere in this package). A dome answers by one of three laws: the study's,
+a tabulated one, or either of them where the dome pushes but never pulls.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.mechanics.curve import Curve
 
 
 class SpringResponse(NamedTuple):
@@ -52,3 +56,134 @@ def bistable(extension: Array, stiffness: Array, linearity: Array, stroke: Array
         pull * (linearity + softening * remaining * (remaining - relative)),
         stiffness * (1.0 - 6.0 * softening * relative * remaining),
     )
+
+
+class Dome(NamedTuple):
+    """The constants of the domes, arrays that broadcast.
+
+    `stiffness` k_b at rest (N/mm), `linearity` α (1), `stroke` d (mm) and `contact` c (mm), the
+    travel of the dome's pole at which it touches its neighbor in the straight finger; 0 where
+    the opening stands for the travel.
+    """
+
+    stiffness: Array
+    linearity: Array
+    stroke: Array
+    contact: Array
+
+
+class Rests(NamedTuple):
+    """Extensions (mm) at which an inverted dome exerts no force: barrier top and well.
+
+    NaN where there is no inverted well.
+    """
+
+    top: Array
+    well: Array
+
+
+class Law(Protocol):
+    """How a dome answers to the extension of its spring."""
+
+    @property
+    def description(self) -> str:
+        """What tables and summaries say stiffness figures come from."""
+
+    @property
+    def pushes_only(self) -> bool:
+        """Whether only inverted domes act, and only by pushing."""
+
+    @property
+    def curve(self) -> Curve | None:
+        """The table behind the law; none where the study's polynomial is."""
+
+    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+        """Energy (mJ), force (N) and stiffness (N/mm) at an extension (mm)."""
+
+    def rests(self, dome: Dome) -> Rests:
+        """Where the spring alone is at rest when inverted."""
+
+
+class Published:
+    """The study's law, `bistable`: the spring pushes and pulls."""
+
+    description = "published law, pushing and pulling"
+    pushes_only = False
+    curve = None
+
+    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+        """The study's polynomial."""
+        return bistable(extension, dome.stiffness, dome.linearity, dome.stroke)
+
+    def rests(self, dome: Dome) -> Rests:
+        """u = [3β ± √(9β² − 8β)]/(4β) with β = 1 − α, for α < 1/9."""
+        beta = 1.0 - dome.linearity
+        squared = 9.0 * beta * beta - 8.0 * beta
+        is_bistable = np.real(squared) > 0.0
+        root = np.sqrt(np.where(is_bistable, squared, np.nan))
+        quarter = dome.stroke / np.where(is_bistable, 4.0 * beta, 1.0)
+        return Rests((3.0 * beta - root) * quarter, (3.0 * beta + root) * quarter)
+
+
+class Tabulated:
+    """A law from a curve: E = k_b D² ê((x + c)/D) with D = d + c (our normalization).
+
+    The dimensionless ê is a twice continuously differentiable spline through calibrated points.
+    """
+
+    description = "tabulated law, pushing and pulling"
+    pushes_only = False
+
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+
+    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+        """The spline and its derivatives, in mm and N."""
+        travel = dome.stroke + dome.contact
+        energy, slope, bend = self.curve((extension + dome.contact) / travel)
+        force = dome.stiffness * travel
+        return SpringResponse(force * travel * energy, force * slope, dome.stiffness * bend)
+
+    def rests(self, dome: Dome) -> Rests:
+        """Those of the curve."""
+        travel = dome.stroke + dome.contact
+        top, well = (np.asarray(rest * travel - dome.contact) for rest in self.curve.rests)
+        return Rests(top, well)
+
+
+class PushOnly:
+    """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
+
+    Outside them dome and neighbor do not touch, the energy is constant there. Only inverted
+    domes act: the finger of a pattern has no springs in its ground units.
+    """
+
+    pushes_only = True
+
+    def __init__(self, law: Published | Tabulated) -> None:
+        self.law = law
+        self.curve = law.curve
+
+    @property
+    def description(self) -> str:
+        """What the dome's own energy comes from."""
+        energy = self.law.description.split(" law")[0]
+        return f"push-only law, {energy} energy of the dome"
+
+    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+        """The law's own response where dome and neighbor touch."""
+        top, well = self.law.rests(dome)
+        place = np.real(extension)
+        touches = (place > np.real(top)) & (place < np.real(well))
+        apart = np.where(place < np.real(well), top, well)
+        apart = np.where(np.isnan(apart), 0.0, apart)  # never inverted: never in touch
+        energy, *derivatives = self.law.response(np.where(touches, extension, apart), dome)
+        force, stiffness = (np.where(touches, values, 0.0) for values in derivatives)
+        return SpringResponse(energy, force, stiffness)
+
+    def rests(self, dome: Dome) -> Rests:
+        """Those of the dome itself."""
+        return self.law.rests(dome)
+
+
+PUBLISHED = Published()

@@ -103,7 +103,7 @@ def _is_stiffness(name: str) -> bool:
 def _stacked(fingers: Sequence[Finger]) -> Finger:
     """Fingers as the designs of one batch."""
     columns = {name: _side_by_side([getattr(f, name) for f in fingers]) for name in ARRAYS}
-    return Finger(fingers[0].n_units, **columns)
+    return fingers[0].changed(**columns)
 
 
 def _side_by_side(parts: list[Array]) -> Array:

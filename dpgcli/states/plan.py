@@ -251,6 +251,7 @@ def _split(
 ) -> Split | None:
     """Where to cut the finger, if all states are wanted and that is cheaper."""
     fits = groups <= {Group.STATES, Group.ENERGIES} and request.formulation == "chain"
+    fits = fits and not units.finger.law.pushes_only  # a half's springs depend on its pattern
     if not (is_whole and fits and n_states >= FEWEST_PAIRED_STATES):
         return None
     n_inner = units.finger.n_units // 2

@@ -119,10 +119,11 @@ def _corner_stiffness(units: Units) -> Array:
     finger, shape = single_units(units.finger)
     angle = np.where(units.wells.exists, units.wells.angle, 0.0)
     angle = np.broadcast_to(angle, shape).reshape(1, -1)
-    chain = Chain(finger.with_bars(np.inf))
+    bent = finger.with_bars(np.inf)
     rest = np.zeros((1, 1))
     least = np.full_like(angle, np.inf)
-    for corner in (np.zeros_like(angle), angle):
+    for corner, inverted in ((np.zeros_like(angle), False), (angle, True)):
+        chain = Chain(bent.with_pattern(np.full(angle.shape, inverted)))
         band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
     return np.where(least > 0.0, least, 0.0).reshape(shape)

@@ -121,7 +121,7 @@ def solve(
     `inverted` has shape (unit, batch); the finger has one design, or one for each lane.
     The guess puts each unit into its own rigid well, or opens it by `strokes` strokes.
     """
-    formulation = formulate(units.finger)
+    formulation = formulate(units.finger.with_pattern(inverted))
     if strokes is None:
         guess = geometric_guess(units.finger, inverted, units.first_order)
     else:
@@ -129,6 +129,8 @@ def solve(
     equilibrium = minimize(formulation, formulation.coordinates(guess), tolerance)
     springs = formulation.springs(equilibrium.coordinates)
     reached = springs.extension > units.wells.barrier
+    if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
+        reached = reached & inverted
     return Batch(formulation, equilibrium, inverted, reached, springs.is_folded)
 
 

@@ -20,6 +20,8 @@ from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.terms import evaluate
 
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
+SEARCHED = 512  # extensions at which the slope of a tabulated law is looked at
+BISECTIONS = 48  # of one 512th of the range: down to rounding
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ def inverted_wells(finger: Finger) -> Wells:
     >>> print(inverted_wells(unit).extension.round(6))  # mm
     [[3.245015]]
     """
+    if finger.law.curve is not None:
+        return _searched_wells(finger)
     half_height = finger.stroke / (2.0 * finger.segment_height)
     hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
     half_height, hinge, linearity = np.broadcast_arrays(half_height, hinge, finger.force_linearity)
@@ -71,6 +75,46 @@ def inverted_wells(finger: Finger) -> Wells:
         np.where(exists, barrier, MIDDLE) * stroke,
         np.arcsin(extension / (2.0 * finger.segment_height)),
     )
+
+
+def _searched_wells(finger: Finger) -> Wells:
+    """The outermost well of any law: sign changes of de/dx on a grid, then bisection."""
+    lever = 2.0 * finger.segment_height
+    whole = finger.stroke + finger.contact_travel
+    widest = np.minimum(1.5 * whole - finger.contact_travel, (1.0 - 1e-9) * lever)
+    lowest = finger.law.rests(finger.domes).top if finger.law.pushes_only else 0.0 * widest
+    lowest = np.where(np.isnan(lowest), 0.0, lowest)
+    shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
+    grid = lowest + (widest - lowest) * shares
+    pulls = _rigid_slope(finger, grid) >= 0.0
+    places = np.arange(SEARCHED - 1)[:, None, None]
+    # the last place where a push gives way to a pull, and the last where it began before that
+    wells = np.where(~pulls[:-1] & pulls[1:], places, -1).max(axis=0)
+    tops = np.where(pulls[:-1] & ~pulls[1:] & (places < wells), places, -1).max(axis=0)
+    exists = wells >= 0
+    well = _bisected(finger, grid, np.maximum(wells, 0), rises=True)
+    top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
+    stroke = np.broadcast_to(finger.stroke, exists.shape)
+    extension = np.where(exists, well, np.minimum(stroke, widest))
+    barrier = np.where(exists, np.where(tops >= 0, top, lowest), MIDDLE * stroke)
+    return Wells(exists, extension, barrier, np.arcsin(extension / lever))
+
+
+def _rigid_slope(finger: Finger, extension: Array) -> Array:
+    """de/dx of a unit with rigid bars, N: the spring's force and the hinge's."""
+    half_turn = np.arcsin(extension / (2.0 * finger.segment_height))
+    hinge = 2.0 * finger.hinge_stiffness * half_turn
+    return finger.springs(extension).force + hinge / (finger.segment_height * np.cos(half_turn))
+
+
+def _bisected(finger: Finger, grid: Array, places: Indices, *, rises: bool) -> Array:
+    """Where the slope changes its sign between a place of the grid and the next."""
+    low, high = (np.take_along_axis(grid, (places + k)[None], axis=0)[0] for k in (0, 1))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_beyond = (_rigid_slope(finger, middle) >= 0.0) == rises
+        low, high = np.where(is_beyond, low, middle), np.where(is_beyond, middle, high)
+    return np.asarray(0.5 * (low + high))
 
 
 def _roots(
@@ -116,15 +160,15 @@ def barriers(finger: Finger, wells: Wells) -> Array:
     unit has but one well.
     """
     top, bottom = (_rigid_energy(finger, x) for x in (wells.barrier, wells.extension))
-    lowest = np.where(wells.exists, np.minimum(top, top - bottom), 0.0)
+    # a dome that inverts before it touches its neighbor does not open the hinge
+    snap = np.where(wells.barrier > 0.0, top, finger.springs(wells.barrier).energy)
+    lowest = np.where(wells.exists, np.minimum(snap, top - bottom), 0.0)
     return np.asarray(lowest.min(axis=0))
 
 
 def _rigid_energy(finger: Finger, extension: Array) -> Array:
     """Spring and hinge of a unit with rigid bars, E(x) + ½ k_θ φ² with x = 2H sin(φ/2)."""
-    spring = laws.bistable(
-        extension, finger.bistable_stiffness, finger.force_linearity, finger.stroke
-    )
+    spring = finger.springs(extension)
     turn = 2.0 * np.arcsin(extension / (2.0 * finger.segment_height))
     return spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
 
@@ -206,7 +250,7 @@ def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
     arrays = finger.arrays()
     units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
     flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
-    return Finger(1, **flat), (units, designs)
+    return finger.with_units([0]).changed(**flat), (units, designs)
 
 
 def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Internal:

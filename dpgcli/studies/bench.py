@@ -15,6 +15,7 @@ import numpy as np
 
 from dpgcli.accuracy.comparison import Frame, KnownTips, compare
 from dpgcli.accuracy.extended import ExtendedStates, extended_states
+from dpgcli.accuracy.families import repeated
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.arrays import Array, Flags, keep_freed_memory
@@ -168,7 +169,7 @@ class Bench:
     def _by_units(self) -> Iterator[Row]:
         """All 2^n states of fingers that repeat this one's units, as `predict` finds them."""
         for n_units in GROWTH_UNITS:
-            finger = repeated_units(self.finger, n_units)
+            finger = repeated(self.finger, n_units)
             scene = Scene(finger, ())
 
             def whole(scene: Scene = scene) -> None:
@@ -208,7 +209,7 @@ class Bench:
         n_units = min(self.finger.n_units, 3)
         patterns = chosen_patterns(n_units)
         for ratio in GROWTH_RATIOS:
-            short = repeated_units(self.finger, n_units)
+            short = repeated(self.finger, n_units)
             finger = short.with_bars(ratio * float(short.bistable_stiffness.max()))
             reference = extended_states(finger, patterns, digits=REFERENCE_DIGITS)
             wanted = (f"chain, {DEFAULT_TOLERANCE:g}", f"lattice, {DEFAULT_TOLERANCE:g}")
@@ -222,7 +223,7 @@ class Bench:
 
     def _to_parquet(self) -> Row:
         """All states of a long finger, computed, certified and written to a file."""
-        finger = repeated_units(self.finger, TABLE_UNITS)
+        finger = repeated(self.finger, TABLE_UNITS)
 
         with TemporaryDirectory() as folder:
 
@@ -275,17 +276,10 @@ def chosen_patterns(n_units: int) -> Flags:
     return inverted_units(np.array(codes, dtype=np.uint64), n_units)
 
 
-def repeated_units(finger: Finger, n_units: int) -> Finger:
-    """A finger of n units that are this one's over and over."""
-    places = np.arange(n_units) % finger.n_units
-    arrays = {k: v if len(v) == 1 else v[places] for k, v in finger.arrays().items()}
-    return Finger(n_units, **arrays)
-
-
 def varied(finger: Finger, n_designs: int) -> Finger:
     """Designs whose strokes differ by up to 1 %."""
     factors = np.linspace(0.99, 1.01, n_designs)
-    return Finger(finger.n_units, **{**finger.arrays(), "stroke": finger.stroke * factors})
+    return finger.changed(stroke=finger.stroke * factors)
 
 
 def _only(reference: ExtendedStates, few: slice) -> ExtendedStates:

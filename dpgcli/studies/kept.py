@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.predict import predict
@@ -102,8 +101,8 @@ def _with_hinges(plan: Plan) -> Variant | None:
     if finger.hinge_stiffness.any():
         return None
     smallest = np.full_like(finger.hinge_stiffness, np.finfo(float).tiny)
-    arrays = {**finger.arrays(), "hinge_stiffness": smallest}
-    return Variant(replace(scene, finger=Finger(finger.n_units, **arrays)), _request(plan))
+    changed = finger.changed(hinge_stiffness=smallest)
+    return Variant(replace(scene, finger=changed), _request(plan))
 
 
 def _with_every_unit(plan: Plan) -> Variant | None:
@@ -116,7 +115,7 @@ def _with_every_unit(plan: Plan) -> Variant | None:
         name: values if name in shared else np.repeat(values, finger.n_units // len(values), axis=0)
         for name, values in finger.arrays().items()
     }
-    return Variant(replace(scene, finger=Finger(finger.n_units, **arrays)), _request(plan))
+    return Variant(replace(scene, finger=finger.changed(**arrays)), _request(plan))
 
 
 def _with_whole_fingers(plan: Plan) -> Variant | None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from dpgcli.accuracy.families import FAMILIES, PATTERNS, TURNED, changed, picked, rigid
+from dpgcli.accuracy.families import FAMILIES, PATTERNS, TURNED, changed, rigid
 from dpgcli.accuracy.gauntlet import (
     Case,
     all_cases,
@@ -99,14 +99,14 @@ def test_turned_shapes_start_at_every_corner_by_one_unit(built_in: list[Case]) -
 
 @pytest.mark.parametrize(("n_units", "n_patterns"), [(1, 2), (3, 8), (4, 16), (5, 8), (64, 8)])
 def test_of_the_users_finger_all_patterns_are_taken_or_some(n_units: int, n_patterns: int) -> None:
-    finger = picked(study_finger(), [0] * n_units)
+    finger = study_finger().with_units([0] * n_units)
     patterns = {case.pattern for case in cases_of(finger, ["patterns"])}
     assert len(patterns) == n_patterns
     assert {"0" * n_units, "1" * n_units} <= patterns
 
 
 def test_families_push_the_first_middle_and_last_unit_of_the_users_finger() -> None:
-    finger = changed(picked(study_finger(), [0] * 8), stroke=np.arange(1.0, 9.0))
+    finger = changed(study_finger().with_units([0] * 8), stroke=np.arange(1.0, 9.0))
     cases = list(cases_of(finger, ["linearity"]))
     assert cases[0].variant.finger.stroke.ravel().tolist() == [1.0, 5.0, 8.0]
     assert [case.subject for case in cases] == ["spec"] * len(cases)

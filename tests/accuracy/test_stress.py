@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dpgcli.accuracy.families import FAMILIES, TURNED, Start, Variant, changed, picked, rigid
+from dpgcli.accuracy.families import FAMILIES, TURNED, Start, Variant, changed, rigid
 from dpgcli.accuracy.gauntlet import Case, built_in_cases, study_finger
 from dpgcli.accuracy.margins import limits
 from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows, summarized
@@ -21,7 +21,7 @@ from dpgcli.states.columns import Kind
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.solve import MARGINAL_CURVATURE, Batch, Status, Units, certify, solve
 
-UNIT = rigid(picked(study_finger(), [0]))
+UNIT = rigid(study_finger().with_units([0]))
 
 
 def case_of(
@@ -124,7 +124,7 @@ def test_next_to_a_fold_an_error_may_be_four_times_the_stated_one(
 def test_to_miss_a_state_fails_only_the_chain_from_its_own_guess(
     formulation: str, start: Start, is_failure: bool, status: Status
 ) -> None:
-    case = case_of(picked(study_finger(), [0]), "1", formulation, start)
+    case = case_of(study_finger().with_units([0]), "1", formulation, start)
     outcome = judged(case, replace(answered(case), status=status))
     assert (outcome.verdict, outcome.is_failure) == (Verdict.MISSED, is_failure)
     assert np.isnan([outcome.true_tip_error, outcome.true_angle_error]).all()
@@ -320,5 +320,5 @@ def test_between_stiff_bars_the_lattices_error_is_within_the_stated_one() -> Non
 
 @pytest.mark.slow
 def test_the_angle_of_a_long_finger_is_as_exact_as_stated() -> None:
-    (outcome,) = stress([case_of(picked(study_finger(), [0] * 64), "1" * 64)])
+    (outcome,) = stress([case_of(study_finger().with_units([0] * 64), "1" * 64)])
     assert outcome.true_angle_error <= outcome.answer.angle_error

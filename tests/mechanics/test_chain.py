@@ -1,15 +1,18 @@
 """Both formulations: derivatives, lanes and published equilibria; one unit in closed form."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Internal
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
 from dpgcli.mechanics.terms import evaluate
 
 FORMULATIONS: dict[str, tuple[type[Chain] | type[Lattice], float]] = {
@@ -21,17 +24,45 @@ OPENING_ANGLE = np.deg2rad(17.36175941)  # of an inverted unit with rigid bars
 Case = tuple[Formulation, Array, Array]
 
 
-@pytest.fixture(params=[(name, n) for name in FORMULATIONS for n in (1, 2, 4)], ids=str)
+def energy_of(u: Array) -> Array:
+    """A smooth dimensionless energy with a second well that is not the study's."""
+    return np.asarray(0.5 * u**2 * (0.06 + 0.9 * (1.0 - u) ** 2) * (1.0 + 0.1 * np.sin(u)))
+
+
+TRAVEL = np.linspace(0.0, 1.4, 8)  # few: the stiffness has a kink at each
+TABULATED = Tabulated(spline(tuple(TRAVEL), tuple(energy_of(TRAVEL))))
+LAWS: dict[str, Law] = {
+    "published": PUBLISHED,
+    "tabulated": TABULATED,
+    "pushes": PushOnly(PUBLISHED),
+    "pushes as tabulated": PushOnly(TABULATED),
+}
+
+
+@pytest.fixture(
+    params=[
+        *((name, n, "published") for name in FORMULATIONS for n in (1, 2, 4)),
+        *((name, 2, law) for name in FORMULATIONS for law in list(LAWS)[1:]),
+    ],
+    ids=str,
+)
 def case(
     request: pytest.FixtureRequest,
     graded_finger: Callable[..., Finger],
     random_shape: Callable[..., Internal],
 ) -> Case:
     """A graded finger's formulation, a shape far from equilibrium, the scale of each row."""
-    name, n_units = request.param
+    name, n_units, law = request.param
     formulation, stiffness = FORMULATIONS[name]
-    potential = formulation(graded_finger(n_units, 11, linear_stiffness=stiffness))
-    coordinates = potential.coordinates(random_shape(n_units, 12))
+    finger = graded_finger(n_units, 11, linear_stiffness=stiffness)
+    finger = replace(finger, law=LAWS[law])
+    potential = formulation(finger)
+    shape = random_shape(n_units, 12)
+    if finger.law.pushes_only:  # where domes and neighbors touch
+        corner = np.arcsin(0.75 * finger.stroke / (2.0 * finger.segment_height))
+        chord, near, far, strut = (0.05 * part for part in shape)
+        shape = Internal(chord, corner + near, corner + far, strut)
+    coordinates = potential.coordinates(shape)
     lever = np.broadcast_to(potential.force_unit, coordinates.shape)[:, 0]
     return potential, coordinates, 1.0 / lever  # 1 mm, or as much of an angle
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.mechanics import laws
+from dpgcli.mechanics.curve import spline
 
 relative_extensions = st.floats(-2.0, 3.0)
 linearities = st.floats(0.0, 1.0)
@@ -93,3 +94,53 @@ def test_force_and_stiffness_are_the_energy_s_derivatives(u: float) -> None:
 
 def test_quadratic_by_head() -> None:
     assert np.array_equal(laws.quadratic(np.array(-2.0), np.array(3.0)), (6.0, -6.0, 3.0))
+
+
+DOME = laws.Dome(*map(np.array, (12.84, 0.043, 3.5, 0.0)))
+TRAVEL = np.linspace(0.0, 1.5, 301)
+SAMPLED = laws.bistable(TRAVEL * 3.5, *DOME[:3]).energy / (12.84 * 3.5**2)
+TABULATED = laws.Tabulated(spline(tuple(TRAVEL), tuple(SAMPLED)))
+
+
+def test_a_table_of_the_published_law_is_the_published_law() -> None:
+    """To the order of the spline: h^4 in energy, h^3 in force, h^2 in stiffness, h = 1/200."""
+    extension = np.linspace(0.0, 5.0, 1001)
+    found, exact = TABULATED.response(extension, DOME), laws.PUBLISHED.response(extension, DOME)
+    for part, known, error in zip(found, exact, (1e-8, 1e-5, 1e-3), strict=True):
+        assert np.abs(part - known).max() < error * 12.84 * 3.5**2
+
+
+@pytest.mark.parametrize("law", [laws.PUBLISHED, TABULATED])
+def test_a_dome_that_pushes_only_pushes(law: laws.Published | laws.Tabulated) -> None:
+    extension = np.linspace(-1.0, 6.0, 2001)
+    top, well = law.rests(DOME)
+    response, own = laws.PushOnly(law).response(extension, DOME), law.response(extension, DOME)
+    touches = (extension > top) & (extension < well)
+    assert (response.force <= 0.0).all()
+    for part, same in zip(response, own, strict=True):
+        assert np.array_equal(part[touches], same[touches])
+    assert not response.force[~touches].any() and not response.stiffness[~touches].any()
+    assert np.ptp(response.energy[extension > well]) == 0.0
+    assert np.ptp(response.energy[extension < top]) == 0.0
+    steps = np.abs(np.diff(response.energy))
+    assert steps.max() < 1.1 * np.abs(response.force).max() * (extension[1] - extension[0])
+
+
+def test_rests_of_the_published_law_are_its_zeros_of_force() -> None:
+    for rest in laws.PUBLISHED.rests(DOME):
+        assert abs(laws.PUBLISHED.response(rest, DOME).force) < 1e-13
+    not_bistable = DOME._replace(linearity=np.array(0.2))
+    assert np.isnan(laws.PUBLISHED.rests(not_bistable)).all()
+    response = laws.PushOnly(laws.PUBLISHED).response(np.linspace(0.0, 5.0, 9), not_bistable)
+    assert not np.any(response), "a dome that has no second well never pushes"
+
+
+def test_contact_shifts_the_travel_of_the_pole() -> None:
+    """x = u - c: with c = 9.5 mm and the well at 13.7 mm the push ends at 4.2 mm."""
+    dome = laws.Dome(*map(np.array, (12.84, 0.0, 4.2, 9.5)))
+    curve = TABULATED.curve
+    law = laws.Tabulated(curve)
+    travel = np.linspace(0.2, 1.4, 50)
+    response = law.response(travel * 13.7 - 9.5, dome)
+    assert response.energy == pytest.approx(12.84 * 13.7**2 * curve(travel).value, rel=1e-12)
+    assert law.rests(dome).well == pytest.approx(curve.rests[1] * 13.7 - 9.5, rel=1e-14)

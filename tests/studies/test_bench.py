@@ -14,7 +14,7 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.plan import Request, explain
 from dpgcli.studies import bench as module
-from dpgcli.studies.bench import Bench, chosen_patterns, errors, repeated_units, varied
+from dpgcli.studies.bench import Bench, chosen_patterns, errors, repeated, varied
 from dpgcli.studies.kept import KEEPABLE, check_kept, kept_ways
 
 
@@ -90,8 +90,7 @@ def test_patterns_are_chosen_evenly_from_first_to_last(n_units: int) -> None:
 
 
 def test_repeated_units_and_varied_designs() -> None:
-    arrays = finger(2).arrays() | {"stroke": np.array([[3.0], [4.0]])}
-    longer = repeated_units(Finger(2, **arrays), 5)
+    longer = repeated(finger(2).changed(stroke=np.array([[3.0], [4.0]])), 5)
     assert longer.stroke.ravel().tolist() == [3.0, 4.0, 3.0, 4.0, 3.0]
     designs = varied(longer, 3)
     assert designs.n_designs == 3

@@ -1,0 +1,63 @@
+"""Splines of a dome's energy: through their points, smooth, and at rest where they say."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from dpgcli.mechanics.curve import spline
+
+TRAVEL = np.array([0.0, 0.2, 0.45, 0.7, 0.9, 1.0, 1.1, 1.3])
+ENERGY = 0.5 * TRAVEL**2 * (0.043 + 0.957 * (1.0 - TRAVEL) ** 2)
+CURVE = spline(tuple(TRAVEL), tuple(ENERGY))
+
+
+def test_it_is_scipy_s_spline_between_its_ends() -> None:
+    peer = CubicSpline(TRAVEL, ENERGY, bc_type=((1, 0.0), "not-a-knot"))
+    travel = np.linspace(0.0, 1.3, 101)
+    for order, part in enumerate(CURVE(travel)):
+        assert part == pytest.approx(peer(travel, order), rel=1e-12, abs=1e-15)
+
+
+def test_it_goes_through_its_points_and_rests_at_zero() -> None:
+    energy, force, _ = CURVE(TRAVEL)
+    assert energy == pytest.approx(ENERGY, abs=1e-15)
+    assert force[0] == 0.0
+
+
+@pytest.mark.parametrize("knot", TRAVEL)
+def test_energy_force_and_stiffness_have_no_jump(knot: float) -> None:
+    """At inner knots and at both ends, where the spline is continued."""
+    before, after = CURVE(knot * (1.0 + 1e-9) - 1e-9), CURVE(knot * (1.0 + 1e-9) + 1e-9)
+    for left, right in zip(before, after, strict=True):
+        assert abs(left - right) < 1e-7
+
+
+@pytest.mark.parametrize(("start", "end"), [(-1.0, -0.2), (1.4, 3.0)])
+def test_beyond_its_ends_the_curvature_stays(start: float, end: float) -> None:
+    bend = CURVE(np.linspace(start, end, 5)).bend
+    assert bend == pytest.approx(np.full(5, bend[0]), rel=1e-14)
+
+
+def test_rests_are_where_an_independent_search_finds_them() -> None:
+    peer = CubicSpline(TRAVEL, ENERGY, bc_type=((1, 0.0), "not-a-knot"))
+    found = [brentq(lambda u: float(peer(u, 1)), *around) for around in ((0.3, 0.7), (0.8, 1.2))]
+    assert CURVE.rests == pytest.approx(found, rel=1e-10)
+
+
+def test_without_a_second_well_there_is_no_rest() -> None:
+    travel = tuple(np.linspace(0.0, 1.0, 9))
+    assert np.isnan(spline(travel, tuple(u * u for u in travel)).rests).all()
+
+
+@pytest.mark.parametrize("travel", [(0.0, 0.1, 0.2), (0.0, 0.1, 0.1, 0.2), (0.0, 0.2, 0.1, 0.3)])
+def test_points_that_make_no_curve(travel: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="4 or more increasing"):
+        spline(travel, travel)
+
+
+def test_complex_travels_carry_their_derivative() -> None:
+    travel = np.array([-0.1, 0.3, 0.77, 1.25, 1.5])
+    moved = CURVE(travel + 1e-100j)
+    assert moved.value.imag / 1e-100 == pytest.approx(CURVE(travel).slope, rel=1e-13)
+    assert moved.slope.imag / 1e-100 == pytest.approx(CURVE(travel).bend, rel=1e-13)

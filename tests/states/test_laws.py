@@ -1,0 +1,159 @@
+"""States under the other laws: two formulations, closed forms, independent searches."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from dpgcli.mechanics.curve import Curve, spline
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.mechanics.scene import Scene
+from dpgcli.states.plan import Method, Request, explain
+from dpgcli.states.predict import predict
+from dpgcli.states.wells import barriers, inverted_wells
+
+Fingers = Callable[..., Finger]
+TRAVEL = np.linspace(0.0, 1.5, 301)
+
+
+def table(linearity: float = 0.043) -> Curve:
+    energy = 0.5 * TRAVEL**2 * (linearity + (1.0 - linearity) * (1.0 - TRAVEL) ** 2)
+    return spline(tuple(TRAVEL), tuple(energy))
+
+
+LAWS: tuple[Law, ...] = (Tabulated(table()), PushOnly(PUBLISHED), PushOnly(Tabulated(table())))
+
+
+def rows(finger: Finger, **request: object) -> dict[str, np.ndarray]:
+    return predict(Scene(finger, ()), Request(**request)).arrays()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
+def test_both_formulations_agree(graded_finger: Fingers, law: Law) -> None:
+    finger = replace(graded_finger(3, 5), law=law)
+    chain, lattice = (rows(finger, formulation=name) for name in ("chain", "lattice"))
+    assert (chain["status"] == "stable").all()
+    assert (lattice["status"] == "stable").all()
+    for name in ("tip_x_mm", "tip_y_mm", "tip_angle_rad", "energy_mJ"):
+        assert chain[name] == pytest.approx(lattice[name], abs=1e-9)
+    name = "tip_compliance_angle_rad_per_N_mm"
+    assert chain[name] == pytest.approx(lattice[name], rel=1e-8)
+
+
+@pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.description)
+def test_free_shapes_do_not_feel_whether_domes_pull(reference_finger: Fingers, law: Law) -> None:
+    """Inverted domes push in every state, ground ones are at rest."""
+    finger = reference_finger(4, 1e4)
+    both = rows(finger), rows(replace(finger, law=law))
+    error = 1e-10 if law.curve is None else 1e-4  # of the spline's second well
+    for name in ("tip_x_mm", "tip_y_mm", "tip_angle_rad", "energy_mJ"):
+        assert both[0][name] == pytest.approx(both[1][name], abs=error)
+
+
+def test_a_ground_unit_that_is_not_touched_bends_as_its_hinge(reference_finger: Fingers) -> None:
+    """By the model's definition a moment turns it by M/k_theta; 60 times less where domes pull."""
+    pushing = replace(reference_finger(1), law=PushOnly(PUBLISHED))
+    name = "tip_compliance_angle_rad_per_N_mm"
+    by_hinge = rows(pushing, patterns=("0",))[name][0]
+    assert by_hinge == pytest.approx(1.0 / 24.2, rel=1e-12)
+    by_both = rows(reference_finger(1), patterns=("0",))[name][0]
+    assert by_both == pytest.approx(1.0 / (24.2 + 12.84 * 10.75**2), rel=1e-12)
+    assert by_hinge / by_both == pytest.approx(62.3, abs=0.1)
+
+
+@pytest.mark.parametrize("linearity", [0.0, 0.043, 0.09])
+def test_wells_of_a_table_are_where_an_independent_search_finds_them(
+    reference_finger: Fingers, linearity: float
+) -> None:
+    curve = table(linearity)
+    finger = replace(reference_finger(1), law=Tabulated(curve))
+    wells = inverted_wells(finger)
+
+    def slope(x: float) -> float:
+        half = np.arcsin(x / 21.5)
+        spring = 12.84 * 3.5 * float(curve(np.array(x / 3.5)).slope)
+        return float(spring + 2.0 * 24.2 * half / (10.75 * np.cos(half)))
+
+    assert wells.extension[0, 0] == pytest.approx(brentq(slope, 2.8, 3.6), rel=1e-12)
+    assert wells.barrier[0, 0] == pytest.approx(brentq(slope, 1.0, 2.6), rel=1e-12)
+    assert wells.exists.all()
+
+
+def test_a_table_that_is_not_bistable_is_a_row_that_says_so(reference_finger: Fingers) -> None:
+    finger = replace(reference_finger(2, 1e4), law=Tabulated(table(0.12)))
+    assert not inverted_wells(finger).exists.any()
+    assert rows(finger)["status"].tolist() == ["stable", *["not_bistable"] * 3]
+    pushing = replace(finger, law=PushOnly(Tabulated(table(0.12))))
+    assert rows(pushing)["status"].tolist() == ["stable", *["not_bistable"] * 3]
+
+
+def dome_that_inverts_before_it_touches() -> Finger:
+    """A dome of 13.7 mm travel that touches its neighbor at 9.5 mm."""
+    finger = Finger(
+        2,
+        *(np.array([[value]]) for value in (13.5, 10.75, 4.2, 12.84, 0.0, 24.2, 1e4, 9.5)),
+    )
+    return replace(finger, law=PushOnly(Tabulated(table())))
+
+
+def test_a_hinge_never_resets_a_dome_that_still_pushes_in_the_straight_finger() -> None:
+    finger = dome_that_inverts_before_it_touches()
+    wells = inverted_wells(finger)
+    top, well = finger.law.rests(finger.domes)
+    assert wells.barrier == pytest.approx(top)
+    assert wells.barrier[0, 0] < 0.0 < wells.extension[0, 0] < well[0, 0]
+    found = rows(finger)
+    assert (found["status"] == "stable").all()
+    assert found["reached_pattern"].tolist() == found["pattern"].tolist()
+
+
+def test_barriers_of_a_dome_that_inverts_before_it_touches() -> None:
+    """To snap costs the dome's own barrier alone, to reset at least that less the well."""
+    finger = dome_that_inverts_before_it_touches()
+    curve = finger.law.curve
+    assert curve is not None
+    own = 12.84 * 13.7**2 * float(curve(np.array(curve.rests[0])).value)
+    wells = inverted_wells(finger)
+    (lowest,) = barriers(finger, wells)
+    half_turns = np.arcsin(np.stack((wells.barrier, wells.extension))[:, 0, 0] / 21.5)
+    top, bottom = 0.5 * 24.2 * (2.0 * half_turns) ** 2
+    reset = own + top - float(finger.springs(wells.extension).energy[0, 0]) - bottom
+    assert lowest == pytest.approx(min(own, reset), rel=1e-9)
+
+
+def test_pairs_of_halves_are_not_for_domes_that_push_only(reference_finger: Fingers) -> None:
+    finger = reference_finger(14, 1e4)
+    request = Request(columns=("tip_x_mm",))
+    assert explain(Scene(finger, ()), request).method is Method.PAIRS
+    tabulated = Scene(replace(finger, law=Tabulated(table())), ())
+    assert explain(tabulated, request).method is Method.PAIRS
+    pushing = Scene(replace(finger, law=PushOnly(PUBLISHED)), ())
+    assert explain(pushing, request).method is Method.DIRECT
+
+
+def test_long_fingers_of_a_table_agree_with_a_direct_solve(reference_finger: Fingers) -> None:
+    finger = replace(reference_finger(13, 1e4), law=Tabulated(table()))
+    paired = rows(finger, columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
+    some = rows(finger, patterns=("1*01*1",), columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
+    place = np.flatnonzero(np.isin(paired["pattern"], some["pattern"]))
+    assert len(place) > 100
+    for name in ("tip_x_mm", "tip_y_mm", "energy_mJ"):
+        assert paired[name][place] == pytest.approx(some[name], abs=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
+def test_dropping_the_bars_stays_within_its_bound(graded_finger: Fingers, law: Law) -> None:
+    for seed in range(20):
+        finger = replace(graded_finger(3, seed, linear_stiffness=3e3), law=law)
+        exact = rows(finger)
+        stable = exact["status"] == "stable"
+        cheap = predict(Scene(finger, ()), Request(target_error=1.0))
+        bound, found = cheap.plan.error_bound, cheap.arrays()
+        assert cheap.plan.rung is not None and cheap.plan.rung.drops_bars
+        moved = np.hypot(
+            found["tip_x_mm"] - exact["tip_x_mm"], found["tip_y_mm"] - exact["tip_y_mm"]
+        )
+        assert moved[stable].max() <= bound
