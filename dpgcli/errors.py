@@ -43,3 +43,7 @@ class NothingSelectedError(Exception):
 
 class OutputError(Exception):
     """A file cannot be written; nothing half-written is left behind."""
+
+
+class FitError(Exception):
+    """A fit that failed; the message says why. Nothing is written."""

@@ -15,6 +15,7 @@ FLOORS = {
     "equilibrium": 2,
     "states": 3,
     "accuracy": 4,
+    "calibration": 4,
     "exploration": 5,
     "files": 6,
     "report": 6,
@@ -54,7 +55,7 @@ def test_the_solver_knows_no_finger() -> None:
     assert known <= {"dpgcli.arrays", "dpgcli.mechanics.terms", "dpgcli.equilibrium.banded"}
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states"])
+@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states", "calibration"])
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
     for path in (PACKAGE / folder).glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))

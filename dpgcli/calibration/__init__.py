@@ -1,0 +1,1 @@
+"""Fits, validation and the bridge to finite elements."""

@@ -1,0 +1,194 @@
+"""Least squares with free, fixed and bounded parameters, and how far to trust what comes out.
+
+With residuals r (point,), the cost is ½ Σ C² ρ((r/C)²), see `losses`. With ψ = ρ' r, ψ' its
+derivative by r, J the Jacobian of m points by n free parameters and H = Jᵀ diag(ψ') J, the
+covariance of the values is
+
+    Σψ²/(m−n) H⁻¹ JᵀJ H⁻¹,    for plain least squares s² (JᵀJ)⁻¹
+
+(Huber and Ronchetti, Robust Statistics, 2009, section 7.6). It holds for independent errors of
+equal size; a curve that the model cannot follow has neither.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.calibration.losses import Loss, influence
+from dpgcli.calibration.search import Function, Parameter, Search, differences
+from dpgcli.errors import FitError
+
+__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit"]
+
+CONFIDENCE = 0.95  # of bootstrap intervals
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted values and their errors; arrays by parameter, in the order of `parameters`.
+
+    `standard_errors` (n,) are NaN where there are none: of a fixed value, of one that ended at a
+    bound, and of all where there are no more points than free values. `covariance` (n, n) is zero
+    in rows of values that were held, NaN where errors are not known. `residuals` (point,) as
+    the model gave them, `rms` their root mean square, `r_squared` 1 − Σr²/Σ(y − ȳ)², NaN if all
+    observations y are equal. `at_bound` (n,) marks values that ended at a bound.
+    `loss_scale` is the C of the loss. `intervals` (n, 2) hold 95 % of the bootstrap, or None.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Array
+    standard_errors: Array
+    covariance: Array
+    residuals: Array
+    r_squared: float
+    rms: float
+    n_points: int
+    loss: Loss
+    loss_scale: float
+    at_bound: Flags
+    warnings: tuple[str, ...] = ()
+    intervals: Array | None = None
+
+    @property
+    def by_key(self) -> dict[str, float]:
+        """Values by key."""
+        return dict(zip((p.key for p in self.parameters), self.values.tolist(), strict=True))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the values (n, n): 1 on the diagonal, 0 where an error is missing."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        scale = np.outer(deviation, deviation)
+        known = np.isfinite(scale) & (scale > 0.0)
+        found = np.where(known, self.covariance, 0.0) / np.where(known, scale, 1.0)
+        np.fill_diagonal(found, 1.0)
+        return found
+
+
+def fit(
+    parameters: Sequence[Parameter],
+    residual: Function,
+    jacobian: Function | None,
+    *,
+    observed: Array,
+    loss: Loss | str = Loss.LINEAR,
+    loss_scale: float | None = None,
+    resamples: int = 0,
+    seed: int = 0,
+) -> Fit:
+    """Fit the free parameters so that the residuals become small.
+
+    `residual` and `jacobian` take the values of all parameters, fixed ones included, (n,), and
+    give residuals (point,), predicted less `observed` and in its unit, and their derivatives
+    (point, n); without `jacobian` it comes from central differences. `loss_scale` is the size
+    from which a residual counts less; by default a multiple of the median residual.
+    `resamples` asks for bootstrap intervals: points drawn anew with replacement, each time
+    fitted again; the same `seed` gives the same intervals.
+
+    Raises FitError if there are fewer points than free parameters, if some of them cannot be
+    told apart, or if the search does not converge.
+
+    >>> through_origin = Parameter("stiffness", 1.0)
+    >>> x, y = np.array([1.0, 2.0]), np.array([2.0, 4.0])
+    >>> found = fit([through_origin], lambda v: v[0] * x - y, lambda v: x[:, None], observed=y)
+    >>> round(float(found.values[0]), 9)
+    2.0
+    """
+    if not all(p.lower <= p.start <= p.upper for p in parameters):
+        raise ValueError(f"a start outside its bounds in {parameters}")
+    slopes = jacobian or differences(residual, tuple(parameters))
+    search = Search(tuple(parameters), residual, slopes, Loss(loss), np.arange(len(observed)))
+    free = np.array([p.is_free for p in parameters])
+    start = np.array([p.start for p in parameters])
+    _check_points(observed, int(free.sum()))
+    values, scale = search.scaled(start, free, loss_scale)
+    values, still_free = search.solved(values, free, scale)
+    found = _judged(search, values, still_free, scale, observed)
+    found = replace(found, at_bound=free & ~still_free, warnings=_warnings(search, found, free))
+    return _bootstrapped(search, found, free, resamples, seed) if resamples else found
+
+
+def _check_points(observed: Array, n_free: int) -> None:
+    if len(observed) < n_free:
+        raise FitError(f"{len(observed)} points for {n_free} free values: give more, or fix some")
+
+
+def _judged(search: Search, values: Array, free: Flags, scale: float, observed: Array) -> Fit:
+    """Errors of values at a minimum."""
+    residuals = search.residual(values)
+    covariance = np.zeros((len(values), len(values)))
+    if free.any():
+        block = _covariance(search, values, free, scale)
+        covariance[np.ix_(free, free)] = block
+    spread = float(((observed - observed.mean()) ** 2).sum())
+    squares = float((residuals**2).sum())
+    return Fit(
+        parameters=search.parameters,
+        values=values,
+        standard_errors=np.where(free, np.sqrt(np.diag(covariance)), np.nan),
+        covariance=covariance,
+        residuals=residuals,
+        r_squared=1.0 - squares / spread if spread > 0.0 else float("nan"),
+        rms=float(np.sqrt(squares / len(residuals))),
+        n_points=len(residuals),
+        loss=search.loss,
+        loss_scale=scale,
+        at_bound=np.zeros(len(values), bool),
+    )
+
+
+def _covariance(search: Search, values: Array, free: Flags, scale: float) -> Array:
+    """Covariance of the free values; NaN where the points leave no freedom, or no curvature."""
+    slopes = search.jacobian(values)[:, free]
+    pull, curvature = influence(search.loss, search.residual(values), scale)
+    n_spare = len(pull) - slopes.shape[1]
+    size = np.array([p.size for p in search.parameters])[free]
+    slopes = slopes * size  # of order one in every direction, so that nothing is lost in H
+    hessian = (slopes.T * curvature) @ slopes
+    unknown = np.full((len(size), len(size)), np.nan)
+    if n_spare <= 0 or np.linalg.eigvalsh(hessian)[0] <= 0.0:
+        return unknown
+    spread = np.linalg.solve(hessian, slopes.T)
+    return np.asarray((pull**2).sum() / n_spare * (spread @ spread.T) * np.outer(size, size))
+
+
+def _warnings(search: Search, found: Fit, free: Flags) -> tuple[str, ...]:
+    said = []
+    for parameter, value, is_free, error in zip(
+        search.parameters, found.values, free, found.standard_errors, strict=True
+    ):
+        if is_free and value in (parameter.lower, parameter.upper):
+            said.append(
+                f"{parameter.key} ended at its bound {value:g}: it has no standard error, and "
+                "those of the others are as if it were known"
+            )
+        elif is_free and np.isnan(error) and found.n_points > free.sum():
+            said.append(f"{parameter.key}: too many outliers for a standard error")
+    if found.n_points == free.sum():
+        said.append(f"{found.n_points} points for as many free values: no error estimate")
+    return tuple(said)
+
+
+def _bootstrapped(search: Search, found: Fit, free: Flags, resamples: int, seed: int) -> Fit:
+    """The fit with percentile intervals over points drawn with replacement.
+
+    Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 6.2.4.
+    """
+    draws = np.random.default_rng(seed).integers(found.n_points, size=(resamples, found.n_points))
+    fitted = []
+    for rows in draws:
+        try:
+            again = replace(search, rows=np.asarray(rows, np.int64))
+            fitted.append(again.solved(found.values, free, found.loss_scale)[0])
+        except FitError:
+            continue  # counted below
+    if len(fitted) < max(2, resamples // 2):
+        raise FitError(f"bootstrap: {resamples - len(fitted)} of {resamples} samples have no fit")
+    edges = (0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE))
+    intervals = np.quantile(np.array(fitted), edges, axis=0).T
+    warnings = found.warnings
+    if n_failed := resamples - len(fitted):
+        warnings += (f"bootstrap: {n_failed} of {resamples} samples had no fit and are left out",)
+    return replace(found, warnings=warnings, intervals=np.where(free[:, None], intervals, np.nan))

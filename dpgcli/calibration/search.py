@@ -1,0 +1,161 @@
+"""The search for the values at which residuals are smallest, within bounds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.calibration.losses import TUNING, Loss, growth
+from dpgcli.errors import FitError
+
+NEAR_BOUND = 1e-3  # of a parameter's size: closer than this, the bound itself is tried
+ALIKE = 1e-9  # smallest singular value of the Jacobian's unit columns that tells them apart
+TOLERANCE = 1e-14
+MOST_STEPS = 500
+NORMAL_DEVIATION = 1.4826  # of normal errors, over their median absolute value
+
+Function = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value to fit: its key (unit in the name), where to start, and bounds; or held at start."""
+
+    key: str
+    start: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    is_free: bool = True
+
+    @property
+    def size(self) -> float:
+        """A positive number of the parameter's magnitude.
+
+        >>> Parameter("force_linearity", -0.5).size, Parameter("force_linearity", 0.0).size
+        (0.5, 1.0)
+        """
+        return abs(self.start) or 1.0
+
+
+@dataclass(frozen=True)
+class Search:
+    """What is minimized: the rows that count, of a residual, under a loss."""
+
+    parameters: tuple[Parameter, ...]
+    residual: Function
+    jacobian: Function
+    loss: Loss
+    rows: Indices
+
+    def scaled(self, start: Array, free: Flags, given: float | None) -> tuple[Array, float]:
+        """Where to start and the scale of the loss, from fits that each refine the scale."""
+        if given is not None or self.loss is Loss.LINEAR:
+            return start, 1.0 if given is None else given
+        plain = replace(self, loss=Loss.LINEAR)
+        values = plain.solved(start, free, 1.0)[0]
+        scale = 1.0
+        for _ in range(3):
+            size = float(np.median(np.abs(self.residual(values))))
+            if size == 0.0:
+                break  # half of the points are met exactly: any scale will do
+            scale = TUNING[self.loss] * NORMAL_DEVIATION * size
+            values = self.solved(values, free, scale)[0]
+        return values, scale
+
+    def solved(self, start: Array, free: Flags, scale: float) -> tuple[Array, Flags]:
+        """Values at the smallest cost, and which are free; those that end at a bound are held."""
+        values = self.searched(start, free, scale)
+        for place in np.flatnonzero(free):
+            parameter = self.parameters[place]
+            for bound in (parameter.lower, parameter.upper):
+                if abs(values[place] - bound) > NEAR_BOUND * parameter.size:
+                    continue
+                held = free.copy()
+                held[place] = False
+                moved = values.copy()
+                moved[place] = bound
+                at_bound, still_free = self.solved(moved, held, scale)
+                if self.cost(at_bound, scale) <= self.cost(values, scale) * (1.0 + 1e-9):
+                    return at_bound, still_free
+        return values, free
+
+    def searched(self, start: Array, free: Flags, scale: float) -> Array:
+        """The minimum over the free parameters. Raises FitError where there is none to be found."""
+        if not free.any():
+            return start
+        at_start = self.residual(start)[self.rows]
+        if not np.isfinite(at_start).all():
+            raise FitError(f"the model has no value at its start: {self.named(start)}")
+        size, lower, upper = np.array([(p.size, p.lower, p.upper) for p in self.parameters])[free].T
+        # all of order one, so that tolerances mean the same in any unit
+        unit = float(np.sqrt((at_start**2).mean())) or 1.0
+
+        def residual(scaled: Array) -> Array:
+            return np.asarray(self.residual(_with(start, free, scaled * size))[self.rows] / unit)
+
+        def jacobian(scaled: Array) -> Array:
+            slopes = self.jacobian(_with(start, free, scaled * size))
+            return np.asarray(slopes[np.ix_(self.rows, free)] * size / unit)
+
+        found = least_squares(
+            residual,
+            start[free] / size,
+            jacobian,
+            bounds=(lower / size, upper / size),
+            method="trf",
+            loss=self.loss.value,
+            f_scale=scale / unit,
+            ftol=TOLERANCE,
+            xtol=TOLERANCE,
+            gtol=TOLERANCE,
+            max_nfev=MOST_STEPS,
+        )
+        values = _with(start, free, found.x * size)
+        self.check_told_apart(values, free)
+        if found.status <= 0:
+            raise FitError(f"no convergence after {found.nfev} steps, at {self.named(values)}")
+        return values
+
+    def check_told_apart(self, values: Array, free: Flags) -> None:
+        """Raise FitError for parameters that the data leave undetermined."""
+        slopes = self.jacobian(values)[np.ix_(self.rows, free)]
+        length = np.sqrt((slopes**2).sum(axis=0))
+        columns = slopes / np.where(length > 0.0, length, 1.0)
+        _, singular, directions = np.linalg.svd(columns)
+        if len(singular) == len(length) and singular[-1] > ALIKE:
+            return
+        keys = [p.key for p, is_free in zip(self.parameters, free, strict=True) if is_free]
+        if idle := [key for key, size in zip(keys, length, strict=True) if size == 0.0]:
+            raise FitError(f"the data do not depend on {' and '.join(idle)}: fix it")
+        alike = [k for k, part in zip(keys, directions[-1], strict=True) if abs(part) > 0.1]
+        raise FitError(f"the data cannot tell {' and '.join(alike)} apart: fix one of them")
+
+    def cost(self, values: Array, scale: float) -> float:
+        """½ Σ C² ρ((r/C)²) over the rows that count."""
+        ratio = (self.residual(values)[self.rows] / scale) ** 2
+        return float(0.5 * scale**2 * growth(self.loss, ratio).sum())
+
+    def named(self, values: Array) -> str:
+        """Values with their keys, for messages."""
+        pairs = zip(self.parameters, values, strict=True)
+        return ", ".join(f"{p.key} = {value:.6g}" for p, value in pairs)
+
+
+def _with(values: Array, free: Flags, some: Array) -> Array:
+    """The values with the free ones replaced."""
+    changed = values.copy()
+    changed[free] = some
+    return changed
+
+
+def differences(residual: Function, parameters: tuple[Parameter, ...]) -> Function:
+    """A Jacobian by central differences."""
+    steps = np.diag([6e-6 * p.size for p in parameters])  # cube root of the rounding unit
+
+    def jacobian(values: Array) -> Array:
+        pairs = [(residual(values + s) - residual(values - s)) / (2.0 * s.sum()) for s in steps]
+        return np.stack(pairs, axis=1)
+
+    return jacobian

@@ -1,0 +1,192 @@
+"""The calibration file: fitted values with their errors, where they hold and what they come from.
+
+Written by `dpg fit`, read by specs. Keys of values and geometry are those of a spec.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from difflib import get_close_matches
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+import numpy as np
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+
+from dpgcli import __version__
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.calibration.models import (
+    Calibration,
+    Curve,
+    DataFile,
+    Fitted,
+    Grid,
+    Quality,
+    ScalingLaw,
+    TravelToOpening,
+    Values,
+)
+from dpgcli.files.output import whole_file
+from dpgcli.files.spec.models import Geometry, Section
+from dpgcli.files.spec.places import KeyPath, in_order, shown
+from dpgcli.files.spec.source import Document, read_document
+
+__all__ = [
+    "VERSION",
+    "Calibration",
+    "Curve",
+    "DataFile",
+    "Fitted",
+    "Grid",
+    "Quality",
+    "ScalingLaw",
+    "TravelToOpening",
+    "Values",
+    "made_by",
+    "read_calibration",
+    "source_of",
+    "write_calibration",
+]
+
+VERSION = 1
+Issue = tuple[KeyPath, str, str]  # key, expected, found
+
+
+def source_of(path: Path, rows: int) -> DataFile:
+    """The name and SHA-256 of a file of data, and how many of its rows were used."""
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return DataFile(file=path.name, sha256=digest, rows=rows)
+
+
+def made_by() -> str:
+    """This program, as calibration files name it."""
+    return f"dpg {__version__}"
+
+
+def write_calibration(path: Path, calibration: Calibration) -> None:
+    """Write a calibration: the same one gives the same bytes.
+
+    Raises OutputError, and leaves no half-written file whatever happens.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None  # leaves on one line, sections on several
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.width = 110
+    yaml.allow_unicode = True
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
+        yaml.dump(calibration.model_dump(exclude_none=True), stream)
+
+
+def read_calibration(path: str | Path) -> Calibration:
+    """Read and check a calibration. Raises SpecError with every problem and its place."""
+    document = read_document(path)
+    try:
+        found = Calibration.model_validate(document.data)
+    except ValidationError as error:
+        problems = [_problem(document, e) for e in error.errors(include_url=False)]
+        raise SpecError(in_order([*document.problems, *problems])) from None
+    problems = [document.problem(*issue) for issue in _issues(found)]
+    if problems or document.problems:
+        raise SpecError(in_order([*document.problems, *problems]))
+    return found
+
+
+def _problem(document: Document, error: Any) -> Problem:
+    """One finding of the models as a problem with a place."""
+    path: KeyPath = error["loc"]
+    section, description = _model_at(path)
+    if error["type"] == "extra_forbidden":
+        known = list(section.model_fields)
+        close = get_close_matches(str(path[-1]), known, n=1)
+        hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
+        return document.problem(path, "a known key", shown(path[-1]), hint)
+    found = "nothing" if error["type"] == "missing" else shown(error["input"])
+    return document.problem(path, description, found)
+
+
+def _model_at(path: KeyPath) -> tuple[type[Section], str]:
+    """The section that a key path stands in, and what its key describes."""
+    section: type[Section] = Calibration
+    kind: Any = Calibration
+    description = "a section of keys"
+    for part in path:
+        kind = _bare(kind)
+        if not isinstance(kind, type) or not issubclass(kind, Section):
+            kind = (get_args(kind) or (kind,))[-1]  # the items of a list or mapping
+            continue
+        section = kind
+        field = section.model_fields.get(str(part))
+        if field is None:
+            break
+        kind, description = field.annotation, field.description or "a section of keys"
+    return section, description
+
+
+def _bare(kind: Any) -> Any:
+    """A type without what is said about it, and without None."""
+    while get_origin(kind) in (Annotated, Union, UnionType):
+        kind = get_args(kind)[0]
+    return kind
+
+
+def _issues(calibration: Calibration) -> Iterator[Issue]:
+    """What is wrong between keys that are right by themselves."""
+    if calibration.grid is None and not (calibration.values and calibration.values.given()):
+        yield (), "values, a grid or both", "neither"
+    if calibration.correlation is not None:
+        yield from _correlation_issues(calibration.correlation, list(calibration.uncertain))
+    if calibration.curve is not None:
+        yield from _curve_issues(calibration.curve)
+    if calibration.grid is not None:
+        yield from _grid_issues(calibration.grid)
+
+
+def _correlation_issues(rows: list[list[float]], keys: list[str]) -> Iterator[Issue]:
+    path: KeyPath = ("correlation",)
+    if len(rows) != len(keys) or any(len(row) != len(keys) for row in rows):
+        expected = f"{len(keys)} rows of as many numbers, for {', '.join(keys) or 'no value'}"
+        yield path, expected, f"rows of {', '.join(str(len(row)) for row in rows)}"
+        return
+    matrix = np.array(rows).reshape(len(keys), len(keys))
+    if (np.diag(matrix) != 1.0).any() or (matrix != matrix.T).any():
+        yield path, "a symmetric matrix with 1 on its diagonal", "another"
+    elif len(keys) and np.linalg.eigvalsh(matrix)[0] < -1e-9:
+        yield path, "a matrix without negative eigenvalue", "one with"
+
+
+def _curve_issues(curve: Curve) -> Iterator[Issue]:
+    path: KeyPath = ("curve", "travel_mm")
+    if len(curve.travel_mm) != len(curve.energy_mJ):
+        yield path, f"{len(curve.energy_mJ)} numbers, as energies", str(len(curve.travel_mm))
+    for index in np.flatnonzero(np.diff(curve.travel_mm) <= 0.0)[:1].tolist():
+        expected = f"more than {curve.travel_mm[index]:g}"
+        yield (*path, index + 1), expected, f"{curve.travel_mm[index + 1]:g}"
+    for index, (start, end) in enumerate(curve.unsampled_mm):
+        if not start < end:
+            yield (
+                ("curve", "unsampled_mm", index),
+                "the smaller travel first",
+                f"{start:g}, {end:g}",
+            )
+
+
+def _grid_issues(grid: Grid) -> Iterator[Issue]:
+    sizes = {len(values) for values in grid.points.values()}
+    if len(sizes) > 1:
+        yield ("grid", "points"), "lists of one length", " and ".join(map(str, sorted(sizes)))
+    for index, key in enumerate(grid.over):
+        if key not in Geometry.model_fields:
+            yield ("grid", "over", index), "a key of the geometry section", shown(key)
+        elif key not in grid.points:
+            yield ("grid", "points"), f"a list for {key}", "none"
+    if (grid.method == "scaling") != (grid.scaling is not None):
+        found = "another method" if grid.scaling is not None else "no section scaling"
+        yield ("grid", "method"), "scaling with a section scaling, else none", found
+    for key, law in (grid.scaling or {}).items():
+        path: KeyPath = ("grid", "scaling", key)
+        if key not in grid.points:
+            yield path, "a quantity among the points", shown(key)
+        if set(law.exponents) != set(grid.over):
+            found = ", ".join(law.exponents) or "none"
+            yield (*path, "exponents"), f"exponents of {', '.join(grid.over)}", found

@@ -1,0 +1,151 @@
+"""The keys of a calibration file, their types and their meaning.
+
+Each description says what is expected: it is what a wrong value is answered with.
+"""
+
+from typing import Annotated, Generic, Literal, TypeVar
+
+from pydantic import Field
+
+from dpgcli.files.spec.models import (
+    BarStiffness,
+    Fraction,
+    Geometry,
+    NotNegative,
+    Positive,
+    Section,
+)
+
+T = TypeVar("T")
+Numbers = Annotated[list[float], Field(min_length=1)]
+Positives = Annotated[list[Positive], Field(min_length=1)]
+
+
+class Fitted(Section, Generic[T]):
+    """A value, its standard error if it has one, and its 95 % bootstrap interval if asked for."""
+
+    value: T = Field(description="a number in the unit of its key")
+    standard_error: NotNegative | None = Field(default=None, description="a number >= 0")
+    interval: Annotated[list[float], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="two numbers, the lower one first"
+    )
+
+
+class Values(Section):
+    """Lattice values; keys as in a spec."""
+
+    segment_length_mm: Fitted[Positive] | None = None
+    segment_height_mm: Fitted[Positive] | None = None
+    stroke_mm: Fitted[Positive] | None = None
+    bistable_stiffness_N_per_mm: Fitted[Positive] | None = None
+    force_linearity: Fitted[Fraction] | None = None
+    hinge_stiffness_N_mm_per_rad: Fitted[NotNegative] | None = None
+    linear_stiffness_N_per_mm: Fitted[BarStiffness] | None = None
+
+    def given(self) -> dict[str, Fitted[float]]:
+        """The values that there are, by key."""
+        return {key: value for key, value in vars(self).items() if value is not None}
+
+
+class TravelToOpening(Section):
+    """How the opening x of a unit follows from the dome's travel u: x = factor u."""
+
+    rule: Literal["equal", "proportional"] = Field(description="equal or proportional")
+    factor: Positive = Field(default=1.0, description="a number > 0")
+
+
+Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Curve(Section):
+    """The dome's own energy over its travel, by travel."""
+
+    travel_mm: Annotated[list[float], Field(min_length=2)] = Field(
+        description="numbers in mm, each larger than the one before"
+    )
+    energy_mJ: Annotated[list[float], Field(min_length=2)] = Field(
+        description="numbers in mJ, one for each travel"
+    )
+    travel_to_opening: TravelToOpening = Field(description="a rule and its factor")
+    unsampled_mm: list[Stretch] = Field(
+        default_factory=list, description="pairs of travels in mm between which nothing is known"
+    )
+
+
+class ScalingLaw(Section):
+    """A product of powers: value at the reference geometry, times (geometry/reference)^exponent."""
+
+    at_reference: Positive = Field(description="a number > 0")
+    standard_error: NotNegative | None = Field(
+        default=None, description="a number >= 0, relative to the value"
+    )
+    exponents: dict[str, float] = Field(description="a number for each key of `over`")
+    standard_errors: dict[str, NotNegative] | None = Field(
+        default=None, description="a number >= 0 for each key of `over`"
+    )
+
+
+class Grid(Section):
+    """Quantities known at several geometries, and the way between them."""
+
+    method: Literal["scaling", "interpolation"] = Field(description="scaling or interpolation")
+    over: Annotated[list[str], Field(min_length=1)] = Field(
+        description="keys of the geometry, at least one"
+    )
+    points: dict[str, Positives] = Field(
+        description="lists of numbers > 0 by key, equally long, one list for each key of `over`"
+    )
+    reference: dict[str, Positive] | None = Field(
+        default=None, description="a geometry: a number > 0 for each key of `over`"
+    )
+    scaling: dict[str, ScalingLaw] | None = Field(
+        default=None, description="a law for each quantity, for method scaling"
+    )
+    leave_one_out: dict[str, NotNegative] | None = Field(
+        default=None, description="the largest relative error by quantity"
+    )
+
+
+class Quality(Section):
+    """How well the model meets the data."""
+
+    n_points: Annotated[int, Field(ge=1)] = Field(description="a whole number from 1")
+    r_squared: Annotated[float, Field(le=1)] | None = Field(
+        default=None, description="a number up to 1"
+    )
+    rms_residual: NotNegative | None = Field(default=None, description="a number >= 0")
+    residual_unit: str | None = Field(default=None, description="a unit")
+
+
+class DataFile(Section):
+    """A file that values come from."""
+
+    file: str = Field(description="the name of a file")
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] = Field(
+        description="64 hexadecimal digits"
+    )
+    rows: Annotated[int, Field(ge=0)] = Field(description="a whole number from 0")
+
+
+class Calibration(Section):
+    """What `dpg fit` found out: values for one geometry, or a grid over several."""
+
+    calibration_version: Literal[1] = Field(description="1: what this version of dpg reads")
+    made_by: str = Field(description="the program and its version")
+    method: str = Field(description="one line of text")
+    values: Values | None = Field(default=None, description="a section of fitted values")
+    correlation: list[Numbers] | None = Field(
+        default=None, description="a symmetric matrix over the values that have errors"
+    )
+    geometry: Geometry | None = Field(default=None, description="a section of dimensions")
+    curve: Curve | None = Field(default=None, description="the dome's energy over its travel")
+    grid: Grid | None = Field(default=None, description="a section of points")
+    quality: Quality | None = Field(default=None, description="a section")
+    warnings: list[str] = Field(default_factory=list, description="a list of texts")
+    sources: list[DataFile] = Field(default_factory=list, description="a list of files")
+
+    @property
+    def uncertain(self) -> dict[str, float]:
+        """Standard errors by key, of the values that have one; the order of `correlation`."""
+        given = {} if self.values is None else self.values.given()
+        return {k: v.standard_error for k, v in given.items() if v.standard_error is not None}

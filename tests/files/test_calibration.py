@@ -1,0 +1,168 @@
+"""Calibration files: what is written is read back, and every mistake has its place."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from dpgcli.errors import OutputError, SpecError
+from dpgcli.files.calibration import Calibration, read_calibration, source_of, write_calibration
+
+WHOLE = """\
+calibration_version: 1
+made_by: dpg 0.1.0
+method: least squares on the energy, linear loss
+values:
+  bistable_stiffness_N_per_mm: {value: 12.84, standard_error: 0.31, interval: [12.2, 13.5]}
+  force_linearity: {value: 0.043, standard_error: 0.002}
+  stroke_mm: {value: 3.5}
+correlation:
+- [1.0, -0.93]
+- [-0.93, 1.0]
+geometry: {dome_height_mm: 6.5, elastic_modulus_MPa: 26}
+curve:
+  travel_mm: [0, 1, 14]
+  energy_mJ: [0, 20.5, 68]
+  travel_to_opening: {rule: proportional, factor: 0.2553}
+  unsampled_mm: [[1, 14]]
+grid:
+  method: scaling
+  over: [dome_height_mm]
+  points: {dome_height_mm: [4.5, 5.5, 6.5], stroke_mm: [1.5, 2.5, 3.5]}
+  scaling:
+    stroke_mm: {at_reference: 2.4, exponents: {dome_height_mm: 2.3}}
+quality: {n_points: 57, r_squared: 0.98, rms_residual: 1.2, residual_unit: mJ}
+warnings: [no data from 1 to 14 mm]
+sources:
+- {file: dome.csv, sha256: "DIGEST", rows: 57}
+""".replace("DIGEST", 64 * "0")
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tpu.yaml"
+
+
+def read(path: Path, text: str) -> Calibration:
+    path.write_text(text, encoding="utf-8")
+    return read_calibration(path)
+
+
+def problems(path: Path, text: str) -> list[str]:
+    with pytest.raises(SpecError) as raised:
+        read(path, text)
+    return [str(problem).removeprefix(f"{path}:") for problem in raised.value.problems]
+
+
+def test_what_is_written_is_read_back(path: Path) -> None:
+    found = read(path, WHOLE)
+    again = path.with_name("again.yaml")
+    write_calibration(again, found)
+    assert read_calibration(again) == found
+
+
+def test_the_same_bytes_every_time(path: Path) -> None:
+    found = read(path, WHOLE)
+    write_calibration(path, found)
+    first = path.read_bytes()
+    write_calibration(path, read_calibration(path))
+    assert path.read_bytes() == first
+    assert [p.name for p in path.parent.iterdir()] == ["tpu.yaml"]
+
+
+def test_what_a_spec_needs_is_at_hand(path: Path) -> None:
+    found = read(path, WHOLE)
+    assert found.values is not None
+    assert {key: fitted.value for key, fitted in found.values.given().items()} == {
+        "bistable_stiffness_N_per_mm": 12.84,
+        "force_linearity": 0.043,
+        "stroke_mm": 3.5,
+    }
+    assert found.uncertain == {"bistable_stiffness_N_per_mm": 0.31, "force_linearity": 0.002}
+
+
+def test_a_file_that_cannot_be_written_is_not_begun(path: Path) -> None:
+    found = read(path, WHOLE)
+    with pytest.raises(OutputError, match="cannot write"):
+        write_calibration(path / "below.yaml", found)
+
+
+def test_a_source_is_known_by_its_content(path: Path) -> None:
+    path.write_bytes(b"travel_mm\n1\n")
+    source = source_of(path, 1)
+    assert (source.file, source.rows) == ("tpu.yaml", 1)
+    assert source.sha256 == hashlib.sha256(b"travel_mm\n1\n").hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("version: 1", "version: 2", "1:1: calibration_version: expected 1: what this version"),
+        ("made_by:", "made_buy:", '2:1: made_buy: expected a known key, found "made_buy" (did'),
+        ("value: 12.84", "value: -1", "5:33: values.bistable_stiffness_N_per_mm.value: expected"),
+        ("value: 12.84", 'value: "12.84"', 'found "12.84"'),
+        ("value: 12.84", "value: .nan", "found .nan"),
+        ("value: 0.043", "value: 1.5", "6:21: values.force_linearity.value: expected"),
+        (
+            "error: 0.31",
+            "error: -0.31",
+            "values.bistable_stiffness_N_per_mm.standard_error: expected",
+        ),
+        ("stroke_mm: {value", "strike_mm: {value", "did you mean stroke_mm?"),
+        ("- [1.0, -0.93]\n", "", "8:1: correlation: expected 2 rows of as many numbers"),
+        ("- [1.0, -0.93]", "- [1.0, 0.93]", "correlation: expected a symmetric matrix"),
+        ("0.93", "1.93", "correlation: expected a matrix without negative eigenvalue"),
+        ("dome_height_mm: 6.5", "dome_hight_mm: 6.5", "did you mean dome_height_mm?"),
+        ("[0, 1, 14]", "[0, 14, 1]", "13:22: curve.travel_mm.2: expected more than 14, found 1"),
+        ("[0, 1, 14]", "[0, 1, true]", "13:21: curve.travel_mm.2: expected numbers in mm"),
+        ("[0, 1, 14]", "[0, 1]", "13:3: curve.travel_mm: expected 3 numbers, as energies, found 2"),
+        (
+            "[[1, 14]]",
+            "[[14, 1]]",
+            "16:18: curve.unsampled_mm.0: expected the smaller travel first",
+        ),
+        ("rule: proportional", "rule: linear", "expected equal or proportional"),
+        ("factor: 0.2553", "factor: 0", "curve.travel_to_opening.factor: expected a number > 0"),
+        ("over: [dome_height_mm]", "over: [stroke_mm]", "expected a key of the geometry section"),
+        ("over: [dome_height_mm]", "over: [unit_cell_mm]", "expected a list for unit_cell_mm"),
+        (
+            "[4.5, 5.5, 6.5]",
+            "[4.5, 5.5]",
+            "20:3: grid.points: expected lists of one length, found 2 and 3",
+        ),
+        ("[4.5, 5.5, 6.5]", "[4.5, 5.5, -6.5]", "expected lists of numbers > 0 by key"),
+        ("method: scaling", "method: interpolation", "expected scaling with a section scaling"),
+        (
+            "exponents: {dome_height_mm",
+            "exponents: {stroke_mm",
+            "expected exponents of dome_height_mm",
+        ),
+        (
+            "    stroke_mm: {at",
+            "    limit_pressure_MPa: {at",
+            "expected a quantity among the points",
+        ),
+        ("n_points: 57", "n_points: 57.5", "quality.n_points: expected a whole number from 1"),
+        ('000"', '00x"', "sources.0.sha256: expected 64 hexadecimal digits"),
+    ],
+)
+def test_a_mistake_has_its_place(path: Path, before: str, after: str, said: str) -> None:
+    assert before in WHOLE
+    found = problems(path, WHOLE.replace(before, after))
+    assert any(said in problem for problem in found), found
+
+
+def test_every_mistake_is_said_at_once(path: Path) -> None:
+    wrong = WHOLE.replace("12.84", "-1").replace("n_points: 57", "n_points: 0") + "colour: red\n"
+    assert [problem.split(":")[0] for problem in problems(path, wrong)] == ["5", "23", "27"]
+
+
+def test_a_calibration_says_something(path: Path) -> None:
+    head = "calibration_version: 1\nmade_by: dpg\nmethod: none\n"
+    assert problems(path, head) == ["1:1: document: expected values, a grid or both, found neither"]
+    assert problems(path, head + "values: {}\n")
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="no such file"):
+        read_calibration(tmp_path / "none.yaml")
