@@ -29,7 +29,8 @@ def extended_units(finger: Finger) -> list[Unit]:
     """The units of a finger of one design, their doubles taken as exact."""
     from mpmath import mpf
 
-    columns = (np.broadcast_to(v, (finger.n_units, 1))[:, 0] for v in finger.arrays().values())
+    arrays = list(finger.arrays().values())[: len(Unit._fields)]
+    columns = (np.broadcast_to(v, (finger.n_units, 1))[:, 0] for v in arrays)
     return [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
 
 

@@ -19,13 +19,17 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True)
 class Source:
-    """One lattice value, in its key's unit, of some units, written as in the spec ("1-5", "4")."""
+    """One lattice value, in its key's unit, of some units, written as in the spec ("1-5", "4").
+
+    Its standard error, if it was fitted, is that of the calibration, scaled as the value.
+    """
 
     key: str
     units: str
     value: float
     origin: Origin
     rule: str
+    standard_error: float | None = None
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from dpgcli.files.calibration.models import (
     Values,
 )
 from dpgcli.files.output import whole_file
-from dpgcli.files.spec.models import Geometry, Section
+from dpgcli.files.sections import Geometry, Section
 from dpgcli.files.spec.places import KeyPath, in_order, shown
 from dpgcli.files.spec.source import Document, read_document
 

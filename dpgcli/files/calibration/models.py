@@ -7,7 +7,7 @@ from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import Field
 
-from dpgcli.files.spec.models import (
+from dpgcli.files.sections import (
     BarStiffness,
     Fraction,
     Geometry,
@@ -130,6 +130,7 @@ class DataFile(Section):
 class Calibration(Section):
     """What `dpg fit` found out: values for one geometry, or a grid over several."""
 
+    file: str | None = Field(default=None, description="the name of the file, once it is read")
     calibration_version: Literal[1] = Field(description="1: what this version of dpg reads")
     made_by: str = Field(description="the program and its version")
     method: str = Field(description="one line of text")

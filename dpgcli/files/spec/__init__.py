@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.problems import checked
+from dpgcli.files.spec.references import with_calibrations
 from dpgcli.files.spec.scenes import scene_of
 from dpgcli.files.spec.settings import changed, with_settings
 from dpgcli.files.spec.source import Document, read_document
@@ -20,6 +21,7 @@ __all__ = [
     "Spec",
     "canonical_json",
     "json_schema",
+    "read_scene",
     "read_spec",
     "scene_of",
     "spelled",
@@ -34,7 +36,13 @@ def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
     `settings` are "key.path=value" texts that change the file's data before it is checked.
     Raises SpecError with all problems at once, those of content after those of form are mended.
     """
-    return checked(with_settings(read_document(path), settings))
+    return checked(read_scene(path, settings))
+
+
+def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
+    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    folder = Path() if str(path) == "-" else Path(path).parent
+    return with_calibrations(with_settings(read_document(path), settings), folder)
 
 
 def variant(data: Mapping[str, Any], changes: Mapping[str, float]) -> Scene:

@@ -11,12 +11,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dpgcli.files.spec.models import LARGEST, SMALLEST
+from dpgcli.files.calibration.models import Calibration, Fitted
+from dpgcli.files.sections import LARGEST, SMALLEST, Geometry
 from dpgcli.files.spec.places import KeyPath
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.scene import Origin
 
 AGREEMENT = 1e-6
+PUBLISHED = "published"
 
 
 class Issue(NamedTuple):
@@ -29,22 +31,27 @@ class Issue(NamedTuple):
 
 
 class Value(NamedTuple):
-    """A lattice value of some units and how it came about."""
+    """A lattice value of some units, how it came about, and its standard error if one is known."""
 
     value: float
     origin: Origin
     rule: str
+    standard_error: float | None = None
 
 
 @dataclass(frozen=True)
 class Derivation:
-    """How geometry yields one lattice value; `origin` only where a calibration is behind it."""
+    """How geometry yields one lattice value; `origin` only where a calibration is behind it.
+
+    `is_fitted` says whether a calibration file may give the value instead.
+    """
 
     key: str
     needs: tuple[str, ...]
     value: Callable[..., float]
     rule: str
     origin: Callable[..., Origin] | None = None
+    is_fitted: bool = True
 
 
 SEGMENT_LENGTH = Derivation(
@@ -106,7 +113,7 @@ class Group:
     """Units that share all values: what the spec gives them, and which of it an override gave."""
 
     units: tuple[int, ...]
-    calibration: str | None
+    calibrations: tuple[str | Calibration, ...]
     geometry: Mapping[str, float]
     lattice: Mapping[str, float]
     override: str | None = None
@@ -125,8 +132,18 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
     """The lattice value of a group of units, or why there is none."""
     if derivation.key in group.lattice:
         return _given_value(derivation, group, base)
-    if derivation.origin is not None and group.calibration is None:
+    for calibration in group.calibrations:
+        if calibration == PUBLISHED and derivation.origin is not None:
+            return _derived_value(derivation, group)
+        if isinstance(calibration, Calibration) and (found := _fitted(derivation, calibration)):
+            return _from_file(derivation, group, calibration, found)
+    if derivation.origin is not None:
         return _uncalibrated(derivation, group)
+    return _derived_value(derivation, group)
+
+
+def _derived_value(derivation: Derivation, group: Group) -> Value | Issue:
+    """A value by the rule, if the geometry is there."""
     missing = [need for need in derivation.needs if need not in group.geometry]
     if missing:
         return _missing(derivation, group, missing)
@@ -137,6 +154,51 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
         return Value(derived, Origin.DERIVED, derivation.rule)
     origin = derivation.origin(*_dimensions(derivation, group))
     return Value(derived, origin, _calibration_rule(derivation, origin))
+
+
+def _fitted(derivation: Derivation, calibration: Calibration) -> Fitted[float] | None:
+    values = {} if calibration.values is None else calibration.values.given()
+    return values.get(derivation.key) if derivation.is_fitted else None
+
+
+def _from_file(
+    derivation: Derivation, group: Group, calibration: Calibration, found: Fitted[float]
+) -> Value | Issue:
+    """A calibrated value, scaled by the rule where the geometry is another."""
+    name = f"{'held' if found.standard_error is None else 'fitted'}, {calibration.file}"
+    own = dimensions(calibration.geometry)
+    here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
+    changed = [need for need, size in here.items() if need in own and not agree(size, own[need])]
+    if unknown := [need for need in here if need not in own]:
+        rule = f"{name}, which does not state its {listed(unknown)}"
+        return Value(found.value, Origin.EXTRAPOLATED, rule, found.standard_error)
+    if not changed:
+        return Value(found.value, Origin.CALIBRATED, name, found.standard_error)
+    if missing := [need for need in derivation.needs if need not in own]:
+        rule = f"{name}, which does not state its {listed(missing)} to scale by"
+        return Value(found.value, Origin.EXTRAPOLATED, rule, found.standard_error)
+    there = [own[need] for need in derivation.needs]
+    factor = derivation.value(*(here.get(need, own[need]) for need in derivation.needs))
+    factor /= derivation.value(*there)
+    if not SMALLEST <= factor <= LARGEST:
+        return _impossible(derivation, group, found.value * factor)
+    origin = Origin.SCALED
+    if derivation.origin is geometry.dome_origin:
+        origin = max(origin, geometry.dome_origin(*_dome(own | here)), key=list(Origin).index)
+    error = None if found.standard_error is None else found.standard_error * factor
+    return Value(found.value * factor, origin, f"{name}, {derivation.rule}", error)
+
+
+def _dome(sizes: Mapping[str, float]) -> tuple[float, float]:
+    return sizes["dome_height_mm"], sizes["dome_thickness_mm"]
+
+
+def dimensions(section: Geometry | None) -> dict[str, float]:
+    """The dimensions that a geometry gives, the chamber's width from the unit cell if need be."""
+    given = {} if section is None else {k: v for k, v in vars(section).items() if v is not None}
+    if "chamber_width_mm" not in given and "unit_cell_mm" in given:
+        given["chamber_width_mm"] = geometry.chamber_width(given["unit_cell_mm"])
+    return given
 
 
 def _given_value(derivation: Derivation, group: Group, base: Group) -> Value | Issue:
@@ -185,7 +247,8 @@ def _uncalibrated(derivation: Derivation, group: Group) -> Issue:
         group.path("lattice", derivation.key),
         "a value, or a calibration to take it from",
         "neither",
-        f"give it, or set calibration: published with {listed(derivation.needs)}",
+        "give it, calibrate by a file that has it, or set calibration: published with "
+        f"{listed(derivation.needs)}",
     )
 
 
@@ -224,7 +287,7 @@ def _moved(derivation: Derivation, group: Group, given: float, changed: list[str
         ("finger", "overrides", str(group.override), "lattice", derivation.key),
         f"a value of its own for units with another {listed(tuple(changed))}",
         f"only {number(given)} of the whole finger",
-        "give it here, or leave it to calibration: published everywhere",
+        "give it here, or leave it to a calibration everywhere",
     )
 
 

@@ -6,16 +6,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.sections import Geometry, Lattice, Section, UnitGeometry, UnitLattice
 from dpgcli.files.spec.models import (
     MAX_UNITS,
     FingerSpec,
-    Geometry,
     GripperSpec,
-    Lattice,
-    Section,
     Spec,
-    UnitGeometry,
-    UnitLattice,
     UnitOverride,
 )
 from dpgcli.files.spec.places import KeyPath, dotted, in_order, shown
@@ -41,7 +37,8 @@ SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
 EXPECTED = {
     "units": f"a whole number from 1 to {MAX_UNITS}",
     "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
-    "calibration": '"published"',
+    "calibration": '"published", the name of a calibration file, or a list of these',
+    "law": '"published", "tabulated" or "push_only"',
     "force_linearity": "a number from 0 to 1",
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
     "hinge_stiffness_N_mm_per_rad": "a stiffness >= 0 in N mm/rad",
@@ -58,6 +55,8 @@ HINTS = {
     "segment_height_mm": "half the chamber width + half the limiting layer",
 }
 
+CALIBRATION: KeyPath = ("finger", "calibration")
+TEXTS = ("calibration", "law")
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
 OUT_OF_RANGE = "from 1e-12 to 1e12; 1e18 for the linear stiffness"
 
@@ -89,11 +88,20 @@ def _validated(document: Document) -> tuple[Spec | None, list[Problem]]:
 def _problem(document: Document, error: Any) -> Problem:
     """One finding of the models as a problem with a place."""
     path: KeyPath = error["loc"]
+    if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
+        path = CALIBRATION
+        error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
     return document.problem(path, _expected(path), found, _hint(key, error))
+
+
+def _at(data: Any, path: KeyPath) -> Any:
+    for part in path:
+        data = data[part]
+    return data
 
 
 def _expected(path: KeyPath) -> str:
@@ -108,7 +116,7 @@ def _hint(key: str, error: Any) -> str:
     value = error["input"]
     if error["type"] == "model_type":
         return "keys below it, indented"
-    if isinstance(value, str) and key != "calibration":
+    if isinstance(value, str) and key not in TEXTS:
         return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if is_number and value > 0 and key not in BOUNDED:
@@ -125,7 +133,7 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
     ):
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
-    if pattern in SECTIONS or str(path[-1]) in ("overrides", "calibration"):
+    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS):
         return "the key of a number", dotted(path), "name the number itself"
     if parent not in SECTIONS:
         known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]

@@ -10,27 +10,33 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.errors import SpecError
+from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.spec.derivations import (
     DERIVATIONS,
     SEGMENT_HEIGHT,
+    STROKE,
     Group,
     Issue,
     Value,
     agree,
+    dimensions,
     number,
     value_of,
 )
+from dpgcli.files.spec.domes import Domes, domes_of
 from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
 from dpgcli.files.spec.places import KeyPath, Place, dotted, located
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import PUBLISHED as PUBLISHED_LAW
 from dpgcli.mechanics.scene import Gripper, Origin, Scene, Source
 
 
 @dataclass
 class Resolution:
-    """Lattice values by key and units, and the issues met on the way to them."""
+    """Lattice values by key and units, how domes answer, and the issues met on the way."""
 
+    domes: Domes = field(default_factory=lambda: Domes(PUBLISHED_LAW, DERIVATIONS))
     values: dict[str, list[tuple[Group, Value]]] = field(default_factory=dict)
     issues: list[Issue] = field(default_factory=list)
 
@@ -49,7 +55,7 @@ def scene_of(spec: Spec) -> Scene:
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
     values = resolution.values
     return Scene(
-        finger=_finger(spec.finger, values),
+        finger=_finger(spec.finger, resolution),
         sources=tuple(_sources(spec.finger, values)),
         gripper=_gripper(spec),
         layer_thickness=_given(spec.finger.geometry).get("limiting_layer_thickness_mm"),
@@ -110,8 +116,13 @@ def _resolved(finger: FingerSpec) -> Resolution:
     resolution = Resolution()
     base = _base(finger)
     resolution.issues += _chamber_issues(finger)
+    domes = domes_of(finger.law, base.calibrations)
+    if isinstance(domes, Issue):
+        resolution.issues.append(domes)
+        return resolution
+    resolution.domes = domes
     groups = [group for group in (base, *_overridden(finger, base)) if group.units]
-    for derivation in DERIVATIONS:
+    for derivation in domes.derivations:
         chosen = [base] if derivation is SEGMENT_HEIGHT else groups
         for group in chosen:
             value = value_of(derivation, group, base)
@@ -126,24 +137,28 @@ def _base(finger: FingerSpec) -> Group:
     """The units without an override."""
     taken = {unit for text in finger.overrides or {} for unit in unit_range(text)}
     units = tuple(unit for unit in range(1, finger.units + 1) if unit not in taken)
-    dimensions = _given(finger.geometry)
-    if "chamber_width_mm" not in dimensions and "unit_cell_mm" in dimensions:
-        width = geometry.chamber_width(dimensions["unit_cell_mm"])
-        dimensions["chamber_width_mm"] = width
-    return Group(units, finger.calibration, dimensions, _given(finger.lattice))
+    return Group(units, _calibrations(finger), dimensions(finger.geometry), _given(finger.lattice))
+
+
+def _calibrations(finger: FingerSpec) -> tuple[str | Calibration, ...]:
+    """What a spec calibrates by, in its order."""
+    said = finger.calibration
+    if said is None:
+        return ()
+    return tuple(said) if isinstance(said, list) else (said,)
 
 
 def _overridden(finger: FingerSpec, base: Group) -> Iterator[Group]:
     for text, override in (finger.overrides or {}).items():
-        dimensions = _given(override and override.geometry)
+        own = _given(override and override.geometry)
         lattice = _given(override and override.lattice)
         yield Group(
             unit_range(text),
-            finger.calibration,
-            {**base.geometry, **dimensions},
+            base.calibrations,
+            {**base.geometry, **own},
             {**base.lattice, **lattice},
             text,
-            frozenset(dimensions),
+            frozenset(own),
             frozenset(lattice),
         )
 
@@ -155,33 +170,47 @@ def _given(section: Any) -> dict[str, float]:
 
 def _chamber_issues(finger: FingerSpec) -> Iterator[Issue]:
     """Contradictions between the widths of the unit cell and of the chamber."""
-    dimensions = _given(finger.geometry)
-    if "unit_cell_mm" not in dimensions:
+    sizes = _given(finger.geometry)
+    if "unit_cell_mm" not in sizes:
         return
-    derived = geometry.chamber_width(dimensions["unit_cell_mm"])
+    derived = geometry.chamber_width(sizes["unit_cell_mm"])
     rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
     if derived <= 0:
         path: KeyPath = ("finger", "geometry", "unit_cell_mm")
-        yield Issue(path, "a length > 2 mm", number(dimensions["unit_cell_mm"]), rule)
+        yield Issue(path, "a length > 2 mm", number(sizes["unit_cell_mm"]), rule)
         return
-    given = dimensions.get("chamber_width_mm", derived)
+    given = sizes.get("chamber_width_mm", derived)
     if not agree(given, derived):
         path = ("finger", "geometry", "chamber_width_mm")
         yield Issue(path, f"{number(derived)} as unit_cell_mm has it", number(given), rule)
 
 
-def _finger(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Finger:
-    columns = {key: _column(spec.units, pairs) for key, pairs in values.items()}
+def _finger(spec: FingerSpec, resolution: Resolution) -> Finger:
+    none = np.zeros((1, 1))
+    columns = {key: _column(spec.units, pairs) for key, pairs in resolution.values.items()}
+    domes = resolution.domes
     return Finger(
         spec.units,
         segment_length=columns["segment_length_mm"],
         segment_height=columns["segment_height_mm"],
         stroke=columns["stroke_mm"],
         bistable_stiffness=columns["bistable_stiffness_N_per_mm"],
-        force_linearity=columns["force_linearity"],
+        force_linearity=columns.get("force_linearity", none),  # curves need none
         hinge_stiffness=columns["hinge_stiffness_N_mm_per_rad"],
         linear_stiffness=np.array([[spec.linear_stiffness_N_per_mm]]),
+        contact_travel=_contact(spec.units, resolution) if domes.travel else none,
+        law=domes.law,
     )
+
+
+def _contact(n_units: int, resolution: Resolution) -> Array:
+    """Travels at which domes touch: those of inverted domes at rest, less the strokes."""
+    pairs = [
+        (group, value._replace(value=resolution.domes.travel_at(height) - value.value))
+        for group, value in resolution.values[STROKE.key]
+        for height in [group.geometry.get("dome_height_mm")]
+    ]
+    return _column(n_units, pairs)
 
 
 def _column(n_units: int, pairs: list[tuple[Group, Value]]) -> Array:

@@ -41,12 +41,16 @@ _LEAKS = (ValueError, LookupError, AttributeError, TypeError, AssertionError, Ov
 
 @dataclass(frozen=True)
 class Document:
-    """The data of one YAML file, keys as text, with the place of each key and problems so far."""
+    """The data of one YAML file, keys as text, with the place of each key and problems so far.
+
+    `files` are others whose content is in the data.
+    """
 
     file: str
     data: dict[str, Any]
     places: dict[KeyPath, Place]
     problems: tuple[Problem, ...] = ()
+    files: tuple[Path, ...] = ()
 
     def place(self, path: KeyPath) -> Place:
         """Where the key stands, or the nearest section around it."""

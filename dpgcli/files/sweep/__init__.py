@@ -24,10 +24,10 @@ from dpgcli.exploration.space import (
     logarithmic,
     sampled,
 )
-from dpgcli.files.spec import Spec, canonical_json
+from dpgcli.files.spec import Spec, canonical_json, read_scene
 from dpgcli.files.spec.places import KeyPath, in_order, located, shown
 from dpgcli.files.spec.problems import checked, unknown_key
-from dpgcli.files.spec.settings import SETTING, with_settings
+from dpgcli.files.spec.settings import SETTING
 from dpgcli.files.spec.source import Document, read_document
 from dpgcli.files.sweep.models import (
     MANY_KEYS,
@@ -76,7 +76,7 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     if spec is None:
         raise SpecError(in_order([*document.problems, *problems]))
     base_path = path.parent / spec.base
-    base_document = with_settings(read_document(base_path), settings)
+    base_document = read_scene(base_path, settings)
     base = checked(base_document)
     reader = _SpaceReader(document, path.parent, base.gripper is not None)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
@@ -93,7 +93,7 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         Space(tuple(axis for axis in axes if axis is not None)),
         tuple(rule for rule in rules if rule is not None),
         base_path,
-        (path, base_path, *reader.tables),
+        (path, base_path, *base_document.files, *reader.tables),
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
     )

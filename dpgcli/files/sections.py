@@ -1,0 +1,99 @@
+"""Sections that specs and calibration files share: a finger's geometry and its lattice.
+
+Units are part of each key's name. Lengths, moduli and stiffnesses lie within 1e-12 to 1e12, so
+that any power of them that the model takes stays far from overflow; the linear stiffness, a stiff
+limit, may reach 1e18.
+"""
+
+import math
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
+
+
+def _rigid_or_bounded(value: float) -> float:
+    if value > STIFFEST and not math.isinf(value):
+        raise ValueError("out of range")
+    return value
+
+
+Positive = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+BarStiffness = Annotated[
+    float, Field(ge=SMALLEST, allow_inf_nan=True), AfterValidator(_rigid_or_bounded)
+]
+
+
+class Section(BaseModel):
+    """A mapping whose keys are all known."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class UnitGeometry(Section):
+    """Dimensions that may differ between the units of a finger."""
+
+    dome_height_mm: Positive | None = Field(
+        default=None, description="Height h of the dome at rest, in mm."
+    )
+    dome_thickness_mm: Positive | None = Field(
+        default=None, description="Thickness t of the dome, in mm."
+    )
+    chamber_length_mm: Positive | None = Field(
+        default=None, description="Inner length L_c of a chamber along the finger, in mm."
+    )
+    channel_width_mm: Positive | None = Field(
+        default=None, description="Width W_ch of the strip that bends between chambers, in mm."
+    )
+    unit_separation_mm: Positive | None = Field(
+        default=None, description="Gap s between neighboring chambers, in mm."
+    )
+    elastic_modulus_MPa: Positive | None = Field(
+        default=None, description="Young's modulus E of the material, in MPa."
+    )
+
+
+class Geometry(UnitGeometry):
+    """Dimensions of the molded finger."""
+
+    unit_cell_mm: Positive | None = Field(
+        default=None, description="Outer width UC of a unit in mm: chamber plus two 1 mm walls."
+    )
+    chamber_width_mm: Positive | None = Field(
+        default=None, description="Inner width W_c of a chamber, in mm; unit_cell_mm less 2 mm."
+    )
+    limiting_layer_thickness_mm: Positive | None = Field(
+        default=None, description="Thickness t_L of the limiting layer, in mm."
+    )
+
+
+class UnitLattice(Section):
+    """Lattice values that may differ between the units of a finger."""
+
+    segment_length_mm: Positive | None = Field(
+        default=None, description="Length L of a segment, in mm."
+    )
+    stroke_mm: Positive | None = Field(
+        default=None, description="Opening d of an inverted dome, in mm."
+    )
+    bistable_stiffness_N_per_mm: Positive | None = Field(
+        default=None, description="Stiffness k_b of the bistable spring at rest, in N/mm."
+    )
+    force_linearity: Fraction | None = Field(
+        default=None,
+        description="Force linearity alpha, without unit: 0 symmetric wells, 1 a linear spring.",
+    )
+    hinge_stiffness_N_mm_per_rad: NotNegative | None = Field(
+        default=None, description="Stiffness k_theta of the hinge of a unit, in N mm/rad."
+    )
+
+
+class Lattice(UnitLattice):
+    """Lattice values given instead of derived; where geometry yields them too, they must agree."""
+
+    segment_height_mm: Positive | None = Field(
+        default=None, description="Height H of the struts in mm, shared by all units."
+    )

@@ -1,0 +1,94 @@
+"""Which law the domes of a spec follow, and the curve behind it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.files.calibration.models import Calibration, Curve
+from dpgcli.files.spec.derivations import (
+    DERIVATIONS,
+    FORCE_LINEARITY,
+    STROKE,
+    Derivation,
+    Issue,
+    dimensions,
+)
+from dpgcli.mechanics.curve import FEWEST_POINTS, spline
+from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+
+WHERE = ("finger", "law")
+HINT = "dpg fit bistable writes one"
+
+
+@dataclass(frozen=True)
+class Domes:
+    """How domes answer, and by which rules their values come about.
+
+    `travel` is that of the inverted dome at rest (mm), at a dome height of `height` (mm, if it is
+    known), for domes with a travel of their own; else 0.
+    """
+
+    law: Law
+    derivations: tuple[Derivation, ...]
+    travel: float = 0.0
+    height: float | None = None
+
+    def travel_at(self, height: float | None) -> float:
+        """Travel of an inverted dome of another height, which it grows with (finite elements)."""
+        if self.height is None or height is None:
+            return self.travel
+        return self.travel * height / self.height
+
+
+def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Domes | Issue:
+    """The law that a spec names, with the first curve among its calibrations."""
+    if law in (None, "published"):
+        return Domes(PUBLISHED, DERIVATIONS)
+    curves = (c for c in calibrations if isinstance(c, Calibration) and c.curve is not None)
+    calibration = next(curves, None)
+    if law == "push_only" and calibration is None:
+        return Domes(PushOnly(PUBLISHED), DERIVATIONS)
+    if calibration is None or calibration.curve is None:
+        return Issue(WHERE, "a calibration with a curve beside law: tabulated", "none", HINT)
+    if len(calibration.curve.travel_mm) < FEWEST_POINTS:
+        found = f"{len(calibration.curve.travel_mm)} in {calibration.file}"
+        return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
+    values = {} if calibration.values is None else calibration.values.given()
+    if missing := [key for key in ("bistable_stiffness_N_per_mm", STROKE.key) if key not in values]:
+        found = f"none in {calibration.file}"
+        return Issue(WHERE, f"{' and '.join(missing)} beside the curve", found, HINT)
+    stiffness, stroke = (values[k].value for k in ("bistable_stiffness_N_per_mm", STROKE.key))
+    if law == "tabulated":
+        return _tabulated(calibration.curve, stiffness, stroke)
+    return _pushing(calibration, calibration.curve, stiffness)
+
+
+def _tabulated(curve: Curve, stiffness: float, stroke: float) -> Domes:
+    factor = curve.travel_to_opening.factor
+    law = Tabulated(spline(*_points(curve, stroke / factor, stiffness * stroke**2)))
+    return Domes(law, tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY))
+
+
+def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes | Issue:
+    travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
+    if not np.isfinite(travel):
+        return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+    height = dimensions(calibration.geometry).get("dome_height_mm")
+    shape = spline(*_points(curve, travel, stiffness * travel**2))
+    domes = Domes(PushOnly(Tabulated(shape)), (), travel, height)
+    stroke = replace(
+        STROKE,
+        value=lambda height, separation: domes.travel_at(height) - height - separation,
+        rule="travel of the inverted dome - dome height - unit separation (contact)",
+        is_fitted=False,
+    )
+    rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return replace(domes, derivations=tuple(rules))
+
+
+def _points(curve: Curve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
+    """Travels and energies over a travel and an energy, from rest on."""
+    travels, energies = curve.travel_mm, curve.energy_mJ
+    if travels[0] > 0.0:
+        travels, energies = [0.0, *travels], [0.0, *energies]
+    return tuple(u / travel for u in travels), tuple(e / energy for e in energies)
