@@ -90,8 +90,8 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
+    from dpgcli.files.known_states import read_states
     from dpgcli.files.output import check_outputs, check_table_name
-    from dpgcli.files.reading import read_tips
     from dpgcli.files.spec import canonical_json, read_spec, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
@@ -105,7 +105,7 @@ def bench(
     checked = read_spec(spec, settings or ())
     scene, said = scene_of(checked), canonical_json(checked)
     target = None if target_error is None else millimeters("--target-error", target_error)
-    known = None if against is None else read_tips(against, scene.finger.n_units)
+    known = None if against is None else read_states(against, scene.finger.n_units)
     then = None if compare is None else _recorded(compare, said)
     study = Bench(
         scene, repeats, tuple(keep or ()), target, known, frame_of(first_station, tip_offset)

@@ -20,17 +20,28 @@ from dpgcli.cli.printing import Format, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
-    from dpgcli.accuracy.comparison import Comparison, KnownTips
     from dpgcli.arrays import Array
+    from dpgcli.calibration.comparison import Comparison
+    from dpgcli.calibration.known import KnownStates
     from dpgcli.mechanics.finger import Finger
 
 REPEATS = 5
 
+Data = Annotated[Path, typer.Argument(metavar="DATA", help="CSV of known states")]
+Shapes = Annotated[
+    Path | None, typer.Option("--shapes", help="CSV of the layer's points: pattern, x_mm, y_mm")
+]
+CalibrationFile = Annotated[
+    Path | None, typer.Option("--calibration", help="Compare with its values, too")
+]
+
 
 def compare(
     spec: SpecPath,
-    data: Annotated[Path, typer.Argument(metavar="DATA", help="CSV of known tips")],
+    data: Data,
     settings: Settings = None,
+    calibration: CalibrationFile = None,
+    shapes: Shapes = None,
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     printed_as: Annotated[
@@ -41,63 +52,101 @@ def compare(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold predicted tips against finite elements or measurements."""
-    from dpgcli.accuracy import comparison
+    """Hold predictions against finite elements or measurements."""
+    from dpgcli.calibration.comparison import columns, compare, rows
+    from dpgcli.files.known_states import read_states
     from dpgcli.files.output import check_outputs
-    from dpgcli.files.reading import read_tips
     from dpgcli.files.spec import read_spec, scene_of
 
     scene = scene_of(read_spec(spec, settings or ()))
     finger, frame = scene.finger, frame_of(first_station, tip_offset)
-    known = read_tips(data, finger.n_units)
+    known = read_states(data, finger.n_units, shapes)
+    better = None if calibration is None else _calibrated(finger, calibration)
     if plot is not None:
         check_plot(plot)
-        check_outputs((spec, data), plot)
-    found = comparison.compare(finger, known, frame)
-    printer = printer_of(printed_as)
-    for _ in printer(comparison.COLUMNS, [comparison.rows(known, found)]):
+        sources = [path for path in (spec, data, shapes, calibration) if path is not None]
+        check_outputs(sources, plot)
+    found = compare(finger, known, frame)
+    calibrated = None if better is None else compare(better, known, frame)
+    table = rows(known, found, calibrated)
+    for _ in printer_of(printed_as)(columns(table), [table]):
         pass
     if plot is not None:
         from dpgcli.report.comparison import draw_comparison
 
-        draw_comparison(known, found, str(data), plot)
+        draw_comparison(known, found, calibrated, str(data), plot)
     if not quiet:
         sys.stdout.flush()
-        for line in _summary(finger, known, found):
-            say(line)
+        say("\n".join(_summary(finger, known, found, calibrated)))
 
 
-def _summary(finger: "Finger", known: "KnownTips", found: "Comparison") -> Iterator[str]:
+def _calibrated(finger: "Finger", calibration: Path) -> "Finger":
+    """The finger with a calibration's values instead of its own."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.calibration import read_calibration
+
+    values = read_calibration(calibration).values
+    if values is None:
+        raise UsageError(f"--calibration {calibration}: a grid; name it in a spec instead")
+    return finger.with_values({key: fitted.value for key, fitted in values.given().items()})
+
+
+def _summary(
+    finger: "Finger",
+    known: "KnownStates",
+    found: "Comparison",
+    calibrated: "Comparison | None",
+) -> Iterator[str]:
     """Worst and mean errors of the states that are in both, and the ratio of run times."""
     import numpy as np
 
-    is_state = np.isfinite(found.distance)
-    if not is_state.any():
-        yield f"none of the {len(is_state)} states exists in the lattice"
-        return
-    distance = found.distance[is_state]
-    relative = found.relative[is_state & np.isfinite(found.relative)]
-    text = f"{len(distance)} states: error {_worst_and_mean(distance, 'mm')}"
-    if len(relative):
-        text += f"; of the deflection {_worst_and_mean(100.0 * relative, '%')}"
-    yield text + " (the model's error; published law, pushing and pulling)"
-    if n_missing := int((~is_state).sum()):
-        yield f"{n_missing} states of the data do not exist in the lattice"
+    if calibrated is None:
+        yield from _errors(found, finger.law.description)
+    else:
+        yield from _errors(found, f"as in the spec, {finger.law.description}")
+        yield from _errors(calibrated, f"calibrated, {finger.law.description}")
     if np.isfinite(known.seconds).any():
         yield _times(finger, known)
+
+
+def _errors(found: "Comparison", what: str) -> Iterator[str]:
+    import numpy as np
+
+    is_state = np.isfinite(found.states.pose[0])
+    if not is_state.any():
+        yield f"none of the {len(is_state)} states exists in the lattice ({what})"
+        return
+    kinds = (
+        ("tips", found.distance, "mm"),
+        ("tips, of the deflection", 100.0 * found.relative, "%"),
+        ("tip angles", found.tip_angle, "rad"),
+        ("openings", found.opening, "mm"),
+        ("pushes", found.push, "N"),
+        ("shapes", found.shape[0], "mm"),
+    )
+    said = [
+        f"{name} {_worst_and_mean(errors[np.isfinite(errors)], unit)}"
+        for name, errors, unit in kinds
+        if np.isfinite(errors).any()
+    ]
+    yield f"{is_state.sum()} states, errors of the model ({what}):"
+    yield from (f"  {line}" for line in said)
+    if n_missing := int((~is_state).sum()):
+        yield f"  {n_missing} states of the data do not exist in the lattice"
 
 
 def _worst_and_mean(errors: "Array", unit: str) -> str:
     return f"{errors.max():.3g} {unit} at worst, {errors.mean():.3g} {unit} in the mean"
 
 
-def _times(finger: "Finger", known: "KnownTips") -> str:
+def _times(finger: "Finger", known: "KnownStates") -> str:
     import numpy as np
 
-    from dpgcli.accuracy.comparison import Frame, compare
     from dpgcli.accuracy.timing import measured
+    from dpgcli.calibration.known import Frame, lattice_states
 
-    own = measured(lambda: compare(finger, known, Frame()), REPEATS).wall / known.patterns.shape[1]
+    n_states = known.patterns.shape[1]
+    own = measured(lambda: lattice_states(finger, known.patterns, Frame()), REPEATS).wall / n_states
     theirs = float(np.nanmean(known.seconds))
     ratio = f"{theirs / own:,.0f} times as long"
     return f"{theirs:.3g} s a state in the data, {own:.2g} s here: {ratio}"

@@ -15,6 +15,7 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     Tolerance,
+    WithUncertainty,
     request_of,
 )
 
@@ -35,6 +36,7 @@ def explain(
     patterns: Patterns = None,
     columns: ColumnNames = "default",
     nodes: Nodes = False,
+    uncertainty: WithUncertainty = False,
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
@@ -47,7 +49,9 @@ def explain(
     from dpgcli.states import plan
 
     scene = scene_of(read_spec(spec, settings or ()))
-    request = request_of(patterns, columns, nodes, formulation, tolerance, target_error)
+    request = request_of(
+        patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
+    )
     made = plan.explain(scene, request)
     if printed_as is PlanFormat.JSON:
         import json
@@ -103,7 +107,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         ),
         "",
         "Kept",
-        f"  energy terms    {', '.join(plan.terms)} (published law: springs push and pull)",
+        f"  energy terms    {', '.join(plan.terms)} ({plan.scene.finger.law.description})",
         f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
         f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
         f"  solves          {_count(plan.n_unit_solves, 'unit well')}, "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from dpgcli.accuracy.comparison import Frame
+    from dpgcli.calibration.known import Frame
     from dpgcli.states.plan import Request
 
 SpecPath = Annotated[Path, typer.Argument(metavar="SPEC", help="YAML spec; - reads standard input")]
@@ -29,6 +29,9 @@ ColumnNames = Annotated[
     ),
 ]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]
+WithUncertainty = Annotated[
+    bool, typer.Option("--uncertainty", help="Add what errors of fitted values do to the tips")
+]
 Tolerance = Annotated[
     float | None,
     typer.Option("--tolerance", help="Largest residual over the forces in play  [default: 1e-12]"),
@@ -80,6 +83,7 @@ def request_of(
     patterns: list[str] | None,
     columns: str,
     nodes: bool,
+    uncertainty: bool,
     formulation: FormulationName,
     tolerance: float | None,
     target_error: str | None = None,
@@ -91,11 +95,16 @@ def request_of(
     names = tuple(name.strip() for name in columns.split(",") if name.strip())
     return Request(
         patterns=tuple(patterns or ()),
-        columns=(*names, *(("nodes",) if nodes else ())),
+        columns=(*names, *_groups(nodes=nodes, uncertainty=uncertainty)),
         formulation=formulation.value,
         tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
         target_error=None if target_error is None else millimeters("--target-error", target_error),
     )
+
+
+def _groups(**wanted: bool) -> list[str]:
+    """Groups of columns that have an option of their own."""
+    return [group for group, is_wanted in wanted.items() if is_wanted]
 
 
 def check_installed(what: str, package: str) -> None:
@@ -119,7 +128,7 @@ def check_plot(path: Path) -> None:
 
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
     """Where the lattice lies in given data."""
-    from dpgcli.accuracy.comparison import Frame
+    from dpgcli.calibration.known import Frame
 
     return Frame(
         _point("--first-station", first_station or "0,0"),

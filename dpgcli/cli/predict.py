@@ -19,6 +19,7 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     Tolerance,
+    WithUncertainty,
     check_plot,
     request_of,
 )
@@ -46,6 +47,7 @@ def predict(
     settings: Settings = None,
     columns: ColumnNames = "default",
     nodes: Nodes = False,
+    uncertainty: WithUncertainty = False,
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
@@ -60,7 +62,9 @@ def predict(
 
     checked = read_spec(spec, settings or ())
     scene = scene_of(checked)
-    request = request_of(patterns, columns, nodes, formulation, tolerance, target_error)
+    request = request_of(
+        patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
+    )
     prediction = states.predict(scene, request)
     if plot is not None:
         check_plot(plot)
@@ -151,7 +155,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
-    yield f"values: {values} (dpg explain says which); published law, pushing and pulling"
+    yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"
 
 
 def _chosen(rung: "Rung", bound: float, target: float) -> str:

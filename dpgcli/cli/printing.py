@@ -23,6 +23,9 @@ PRINCIPAL = (
     "tip_y_mm",
     "tip_angle_rad",
     "energy_mJ",
+    "tip_x_uncertainty_mm",
+    "tip_y_uncertainty_mm",
+    "tip_angle_uncertainty_rad",
     "aperture_mm",
     "fingers_overlap",
     "min_eigenvalue_N_per_mm",
@@ -36,6 +39,7 @@ ROUNDED = {
     "min_eigenvalue_N_per_mm": ".5f",
     "mm": ".5f",
     "rad": ".5f",
+    "N": ".4f",
     "mJ": ".5f",
     "%": ".1f",
 }

@@ -1,6 +1,6 @@
 """The finger as the model sees it: lattice dimensions and spring constants."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,6 +18,16 @@ ARRAYS = (
     "linear_stiffness",
     "contact_travel",
 )
+
+KEYS = {  # names with units, as files say them
+    "segment_length_mm": "segment_length",
+    "segment_height_mm": "segment_height",
+    "stroke_mm": "stroke",
+    "bistable_stiffness_N_per_mm": "bistable_stiffness",
+    "force_linearity": "force_linearity",
+    "hinge_stiffness_N_mm_per_rad": "hinge_stiffness",
+    "linear_stiffness_N_per_mm": "linear_stiffness",
+}
 
 
 @dataclass(frozen=True)
@@ -92,6 +102,10 @@ class Finger:
     def changed(self, **arrays: Array) -> "Finger":
         """The finger with other arrays."""
         return replace(self, **{**self.arrays(), **arrays})  # type: ignore[arg-type]
+
+    def with_values(self, values: Mapping[str, float]) -> "Finger":
+        """The finger with other values, the same in all units, by the names in `KEYS`."""
+        return self.changed(**{KEYS[key]: np.array([[value]]) for key, value in values.items()})
 
     def with_units(self, places: Sequence[int]) -> "Finger":
         """A finger of some of the units, counted from 0; a unit may repeat."""

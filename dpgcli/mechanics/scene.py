@@ -1,5 +1,6 @@
 """What a spec describes, in the model's terms, and where its numbers come from."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -33,6 +34,18 @@ class Source:
 
 
 @dataclass(frozen=True)
+class Uncertainty:
+    """What fitted values may be off by.
+
+    `covariance` (step, step) of steps along `directions`: rates of change of the finger's arrays by
+    name, each (1 or unit, 1).
+    """
+
+    directions: tuple[Mapping[str, Array], ...]
+    covariance: Array
+
+
+@dataclass(frozen=True)
 class Gripper:
     """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad).
 
@@ -45,9 +58,13 @@ class Gripper:
 
 @dataclass(frozen=True)
 class Scene:
-    """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known."""
+    """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known.
+
+    `uncertainty` is that of fitted values, if any has an error.
+    """
 
     finger: Finger
     sources: tuple[Source, ...]
     gripper: Gripper | None = None
     layer_thickness: float | None = None
+    uncertainty: Uncertainty | None = None

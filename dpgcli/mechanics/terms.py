@@ -70,6 +70,6 @@ def evaluate(potential: Potential, coordinates: Array) -> Evaluation:
     """Add up the terms at `coordinates`, shape (size, batch)."""
     gradient = np.zeros_like(coordinates)
     bandwidth = max(potential.reach)
-    hessian = np.zeros((bandwidth + 1, *coordinates.shape))
+    hessian = np.zeros((bandwidth + 1, *coordinates.shape), coordinates.dtype)
     energies = {t.kind: t.add_to(coordinates, gradient, hessian) for t in potential.terms}
     return Evaluation(energies, gradient, hessian)

@@ -1,32 +1,43 @@
-"""Predicted shapes with known tips over them."""
+"""Predicted shapes with known states over them."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dpgcli.accuracy.comparison import Comparison, KnownTips
 from dpgcli.arrays import Array
+from dpgcli.calibration.comparison import Comparison
+from dpgcli.calibration.known import KnownStates
 from dpgcli.report.drawing import drawn_to
 
 
-def draw_comparison(known: KnownTips, found: Comparison, name: str, path: Path) -> None:
-    """Draw each state's limiting layer to its tip, and the known tip, to an SVG or PNG file."""
+def draw_comparison(
+    known: KnownStates, found: Comparison, calibrated: Comparison | None, name: str, path: Path
+) -> None:
+    """Draw each state's limiting layer to its tip, and what is known, to an SVG or PNG file."""
     from matplotlib import colormaps
 
     words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": name}
     with drawn_to(path, 9.0, 6.0, aspect="equal", **words) as axes:
         for state, inverted in enumerate(known.patterns.T):
             color = colormaps["viridis"](0.85 * inverted.mean())
-            layer = np.concatenate((found.layer[:, :, state], found.predicted[:2, [state]]), axis=1)
-            axes.plot(*layer, ".-", color=color)
+            axes.plot(*found.states.layer[:, :, state], ".-", color=color)
+            if calibrated is not None:
+                axes.plot(*calibrated.states.layer[:, :, state], "--", color=color)
+            if known.shapes:
+                axes.plot(*known.shapes[state], "+", color=color, ms=4)
             pattern = "".join("1" if on else "0" for on in inverted)
-            _draw_known(axes, known.position[:, state], pattern, color)
+            _draw_known(axes, known.tip[:, state], pattern, color)
         axes.plot([], [], "k.-", label="predicted, to its tip")
+        if calibrated is not None:
+            axes.plot([], [], "k--", label="predicted, calibrated")
+        if known.shapes:
+            axes.plot([], [], "k+", ms=4, label="known shape")
         axes.plot([], [], "kx", ms=9, mew=2, label="known tip")
         axes.legend(frameon=False)
 
 
 def _draw_known(axes: Any, tip: Array, pattern: str, color: Any) -> None:
-    axes.plot(*tip, "x", color=color, ms=9, mew=2)
-    axes.annotate(pattern, tip, textcoords="offset points", xytext=(7, 4), fontsize=8)
+    if np.isfinite(tip).all():
+        axes.plot(*tip, "x", color=color, ms=9, mew=2)
+        axes.annotate(pattern, tip, textcoords="offset points", xytext=(7, 4), fontsize=8)

@@ -27,6 +27,7 @@ class Group(StrEnum):
     ENERGIES = "energies"
     OPENINGS = "openings"
     GRIPPER = "gripper"
+    UNCERTAINTY = "uncertainty"
     NODES = "nodes"
 
 
@@ -41,7 +42,9 @@ class Column:
     kind: Kind = Kind.NUMBER
 
 
-def declared(n_units: int, energy_kinds: Sequence[str], is_gripper: bool) -> tuple[Column, ...]:
+def declared(
+    n_units: int, energy_kinds: Sequence[str], is_gripper: bool, *, is_fitted: bool = False
+) -> tuple[Column, ...]:
     """All columns that a scene can have, in the order of every table.
 
     >>> [c.name for c in declared(3, ("bistable", "hinge"), False)][:4]
@@ -62,6 +65,7 @@ def declared(n_units: int, energy_kinds: Sequence[str], is_gripper: bool) -> tup
             for i in range(1, n_units + 1)
         ),
         *(_GRIPPER if is_gripper else ()),
+        *(_UNCERTAINTY if is_fitted else ()),
         *_node_columns(n_units, is_gripper),
     )
 
@@ -138,6 +142,21 @@ _GRIPPER = (
     Column("upper_tip_y_mm", "mm", "y of the upper finger's tip in the gripper", Group.GRIPPER),
     Column("lower_tip_x_mm", "mm", "x of the lower finger's tip in the gripper", Group.GRIPPER),
     Column("lower_tip_y_mm", "mm", "y of the lower finger's tip in the gripper", Group.GRIPPER),
+)
+
+
+_UNCERTAINTY = tuple(
+    Column(
+        f"tip_{name}",
+        unit,
+        f"standard uncertainty of the tip's {what} by the errors of fitted values, to first order",
+        Group.UNCERTAINTY,
+    )
+    for name, unit, what in (
+        ("x_uncertainty_mm", "mm", "x"),
+        ("y_uncertainty_mm", "mm", "y"),
+        ("angle_uncertainty_rad", "rad", "angle"),
+    )
 )
 
 

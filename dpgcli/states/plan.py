@@ -33,6 +33,7 @@ from dpgcli.states.solve import Status, Units
 FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
+ON_REQUEST = (Group.NODES, Group.UNCERTAINTY)
 STIFF = ("stiffness", "tip_stiffness", "tip_compliance")  # columns that rigid bars falsify
 MOST_STATES_WITH = {
     Group.EIGENVALUE: 2**10,
@@ -127,6 +128,7 @@ class Plan:
             self.scene.gripper,
             self.scene.layer_thickness or 0.0,
             self.dropped_error,
+            self.scene.uncertainty,
         )
 
 
@@ -148,7 +150,8 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         raise UsageError(too_many(n, "the finger has"))
     formulation = FORMULATIONS[request.formulation](finger)
     terms = tuple(term.kind for term in formulation.terms)
-    available = declared(n, terms, scene.gripper is not None)
+    is_fitted = scene.uncertainty is not None
+    available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
     dropped = rung is not None and rung.drops_bars
     columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
     groups = {column.group for column in columns}
@@ -193,9 +196,21 @@ def _check(scene: Scene, request: Request) -> None:
             "--formulation lattice needs a finite finger.linear_stiffness_N_per_mm: "
             "node coordinates cannot drop rigid bars; use the chain"
         )
+    if Group.UNCERTAINTY in request.columns:
+        _check_uncertainty(scene, request)
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
         raise UsageError("--target-error chooses among ways of the chain: drop --formulation")
+
+
+def _check_uncertainty(scene: Scene, request: Request) -> None:
+    if scene.uncertainty is None:
+        raise UsageError(
+            "--uncertainty: no value of the spec has a standard error; "
+            "calibrate it by a file of dpg fit"
+        )
+    if request.formulation != "chain":
+        raise UsageError("--uncertainty is known in the chain's coordinates: drop --formulation")
 
 
 def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
@@ -225,7 +240,7 @@ def _columns(
         cheap = [
             g
             for g in groups
-            if g is not Group.NODES
+            if g not in ON_REQUEST
             and n_states <= MOST_STATES_WITH.get(g, n_states)
             and (has_bars or g is not Group.STIFFNESS)
         ]
@@ -239,8 +254,8 @@ def _columns(
 
 
 def _why_left_out(group: Group, n_states: int) -> str:
-    if group is Group.NODES:
-        return "given on request: --nodes"
+    if group in ON_REQUEST:
+        return f"given on request: --{group}"
     if n_states <= MOST_STATES_WITH[group]:
         return "the target error drops the bars, without which they would be wrong"
     return f"left out above {MOST_STATES_WITH[group]:,} states: --columns default,{group}"

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, total
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Stations
-from dpgcli.mechanics.scene import Gripper
+from dpgcli.mechanics.scene import Gripper, Uncertainty
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.gripper import grip
 from dpgcli.states.patterns import texts
+from dpgcli.states.sensitivities import sensitivities
 from dpgcli.states.solve import (
     Batch,
     States,
@@ -78,6 +79,7 @@ class Wanted:
     gripper: Gripper | None = None
     layer_thickness: float | Array = 0.0
     dropped_error: float | Array = 0.0
+    uncertainty: Uncertainty | None = None
 
 
 def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
@@ -108,6 +110,8 @@ def _batch_columns(wanted: Wanted, batch: Batch, at_tip: Tip, status: NDArray[np
         columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(batch)
     if at_tip.compliance is not None and at_tip.stiffness is not None:
         columns |= _stiffness_columns(at_tip.compliance, at_tip.stiffness)
+    if wanted.uncertainty is not None and Group.UNCERTAINTY in groups:
+        columns |= _uncertainty_columns(batch, wanted.uncertainty)
     coordinates = batch.equilibrium.coordinates
     if Group.OPENINGS in groups:
         openings = batch.formulation.openings(coordinates)
@@ -132,6 +136,21 @@ def _stiffness_columns(compliance: Array, stiffness: Array) -> Columns:
         "tip_compliance_x_angle_rad_per_N": x_angle,
         "tip_compliance_y_angle_rad_per_N": y_angle,
         "tip_compliance_angle_rad_per_N_mm": angle,
+    }
+
+
+def _uncertainty_columns(batch: Batch, uncertainty: Uncertainty) -> Columns:
+    """σ² = s C sᵀ with s the tip's derivatives by fitted values and C their covariance."""
+    slopes = sensitivities(batch, uncertainty.directions).pose
+    terms = [
+        covariance * slopes[:, k] * slopes[:, m]
+        for (k, m), covariance in np.ndenumerate(uncertainty.covariance)
+    ]
+    x, y, angle = np.sqrt(np.maximum(total(np.stack(terms)), 0.0))
+    return {
+        "tip_x_uncertainty_mm": x,
+        "tip_y_uncertainty_mm": y,
+        "tip_angle_uncertainty_rad": angle,
     }
 
 

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.accuracy.comparison import Frame, KnownTips, compare
 from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.families import repeated
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.arrays import Array, Flags, keep_freed_memory
+from dpgcli.calibration.comparison import compare
+from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.files.tables import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
@@ -81,7 +82,7 @@ class Bench:
     repeats: int
     keep: tuple[str, ...] = ()
     target_error: float | None = None
-    known: KnownTips | None = None
+    known: KnownStates | None = None
     frame: Frame = field(default_factory=Frame)
 
     @property
@@ -155,7 +156,7 @@ class Bench:
             "n_states": n_states,
         }
 
-    def _model_error(self, known: KnownTips) -> Row:
+    def _model_error(self, known: KnownStates) -> Row:
         """The lattice's own error: its states beside those that were given."""
         found = compare(self.finger, known, self.frame)
         is_state = np.isfinite(found.distance)

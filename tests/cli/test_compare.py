@@ -34,7 +34,9 @@ def test_the_published_lever_curls_the_finite_element_finger_too_far(
     assert found["000"]["error_percent"] is None
     assert 14.0 < found["110"]["error_percent"] < 16.0
     assert found["110"]["tip_y_mm"] < found["110"]["known_y_mm"], "it curls further"
-    assert "5 states: error 2.6 mm at worst" in result.stderr
+    assert "5 states, errors of the model (published law" in result.stderr
+    assert "tips 2.6 mm at worst" in result.stderr
+    assert "15.2 % at worst" in result.stderr
     assert "22.5 s a state in the data" in result.stderr
 
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dpgcli.accuracy.comparison import KnownTips
 from dpgcli.accuracy.extended import extended_states
 from dpgcli.accuracy.ladder import Found
+from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.scene import Gripper, Scene
@@ -54,8 +54,7 @@ def test_every_row_has_every_column_and_sound_times() -> None:
 def test_the_models_error_stands_beside_the_solvers() -> None:
     patterns = np.array([[True, True], [False, True]])
     tips = np.array([[26.0, 25.0], [-4.0, -7.0]])
-    none = np.full(2, np.nan)
-    study = Bench(Scene(finger(2), ()), 1, known=KnownTips(patterns, tips, none, none))
+    study = Bench(Scene(finger(2), ()), 1, known=KnownStates.of_tips(patterns, tips))
     (row,) = (row for row in study.rows() if row["group"] == "model")
     pose = extended_states(study.finger, patterns).pose[:2]
     assert row["max_tip_error_mm"] == pytest.approx(float(np.hypot(*(pose - tips)).max()))

@@ -30,6 +30,11 @@ class Fitted(Section, Generic[T]):
         default=None, description="two numbers, the lower one first"
     )
 
+    @property
+    def verb(self) -> str:
+        """Whether the value was fitted, or held while others were."""
+        return "held" if self.standard_error is None else "fitted"
+
 
 class Values(Section):
     """Lattice values; keys as in a spec."""
@@ -144,6 +149,10 @@ class Calibration(Section):
     quality: Quality | None = Field(default=None, description="a section")
     warnings: list[str] = Field(default_factory=list, description="a list of texts")
     sources: list[DataFile] = Field(default_factory=list, description="a list of files")
+
+    def fitted(self, key: str) -> Fitted[float] | None:
+        """The value of a key of the lattice, if there is one."""
+        return None if self.values is None else self.values.given().get(key)
 
     @property
     def uncertain(self) -> dict[str, float]:

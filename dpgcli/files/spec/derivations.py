@@ -19,6 +19,7 @@ from dpgcli.mechanics.scene import Origin
 
 AGREEMENT = 1e-6
 PUBLISHED = "published"
+LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
 
 
 class Issue(NamedTuple):
@@ -31,12 +32,16 @@ class Issue(NamedTuple):
 
 
 class Value(NamedTuple):
-    """A lattice value of some units, how it came about, and its standard error if one is known."""
+    """A lattice value of some units, how it came about, and its standard error if one is known.
+
+    `file` is the place of the calibration file that it comes from, in the spec's list of them.
+    """
 
     value: float
     origin: Origin
     rule: str
     standard_error: float | None = None
+    file: int | None = None
 
 
 @dataclass(frozen=True)
@@ -132,11 +137,14 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
     """The lattice value of a group of units, or why there is none."""
     if derivation.key in group.lattice:
         return _given_value(derivation, group, base)
-    for calibration in group.calibrations:
+    for place, calibration in enumerate(group.calibrations):
         if calibration == PUBLISHED and derivation.origin is not None:
             return _derived_value(derivation, group)
-        if isinstance(calibration, Calibration) and (found := _fitted(derivation, calibration)):
-            return _from_file(derivation, group, calibration, found)
+        if not isinstance(calibration, Calibration) or not derivation.is_fitted:
+            continue
+        if found := calibration.fitted(derivation.key):
+            value = _from_file(derivation, group, calibration, found)
+            return value if isinstance(value, Issue) else value._replace(file=place)
     if derivation.origin is not None:
         return _uncalibrated(derivation, group)
     return _derived_value(derivation, group)
@@ -156,16 +164,11 @@ def _derived_value(derivation: Derivation, group: Group) -> Value | Issue:
     return Value(derived, origin, _calibration_rule(derivation, origin))
 
 
-def _fitted(derivation: Derivation, calibration: Calibration) -> Fitted[float] | None:
-    values = {} if calibration.values is None else calibration.values.given()
-    return values.get(derivation.key) if derivation.is_fitted else None
-
-
 def _from_file(
     derivation: Derivation, group: Group, calibration: Calibration, found: Fitted[float]
 ) -> Value | Issue:
     """A calibrated value, scaled by the rule where the geometry is another."""
-    name = f"{'held' if found.standard_error is None else 'fitted'}, {calibration.file}"
+    name = f"{found.verb}, {calibration.file}"
     own = dimensions(calibration.geometry)
     here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
     changed = [need for need, size in here.items() if need in own and not agree(size, own[need])]

@@ -6,6 +6,7 @@ import numpy as np
 
 from dpgcli.files.calibration.models import Calibration, Curve
 from dpgcli.files.spec.derivations import (
+    BISTABLE_STIFFNESS,
     DERIVATIONS,
     FORCE_LINEARITY,
     STROKE,
@@ -53,14 +54,13 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
     if len(calibration.curve.travel_mm) < FEWEST_POINTS:
         found = f"{len(calibration.curve.travel_mm)} in {calibration.file}"
         return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
-    values = {} if calibration.values is None else calibration.values.given()
-    if missing := [key for key in ("bistable_stiffness_N_per_mm", STROKE.key) if key not in values]:
-        found = f"none in {calibration.file}"
-        return Issue(WHERE, f"{' and '.join(missing)} beside the curve", found, HINT)
-    stiffness, stroke = (values[k].value for k in ("bistable_stiffness_N_per_mm", STROKE.key))
+    stiffness, stroke = (calibration.fitted(d.key) for d in (BISTABLE_STIFFNESS, STROKE))
+    if stiffness is None or stroke is None:
+        expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
+        return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
     if law == "tabulated":
-        return _tabulated(calibration.curve, stiffness, stroke)
-    return _pushing(calibration, calibration.curve, stiffness)
+        return _tabulated(calibration.curve, stiffness.value, stroke.value)
+    return _pushing(calibration, calibration.curve, stiffness.value)
 
 
 def _tabulated(curve: Curve, stiffness: float, stroke: float) -> Domes:

@@ -38,8 +38,9 @@ class FingerSpec(Section):
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."
     )
-    linear_stiffness_N_per_mm: BarStiffness = Field(
-        description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid."
+    linear_stiffness_N_per_mm: BarStiffness | None = Field(
+        default=None,
+        description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid.",
     )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,

@@ -13,6 +13,7 @@ from dpgcli.errors import SpecError
 from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.spec.derivations import (
     DERIVATIONS,
+    LINEAR_STIFFNESS,
     SEGMENT_HEIGHT,
     STROKE,
     Group,
@@ -26,10 +27,14 @@ from dpgcli.files.spec.derivations import (
 from dpgcli.files.spec.domes import Domes, domes_of
 from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
 from dpgcli.files.spec.places import KeyPath, Place, dotted, located
+from dpgcli.files.spec.uncertainty import Share, uncertainty_of
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED as PUBLISHED_LAW
 from dpgcli.mechanics.scene import Gripper, Origin, Scene, Source
+
+SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
+BARS_HINT = "the study calls the bars nearly rigid: 1.0e4; .inf is rigid"
 
 
 @dataclass
@@ -59,6 +64,7 @@ def scene_of(spec: Spec) -> Scene:
         sources=tuple(_sources(spec.finger, values)),
         gripper=_gripper(spec),
         layer_thickness=_given(spec.finger.geometry).get("limiting_layer_thickness_mm"),
+        uncertainty=uncertainty_of(_calibrations(spec.finger), _shares(spec.finger, values)),
     )
 
 
@@ -130,14 +136,40 @@ def _resolved(finger: FingerSpec) -> Resolution:
                 resolution.issues.append(value)
             else:
                 resolution.values.setdefault(derivation.key, []).append((group, value))
+    bars = _bars(finger, base)
+    if isinstance(bars, Issue):
+        resolution.issues.append(bars)
+    else:
+        resolution.values[LINEAR_STIFFNESS] = [(base, bars)]
     return resolution
+
+
+def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
+    """The stiffness of the bars: given, or fitted."""
+    if finger.linear_stiffness_N_per_mm is not None:
+        return Value(finger.linear_stiffness_N_per_mm, Origin.GIVEN, "as given")
+    for place, calibration in enumerate(base.calibrations):
+        if isinstance(calibration, Calibration) and (found := calibration.fitted(LINEAR_STIFFNESS)):
+            rule = f"{found.verb}, {calibration.file}"
+            return Value(found.value, Origin.CALIBRATED, rule, found.standard_error, place)
+    path: KeyPath = ("finger", LINEAR_STIFFNESS)
+    return Issue(path, "a stiffness > 0 in N/mm, or .inf", "nothing", BARS_HINT)
+
+
+def _shares(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Iterator[Share]:
+    """What comes from calibration files, unit by unit."""
+    for key, pairs in values.items():
+        for place in {value.file for _, value in pairs if value.file is not None}:
+            of_file = [(g, v if v.file == place else v._replace(value=0.0)) for g, v in pairs]
+            yield Share(place, key, _column(spec.units, of_file))
 
 
 def _base(finger: FingerSpec) -> Group:
     """The units without an override."""
     taken = {unit for text in finger.overrides or {} for unit in unit_range(text)}
     units = tuple(unit for unit in range(1, finger.units + 1) if unit not in taken)
-    return Group(units, _calibrations(finger), dimensions(finger.geometry), _given(finger.lattice))
+    sizes, lattice = dimensions(finger.geometry), _given(finger.lattice)
+    return Group(units, _calibrations(finger), sizes, lattice)
 
 
 def _calibrations(finger: FingerSpec) -> tuple[str | Calibration, ...]:
@@ -197,7 +229,7 @@ def _finger(spec: FingerSpec, resolution: Resolution) -> Finger:
         bistable_stiffness=columns["bistable_stiffness_N_per_mm"],
         force_linearity=columns.get("force_linearity", none),  # curves need none
         hinge_stiffness=columns["hinge_stiffness_N_mm_per_rad"],
-        linear_stiffness=np.array([[spec.linear_stiffness_N_per_mm]]),
+        linear_stiffness=columns[LINEAR_STIFFNESS],
         contact_travel=_contact(spec.units, resolution) if domes.travel else none,
         law=domes.law,
     )
@@ -227,12 +259,10 @@ def _sources(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> 
     for key, pairs in values.items():
         same: dict[Value, tuple[int, ...]] = {}
         for group, value in pairs:
-            units = everyone if key == SEGMENT_HEIGHT.key else group.units
+            units = everyone if key in SHARED else group.units
             same[value] = (*same.get(value, ()), *units)
         for value, units in sorted(same.items(), key=lambda item: min(item[1])):
-            yield Source(key, _ranges(units), *value)
-    key, stiffness = "linear_stiffness_N_per_mm", spec.linear_stiffness_N_per_mm
-    yield Source(key, _ranges(everyone), stiffness, Origin.GIVEN, "as given")
+            yield Source(key, _ranges(units), *value[:4])
 
 
 @cache  # the same few for every design of a sweep

@@ -1,0 +1,171 @@
+"""Predicted states beside known ones: finite elements or measurements, in their own frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.patterns import texts
+from dpgcli.states.rows import Columns
+from dpgcli.states.solve import reach
+
+STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight finger
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of predicted states, (state,), NaN where the lattice or the data have nothing.
+
+    `distance` (mm) between the tips, `deflection` (mm) of the known tip from where the straight
+    finger's is, `tip_angle` the difference of the tip angles (rad), and largest differences over
+    units: `angle` of the phalanges (rad; where more than the last is known), `opening` (mm), `push`
+    (N). `shape` (2, state) is the
+    largest and the root mean square distance (mm) of the known points from the predicted layer.
+    """
+
+    states: LatticeStates
+    distance: Array
+    deflection: Array
+    tip_angle: Array
+    angle: Array
+    opening: Array
+    push: Array
+    shape: Array
+
+    @property
+    def relative(self) -> Array:
+        """Distance over deflection; NaN for a tip that hardly moves."""
+        largest = np.max(self.deflection, initial=0.0, where=np.isfinite(self.deflection))
+        moved = self.deflection > STRAIGHT * largest
+        return np.where(moved, self.distance / np.where(moved, self.deflection, 1.0), np.nan)
+
+
+def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
+    """Hold the states of one finger against known ones.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> finger = uniform_finger(2, **STUDY)
+    >>> straight = np.array([[False], [False]])
+    >>> known = KnownStates.of_tips(straight, np.array([[27.0], [1.0]]))
+    >>> float(compare(finger, known, Frame()).distance[0])
+    1.0
+    """
+    states = lattice_states(finger, known.patterns, frame)
+    straight = frame.tips(np.array([reach(finger), [0.0], [0.0]]))
+    angles = np.abs(states.angles - known.angles)
+    has_more = np.isfinite(known.angles[:-1]).any(axis=0)  # than that of the tip
+    return Comparison(
+        states=states,
+        distance=np.hypot(*(states.tip - known.tip)),
+        deflection=np.hypot(*(known.tip - straight)),
+        tip_angle=angles[-1],
+        angle=np.where(has_more, _largest(angles), np.nan),
+        opening=_largest(np.abs(states.openings - known.openings)),
+        push=_largest(np.abs(states.pushes - known.pushes)),
+        shape=_shape_errors(_from_clamp(states.layer, float(reach(finger)[0])), known.shapes),
+    )
+
+
+def _largest(errors: Array) -> Array:
+    """Over units, of those that are known; NaN where none is."""
+    is_known = np.isfinite(errors)
+    largest = np.max(errors, axis=0, initial=0.0, where=is_known)
+    return np.where(is_known.any(axis=0), largest, np.nan)
+
+
+def _from_clamp(layer: Array, length: float) -> Array:
+    """The layer with a straight piece before its first station, as long as the finger."""
+    before = layer[:, :1] - np.array([length, 0.0])[:, None, None]
+    return np.concatenate((before, layer), axis=1)
+
+
+def _shape_errors(layer: Array, shapes: tuple[Array, ...]) -> Array:
+    errors = np.full((2, layer.shape[2]), np.nan)
+    for state, points in enumerate(shapes):
+        if points.size and np.isfinite(layer[:, :, state]).all():
+            apart = distances(points, layer[:, :, state])
+            errors[:, state] = apart.max(), np.sqrt((apart**2).mean())
+    return errors
+
+
+def distances(points: Array, line: Array) -> Array:
+    """Distance (mm) of points (2, m) from a line through corners (2, k), (m,).
+
+    >>> distances(np.array([[-3.0, 1.0], [4.0, 2.0]]), np.array([[0.0, 2.0], [0.0, 0.0]])).tolist()
+    [5.0, 2.0]
+    """
+    start, along = line[:, :-1, None], np.diff(line, axis=1)[:, :, None]
+    beside = points[:, None] - start
+    squared = (along**2).sum(axis=0)
+    share = (beside * along).sum(axis=0) / np.where(squared > 0.0, squared, 1.0)
+    nearest = beside - np.clip(share, 0.0, 1.0) * along
+    return np.asarray(np.hypot(*nearest).min(axis=0))
+
+
+def _number(name: str, unit: str, description: str) -> Column:
+    return Column(name, unit, description, Group.STATES)
+
+
+COLUMNS = (
+    Column("pattern", "", "activation pattern", Group.STATES, Kind.PATTERN),
+    Column("status", "", "stable where certified, else why not", Group.STATES, Kind.STATUS),
+    _number("tip_x_mm", "mm", "predicted tip"),
+    _number("tip_y_mm", "mm", "predicted tip"),
+    _number("known_x_mm", "mm", "known tip"),
+    _number("known_y_mm", "mm", "known tip"),
+)
+ERRORS = (
+    _number("error_mm", "mm", "distance between the tips"),
+    _number("error_percent", "%", "the same over the deflection of the known tip"),
+    _number("angle_error_rad", "rad", "difference of the tip angles"),
+    _number("max_angle_error_rad", "rad", "largest difference of the phalanges' angles"),
+    _number("max_opening_error_mm", "mm", "largest difference of the openings"),
+    _number("max_push_error_N", "N", "largest difference of the domes' pushes"),
+    _number("max_shape_error_mm", "mm", "largest distance of a known point from the layer"),
+    _number("rms_shape_error_mm", "mm", "root mean square of these distances"),
+)
+CALIBRATED = "calibrated_"
+
+
+def rows(known: KnownStates, found: Comparison, calibrated: Comparison | None = None) -> Columns:
+    """Columns by name: what is predicted and known, and errors of what the data have.
+
+    With a calibrated comparison its errors stand beside the others'.
+    """
+    table = {
+        "pattern": texts(known.patterns),
+        "status": found.states.status,
+        "tip_x_mm": found.states.tip[0],
+        "tip_y_mm": found.states.tip[1],
+        "known_x_mm": known.tip[0],
+        "known_y_mm": known.tip[1],
+    }
+    errors = {name: e for name, e in _errors(found).items() if np.isfinite(e).any()}
+    if calibrated is not None:
+        better = _errors(calibrated)
+        errors |= {CALIBRATED + name: better[name] for name in errors}
+    return {**table, **errors}
+
+
+def _errors(found: Comparison) -> Columns:
+    errors = (
+        found.distance,
+        100.0 * found.relative,
+        found.tip_angle,
+        found.angle,
+        found.opening,
+        found.push,
+        *found.shape,
+    )
+    return {column.name: values for column, values in zip(ERRORS, errors, strict=True)}
+
+
+def columns(table: Columns) -> tuple[Column, ...]:
+    """The columns that a comparison has."""
+    calibrated = (
+        _number(CALIBRATED + c.name, c.unit, f"{c.description}, calibrated") for c in ERRORS
+    )
+    return tuple(c for c in (*COLUMNS, *ERRORS, *calibrated) if c.name in table)

@@ -1,0 +1,116 @@
+"""States that are known from finite elements or tests, and the lattice's own in their frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.chain import Chain, internal
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.rungs import DEFAULT_TOLERANCE
+from dpgcli.states.solve import Batch, Status, Units, certify, solve
+
+
+@dataclass(frozen=True)
+class KnownStates:
+    """What is known of some states; arrays (…, state), NaN where nothing is.
+
+    `patterns` (unit, state), `tip` x and y (2, state) in mm, by unit (unit, state) the `angles` of
+    the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
+    their domes (N), `seconds` (state,) that each state took. `shapes` are the limiting layer's
+    points from base to tip, (2, point) in mm, by state.
+    """
+
+    patterns: Flags
+    tip: Array
+    angles: Array
+    openings: Array
+    pushes: Array
+    seconds: Array
+    shapes: tuple[Array, ...] = ()
+
+    @classmethod
+    def of_tips(cls, patterns: Flags, tip: Array, tip_angle: Array | None = None) -> "KnownStates":
+        """States of which nothing but tips, (2, state) in mm, and their angles are known."""
+        unknown = np.full(patterns.shape, np.nan)
+        angles = unknown.copy()
+        if tip_angle is not None:
+            angles[-1] = tip_angle
+        return cls(patterns, tip, angles, unknown, unknown, unknown[0])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the lattice lies in the data's frame.
+
+    `first_station` is B_0 (mm); `tip` is what the data calls the tip, from the last station B_n,
+    along the end phalanx and to its left (mm).
+    """
+
+    first_station: tuple[float, float] = (0.0, 0.0)
+    tip: tuple[float, float] = (0.0, 0.0)
+
+    def tips(self, pose: Array) -> Array:
+        """Tips x, y (mm), (2, …), of last stations with these poses (3, …), complex ones too.
+
+        >>> Frame((1.0, 0.0), (0.0, -0.5)).tips(np.array([[10.0], [0.0], [0.0]])).ravel().tolist()
+        [11.0, -0.5]
+        """
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        along, left = self.tip
+        x = self.first_station[0] + pose[0] + cos * along - sin * left
+        y = self.first_station[1] + pose[1] + sin * along + cos * left
+        return np.stack((x, y))
+
+
+@dataclass(frozen=True)
+class LatticeStates:
+    """Some states of a finger's lattice, arrays (…, state), NaN where there is no such state.
+
+    `pose` (3, state) of the last station in the lattice's own frame; `tip` (2, state) and `layer`
+    (2, n + 2, state), the layer's line from the first station to the tip, in the data's;
+    `angles`, `openings` and `pushes` as in `KnownStates`.
+    """
+
+    batch: Batch
+    status: NDArray[np.uint8]
+    pose: Array
+    tip: Array
+    layer: Array
+    angles: Array
+    openings: Array
+    pushes: Array
+
+
+def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStates:
+    """Solve and certify patterns (unit, state) of one finger, in the frame of some data.
+
+    The layer's line lies as far to the left of the stations as the data's tip does.
+    """
+    units = Units.of(finger)
+    batch = solve(units, Chain, patterns, DEFAULT_TOLERANCE)
+    status = certify(batch, units.wells, DEFAULT_TOLERANCE)
+    is_state = status == Status.STABLE
+    coordinates = batch.equilibrium.coordinates
+    _, near, far, _ = internal(coordinates, finger.is_rigid)
+    angles = np.where(is_state, -np.cumsum(near + far, axis=0), np.nan)
+    stations = batch.formulation.stations(coordinates)
+    x, y = (np.where(is_state, nodes, np.nan) for nodes in (stations.base_x, stations.base_y))
+    pose = np.stack((x[-1], y[-1], angles[-1]))
+    base = np.where(is_state, 0.0, np.nan)[None]
+    poses = np.stack([np.concatenate((base, rows)) for rows in (x, y, angles)])
+    line = Frame(frame.first_station, (0.0, frame.tip[1])).tips(poses)
+    tip = frame.tips(pose)
+    openings = batch.formulation.openings(coordinates)
+    pushes = -batch.formulation.finger.springs(openings).force
+    return LatticeStates(
+        batch=batch,
+        status=status,
+        pose=pose,
+        tip=tip,
+        layer=np.concatenate((line, tip[:, None]), axis=1),
+        angles=angles,
+        openings=np.where(is_state, openings, np.nan),
+        pushes=np.where(is_state, pushes, np.nan),
+    )

@@ -1,0 +1,106 @@
+"""Known states from CSV: tips, angles, openings and pushes by pattern, shapes by their points."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.calibration.known import KnownStates
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.sheet import Sheet, read_sheet
+
+TIP = ("tip_x_mm", "tip_y_mm")
+TIP_ANGLE = "tip_angle_rad"
+SECONDS = "seconds"
+POINT = ("x_mm", "y_mm")
+FEWEST_POINTS = 2
+
+
+def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownStates:
+    """Known states of a finger of n units; empty cells are not known.
+
+    Columns: `pattern`; `tip_x_mm` and `tip_y_mm`; `tip_angle_rad`; `chamber2_angle_rad` …, of the
+    phalanges after the first; `opening1_mm` …; `push1_N` …; `seconds`. A second file has the
+    points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Raises SpecError
+    with every problem of a file.
+    """
+    sheet = read_sheet(path)
+    sheet.check_names(("pattern",))
+    patterns = sheet.cells("pattern")
+    problems = [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
+    if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
+        problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
+    if problems:
+        raise SpecError(tuple(problems))
+    return KnownStates(
+        patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
+        tip=_columns(sheet, TIP),
+        angles=_angles(sheet, n_units),
+        openings=_columns(sheet, [f"opening{i}_mm" for i in range(1, n_units + 1)]),
+        pushes=_columns(sheet, [f"push{i}_N" for i in range(1, n_units + 1)]),
+        seconds=_columns(sheet, [SECONDS])[0],
+        shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
+    )
+
+
+def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
+    return [
+        sheet.problem(row, "pattern", f"{n_units} digits 0 and 1", repr(pattern))
+        for row, pattern in enumerate(sheet.cells("pattern"))
+        if not re.fullmatch(f"[01]{{{n_units}}}", pattern)
+    ]
+
+
+def _repeated(sheet: Sheet, patterns: Sequence[str]) -> list[Problem]:
+    return [
+        sheet.problem(row, "pattern", "each pattern once", f"{pattern} for the second time")
+        for row, pattern in enumerate(patterns)
+        if pattern in patterns[:row]
+    ]
+
+
+def _columns(sheet: Sheet, names: Sequence[str]) -> Array:
+    """Columns as rows of numbers, (name, state); NaN where there is no column or an empty cell."""
+    given = sheet.numbers([name for name in names if name in sheet.names], may_lack=True)
+    unknown = np.full(len(sheet.rows), np.nan)
+    return np.stack([given.get(name, unknown) for name in names])
+
+
+def _known_angles(sheet: Sheet, n_units: int) -> set[str]:
+    return {TIP_ANGLE, *_angle_names(n_units)} & {*sheet.names}
+
+
+def _angle_names(n_units: int) -> list[str]:
+    """The first chamber is clamped; the last one's angle is that of the tip."""
+    return [f"chamber{i}_angle_rad" for i in range(2, n_units + 2)]
+
+
+def _angles(sheet: Sheet, n_units: int) -> Array:
+    """Angles of the phalanges after the first, (unit, state)."""
+    angles = _columns(sheet, _angle_names(n_units))
+    tip = _columns(sheet, [TIP_ANGLE])[0]
+    angles[-1] = np.where(np.isnan(tip), angles[-1], tip)
+    return angles
+
+
+def _read_shapes(path: Path, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
+    """Points by state, in the order of the file; none for a state that is not in it."""
+    sheet = read_sheet(path)
+    sheet.check_names(("pattern", *POINT))
+    problems = _pattern_problems(sheet, n_units)
+    points = sheet.numbers(POINT)
+    of_row = np.array(sheet.cells("pattern"))
+    for pattern in dict.fromkeys(of_row.tolist()):
+        if pattern not in patterns:
+            row = int(np.argmax(of_row == pattern))
+            expected = "a pattern of the known states"
+            problems.append(sheet.problem(row, "pattern", expected, repr(pattern)))
+        elif (of_row == pattern).sum() < FEWEST_POINTS:
+            row = int(np.argmax(of_row == pattern))
+            problems.append(sheet.problem(row, "pattern", "2 points or more of it", "one"))
+    if problems:
+        raise SpecError(tuple(problems))
+    together = np.stack([points[name] for name in POINT])
+    return tuple(together[:, of_row == pattern] for pattern in patterns)

@@ -1,0 +1,87 @@
+"""How a certified state answers to its finger's values: dq/dp = −H⁻¹ ∂g/∂p, exact to rounding.
+
+The Hessian H is factorized at the state already. The derivative of the gradient g by a value p
+comes from a complex step: Im g(q; p + ih)/h with h = 1e-100 (Squire and Trapp, SIAM Review 40,
+1998, 110). Nothing is subtracted, so nothing cancels, and every law and every value is covered
+by the one formula that states are solved with.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.equilibrium.banded import backward, forward
+from dpgcli.mechanics.chain import Chain, internal
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.solve import Batch
+
+STEP = 1e-100
+Direction = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives by a step along each direction, arrays of shape (…, direction, batch).
+
+    `pose` (3, …) of tip x, y (mm) and angle (rad), `strut_angles` (unit, …) of all stations (rad),
+    `extensions` (unit, …) of the bistable springs (mm) and `forces` (unit, …) of them (N), each
+    per unit of the direction.
+    """
+
+    pose: Array
+    strut_angles: Array
+    extensions: Array
+    forces: Array
+
+
+def sensitivities(batch: Batch, directions: Sequence[Direction]) -> Sensitivities:
+    """Derivatives of states by changes of their finger.
+
+    `batch` is one of the chain's; a direction gives the rates of change of some of the finger's
+    arrays by name, each (1 or unit, 1 or design).
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.states.solve import Units, solve
+    >>> units = Units.of(uniform_finger(1, **STUDY))
+    >>> batch = solve(units, Chain, np.array([[True]]), 1e-12)
+    >>> found = sensitivities(batch, [{"segment_length": np.ones((1, 1))}])
+    >>> print(found.pose[2].round(12))  # turning does not depend on L in the rigid limit
+    [[0.]]
+    """
+    found = [_along(batch, direction) for direction in directions]
+    return Sensitivities(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
+
+
+def _along(batch: Batch, direction: Direction) -> tuple[Array, ...]:
+    equilibrium = batch.equilibrium
+    coordinates = equilibrium.coordinates
+    here = cast("Array", coordinates + 0j)
+    moved = Chain(_moved(batch, direction))
+    with np.errstate(divide="ignore", invalid="ignore"):  # lanes that are no states
+        forces = evaluate(moved, here).gradient.imag / STEP
+        change = forward(equilibrium.factorization, -forces)
+        change /= equilibrium.factorization.pivots
+        change = backward(equilibrium.factorization, change)
+        stepped = here + 1j * STEP * change
+        stations = moved.stations(stepped)
+        _, near, far, _ = internal(change, moved.finger.is_rigid)
+        turns = -np.cumsum(near + far, axis=0)
+        extension = moved.springs(stepped).extension
+        force = moved.finger.springs(extension).force
+    x, y = (nodes[-1].imag / STEP for nodes in (stations.base_x, stations.base_y))
+    return np.stack((x, y, turns[-1])), turns, extension.imag / STEP, force.imag / STEP
+
+
+def _moved(batch: Batch, direction: Direction) -> Finger:
+    """The finger an imaginary step along a direction."""
+    finger = batch.formulation.finger
+    arrays = {}
+    for name, rates in direction.items():
+        if name == "bistable_stiffness" and finger.law.pushes_only:
+            rates = rates * batch.inverted  # ground units have no springs
+        arrays[name] = getattr(finger, name) + 1j * STEP * rates
+    return finger.changed(**arrays)
