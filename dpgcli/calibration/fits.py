@@ -12,6 +12,7 @@ equal size; a curve that the model cannot follow has neither.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from dpgcli.calibration.losses import Loss, influence
 from dpgcli.calibration.search import Function, Parameter, Search, differences
 from dpgcli.errors import FitError
 
-__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit"]
+__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
 
 CONFIDENCE = 0.95  # of bootstrap intervals
 
@@ -108,6 +109,25 @@ def fit(
     found = _judged(search, values, still_free, scale, observed)
     found = replace(found, at_bound=free & ~still_free, warnings=_warnings(search, found, free))
     return _bootstrapped(search, found, free, resamples, seed) if resamples else found
+
+
+def fit_linear(
+    parameters: Sequence[Parameter], design: Array, observed: Array, **options: Any
+) -> Fit:
+    """Fit y = X v with X the `design` (point, n); options as of `fit`.
+
+    >>> line = [Parameter("offset", 0.0), Parameter("slope", 1.0)]
+    >>> design = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    >>> fit_linear(line, design, np.array([1.0, 3.0, 5.0])).values.round(9).tolist()
+    [1.0, 2.0]
+    """
+    return fit(
+        parameters,
+        lambda values: design @ values - observed,
+        lambda _: design,
+        observed=observed,
+        **options,
+    )
 
 
 def _check_points(observed: Array, n_free: int) -> None:

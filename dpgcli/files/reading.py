@@ -1,8 +1,6 @@
 """Tables of designs and facts of runs, read back."""
 
-import csv
 import json
-import math
 import re
 from pathlib import Path
 from typing import Any
@@ -13,10 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dpgcli.accuracy.comparison import KnownTips
-from dpgcli.errors import UsageError
+from dpgcli.errors import SpecError, UsageError
+from dpgcli.files.sheet import read_sheet
 
 TIP_COLUMNS = ("pattern", "tip_x_mm", "tip_y_mm")
-LARGEST = 1e12
 MORE_TIP_COLUMNS = ("tip_angle_rad", "seconds")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 
@@ -65,60 +63,30 @@ def read_run(path: Path) -> dict[str, Any] | None:
 def read_tips(path: Path, n_units: int) -> KnownTips:
     """Known tips from CSV; columns for the angle and the time of a state may be missing.
 
-    Lines that start with # are comments. Raises UsageError, with the line, for what is no such
-    file.
+    Raises SpecError, with every line, for what is no such file.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"cannot read {path}: not UTF-8 text") from error
-    lines = enumerate(text.splitlines(), start=1)
-    rows = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
-        for number, line in lines
-        if line.strip() and not line.startswith("#")
+    sheet = read_sheet(path)
+    sheet.check_names(TIP_COLUMNS)
+    patterns = sheet.cells("pattern")
+    problems = [
+        sheet.problem(row, "pattern", f"{n_units} digits 0 and 1", repr(pattern))
+        for row, pattern in enumerate(patterns)
+        if not re.fullmatch(f"[01]{{{n_units}}}", pattern)
     ]
-    (_, names), *states = rows or [(1, [""])]
-    missing = [name for name in TIP_COLUMNS if name not in names]
-    if missing:
-        hint = "; separate columns with commas" if ";" in names[0] else ""
-        found = ", ".join(names)
-        raise UsageError(f"{path}: no column {', '.join(missing)}; found {found}{hint}")
-    if not states:
-        raise UsageError(f"{path}: no states in it")
-    tips: dict[str, tuple[float, ...]] = {}
-    for number, cells in states:
-        if len(cells) != len(names):
-            raise UsageError(f"{path}:{number}: expected {len(names)} cells, found {len(cells)}")
-        pattern, tip = _tip(dict(zip(names, cells, strict=True)), n_units, f"{path}:{number}")
-        if pattern in tips:
-            raise UsageError(f"{path}:{number}: {pattern} for the second time")
-        tips[pattern] = tip
-    patterns = np.array([[digit == "1" for digit in pattern] for pattern in tips]).T
-    x, y, angle, seconds = np.array(list(tips.values())).T
-    return KnownTips(patterns, np.stack((x, y)), angle, seconds)
-
-
-def _tip(cells: dict[str, str], n_units: int, place: str) -> tuple[str, tuple[float, ...]]:
-    """The pattern of one line, and its tip x, y, angle and time."""
-    pattern = cells["pattern"]
-    if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
-        raise UsageError(f"{place}: pattern: expected {n_units} digits 0 and 1, found {pattern!r}")
-    needed = [_number(cells, name, place) for name in TIP_COLUMNS[1:]]
-    more = [_number(cells, n, place) if cells.get(n) else math.nan for n in MORE_TIP_COLUMNS]
-    return pattern, (*needed, *more)
-
-
-def _number(cells: dict[str, str], name: str, place: str) -> float:
-    try:
-        value = float(cells[name])
-    except ValueError:
-        value = math.nan
-    if not abs(value) < LARGEST:
-        raise UsageError(f"{place}: {name}: expected a number, found {cells[name]!r}")
-    return value
+    problems += [
+        sheet.problem(row, "pattern", "each pattern once", f"{pattern} for the second time")
+        for row, pattern in enumerate(patterns)
+        if pattern in patterns[:row]
+    ]
+    if problems:
+        raise SpecError(tuple(problems))
+    position = sheet.numbers(TIP_COLUMNS[1:])
+    given = [name for name in MORE_TIP_COLUMNS if name in sheet.names]
+    more = sheet.numbers(given, may_lack=True)
+    unknown = np.full(len(patterns), np.nan)
+    inverted = np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T
+    angle, seconds = (more.get(name, unknown) for name in MORE_TIP_COLUMNS)
+    return KnownTips(inverted, np.stack([position[n] for n in TIP_COLUMNS[1:]]), angle, seconds)
 
 
 def read_record(path: Path) -> dict[str, Any]:

@@ -1,0 +1,129 @@
+"""CSV read strictly: what each cell says, where it stands, and all problems at once."""
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.spec.places import Place, in_order, located, shown
+
+LARGEST = 1e12  # a number beyond that has another meaning, or is a mistake
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The cells of a CSV file by row, and the line of each row."""
+
+    file: str
+    names: tuple[str, ...]
+    rows: list[list[str]]
+    lines: list[int]
+
+    def cells(self, name: str) -> list[str]:
+        """The texts of one column."""
+        place = self.names.index(name)
+        return [row[place] for row in self.rows]
+
+    def chosen(self, kept: Sequence[int]) -> "Sheet":
+        """The sheet with some of its rows."""
+        rows, lines = [self.rows[i] for i in kept], [self.lines[i] for i in kept]
+        return Sheet(self.file, self.names, rows, lines)
+
+    def problem(
+        self, row: int | None, key: str, expected: str, found: str, hint: str = ""
+    ) -> Problem:
+        """A problem in a row, or with the whole file."""
+        line = None if row is None else self.lines[row]
+        return located(Place(self.file, line), key, expected, found, hint)
+
+    def numbers(self, names: Sequence[str], *, may_lack: bool = False) -> dict[str, Array]:
+        """Columns as numbers by name; empty cells are NaN if they may be lacking.
+
+        Raises SpecError with every cell that holds no number.
+        """
+        columns = {name: [_number(cell, may_lack) for cell in self.cells(name)] for name in names}
+        problems = [
+            self.problem(row, name, "a number", shown(self.cells(name)[row]))
+            for name, values in columns.items()
+            for row, value in enumerate(values)
+            if value is None
+        ]
+        if problems:
+            raise SpecError(in_order(problems))
+        return {name: np.array(values, np.float64) for name, values in columns.items()}
+
+    def check_names(self, needed: Sequence[str]) -> None:
+        """Raise SpecError for columns that are missing."""
+        missing = [name for name in needed if name not in self.names]
+        if missing:
+            raise SpecError((self.missing(", ".join(missing)),))
+
+    def missing(self, wanted: str) -> Problem:
+        """The problem that there is no such column."""
+        close = get_close_matches(wanted, self.names, n=1)
+        hint = f"is it {close[0]}?" if close else ""
+        if len(self.names) == 1 and (";" in self.names[0] or "\t" in self.names[0]):
+            hint = "separate columns with commas, and write decimal points"
+        found = ", ".join(self.names)
+        return located(Place(self.file), "header", f"a column {wanted}", found, hint)
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Read a CSV file with a header; lines that start with # are comments.
+
+    Raises SpecError for what cannot be read, names that repeat, and rows of another length.
+    """
+    file = str(path)
+    rows, lines = [], []
+    for number, line in enumerate(_text(path).splitlines(), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            rows.append([cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))])
+            lines.append(number)
+    if not rows:
+        raise SpecError((located(Place(file), "file", "a header and rows", "nothing"),))
+    sheet = Sheet(file, tuple(rows[0]), rows[1:], lines[1:])
+    problems = list(_form_problems(sheet, lines[0]))
+    if problems:
+        raise SpecError(in_order(problems))
+    return sheet
+
+
+def _text(path: Path) -> str:
+    place = Place(str(path))
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise SpecError((located(place, "file", "a readable file", found),)) from None
+    except UnicodeDecodeError as error:
+        found = f"byte 0x{error.object[error.start]:02x}"
+        hint = "save the file as UTF-8"
+        raise SpecError((located(place, "file", "text in UTF-8", found, hint),)) from None
+
+
+def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
+    top = Place(sheet.file, header)
+    for name in dict.fromkeys(n for n in sheet.names if sheet.names.count(n) > 1):
+        yield located(top, "header", "each column once", f"{shown(name)} again")
+    for row, cells in enumerate(sheet.rows):
+        if len(cells) != len(sheet.names):
+            yield sheet.problem(row, "row", f"{len(sheet.names)} cells", str(len(cells)))
+    if not sheet.rows:
+        yield located(top, "file", "rows below the header", "none")
+
+
+def _number(cell: str, may_lack: bool) -> float | None:
+    """The number in a cell, None if there is none."""
+    if may_lack and not cell:
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if abs(value) < LARGEST else None
