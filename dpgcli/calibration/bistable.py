@@ -6,11 +6,11 @@ are compared as they are, forces as f F(x), since dE/du = f dE/dx.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.calibration.choices import Loss, Quantity, Rule
 from dpgcli.calibration.curves import (
     Curve,
     alikeness,
@@ -23,7 +23,7 @@ from dpgcli.calibration.curves import (
     unsampled,
     work,
 )
-from dpgcli.calibration.fits import Fit, Loss, Parameter, fit
+from dpgcli.calibration.fits import Fit, Parameter, fit
 from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 
@@ -39,24 +39,7 @@ ALIKE = 0.5  # correlation of neighboring residuals above this is said
 SPAN = (0.01, 100.0)  # of the largest opening: bounds of the stroke
 
 
-class Quantity(StrEnum):
-    """What the law is fitted to."""
-
-    ENERGY = "energy"
-    FORCE = "force"
-    PRESSURE = "pressure"
-    WORK = "work"
-
-
 UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
-
-
-class Rule(StrEnum):
-    """How the opening follows from the travel."""
-
-    EQUAL = "equal"
-    PROPORTIONAL = "proportional"
-    STROKE = "stroke"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.calibration.losses import Loss, influence
+from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.losses import influence
 from dpgcli.calibration.search import Function, Parameter, Search, differences
 from dpgcli.errors import FitError
 
@@ -187,7 +188,8 @@ def _warnings(search: Search, found: Fit, free: Flags) -> tuple[str, ...]:
         elif is_free and np.isnan(error) and found.n_points > free.sum():
             said.append(f"{parameter.key}: too many outliers for a standard error")
     if found.n_points == free.sum():
-        said.append(f"{found.n_points} points for as many free values: no error estimate")
+        points = "1 point" if found.n_points == 1 else f"{found.n_points} points"
+        said.append(f"{points} for as many free values: no error estimate")
     return tuple(said)
 
 

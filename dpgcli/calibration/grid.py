@@ -9,7 +9,6 @@ fill a grid, linear between its nodes (RegularGridInterpolator).
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
@@ -18,18 +17,12 @@ from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
 from scipy.spatial import Delaunay, QhullError
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.errors import FitError
 
 SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its corners
 CONSTANT = "ln(value at reference)"
-
-
-class Method(StrEnum):
-    """The way between the points."""
-
-    SCALING = "scaling"
-    INTERPOLATION = "interpolation"
 
 
 @dataclass(frozen=True)

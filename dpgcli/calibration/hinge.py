@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.fits import Fit, Loss, Parameter, fit_linear
+from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.errors import FitError
 
 STIFFNESS = "hinge_stiffness_N_mm_per_rad"

@@ -38,6 +38,7 @@ ROUNDED = {
     "rad": ".5f",
     "mJ": ".5f",
     "%": ".1f",
+    "standard_error": ".2g",
 }
 
 
@@ -87,7 +88,7 @@ def table_printer(*, principal: bool) -> Printer:
         for block in blocks:
             first += _rows(columns, block, ROWS_SHOWN - len(first))
             n_rows += len(block[columns[0].name])
-            strays |= bool((block["status"] != 0).any())
+            strays |= principal and bool((block["status"] != 0).any())
             yield block
         shown = {
             column.name: [_shown(column, row[place]) for row in first]
