@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake in a spec, with all that is needed to mend it."""
+    """One mistake in a spec or in data, with all that is needed to mend it."""
 
     file: str
     line: int | None
@@ -22,7 +22,7 @@ class Problem:
 
 
 class SpecError(Exception):
-    """A spec, or an option that changes it, is wrong; carries every problem found."""
+    """A spec, an option that changes it, or data are wrong; carries every problem found."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         super().__init__("\n".join(map(str, problems)))

@@ -12,15 +12,17 @@ equal size; a curve that the model cannot follow has neither.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.calibration.losses import Loss, influence
+from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.losses import influence
 from dpgcli.calibration.search import Function, Parameter, Search, differences
 from dpgcli.errors import FitError
 
-__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit"]
+__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
 
 CONFIDENCE = 0.95  # of bootstrap intervals
 
@@ -110,6 +112,25 @@ def fit(
     return _bootstrapped(search, found, free, resamples, seed) if resamples else found
 
 
+def fit_linear(
+    parameters: Sequence[Parameter], design: Array, observed: Array, **options: Any
+) -> Fit:
+    """Fit y = X v with X the `design` (point, n); options as of `fit`.
+
+    >>> line = [Parameter("offset", 0.0), Parameter("slope", 1.0)]
+    >>> design = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    >>> fit_linear(line, design, np.array([1.0, 3.0, 5.0])).values.round(9).tolist()
+    [1.0, 2.0]
+    """
+    return fit(
+        parameters,
+        lambda values: design @ values - observed,
+        lambda _: design,
+        observed=observed,
+        **options,
+    )
+
+
 def _check_points(observed: Array, n_free: int) -> None:
     if len(observed) < n_free:
         raise FitError(f"{len(observed)} points for {n_free} free values: give more, or fix some")
@@ -167,7 +188,8 @@ def _warnings(search: Search, found: Fit, free: Flags) -> tuple[str, ...]:
         elif is_free and np.isnan(error) and found.n_points > free.sum():
             said.append(f"{parameter.key}: too many outliers for a standard error")
     if found.n_points == free.sum():
-        said.append(f"{found.n_points} points for as many free values: no error estimate")
+        points = "1 point" if found.n_points == 1 else f"{found.n_points} points"
+        said.append(f"{points} for as many free values: no error estimate")
     return tuple(said)
 
 

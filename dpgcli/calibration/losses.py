@@ -4,21 +4,10 @@ The cost is ½ Σ C² ρ((r/C)²). ρ(z) = z is plain least squares; soft_l1 2(�
 one, then 2√z − 1) and cauchy ln(1 + z) grow more slowly, so that outliers count less.
 """
 
-from enum import StrEnum
-
 import numpy as np
 
 from dpgcli.arrays import Array
-
-
-class Loss(StrEnum):
-    """How a residual counts: linear is plain least squares, the others limit outliers."""
-
-    LINEAR = "linear"
-    SOFT_L1 = "soft_l1"
-    HUBER = "huber"
-    CAUCHY = "cauchy"
-
+from dpgcli.calibration.choices import Loss
 
 # in standard deviations: estimates are 95 % as efficient as plain ones if errors are normal
 # (Holland and Welsch 1977; soft_l1 from the same condition by quadrature)

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.calibration.losses import TUNING, Loss, growth
+from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.losses import TUNING, growth
 from dpgcli.errors import FitError
 
 NEAR_BOUND = 1e-3  # of a parameter's size: closer than this, the bound itself is tried

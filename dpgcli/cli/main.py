@@ -11,6 +11,7 @@ from dpgcli.cli import (
     check,
     compare,
     explain,
+    fit,
     init,
     merge,
     predict,
@@ -52,6 +53,7 @@ for _function in (
     schema.schema,
 ):
     app.command()(command(_function))
+app.add_typer(fit.app, name="fit")
 
 
 def _version(wanted: bool) -> None:

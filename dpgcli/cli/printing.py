@@ -42,6 +42,7 @@ ROUNDED = {
     "N": ".4f",
     "mJ": ".5f",
     "%": ".1f",
+    "standard_error": ".2g",
 }
 
 
@@ -91,7 +92,7 @@ def table_printer(*, principal: bool) -> Printer:
         for block in blocks:
             first += _rows(columns, block, ROWS_SHOWN - len(first))
             n_rows += len(block[columns[0].name])
-            strays |= bool((block["status"] != 0).any())
+            strays |= principal and bool((block["status"] != 0).any())
             yield block
         shown = {
             column.name: [_shown(column, row[place]) for row in first]

@@ -12,6 +12,14 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
 
+EXPECTED = {  # where it is not a length
+    "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
+    "force_linearity": "a number from 0 to 1",
+    "hinge_stiffness_N_mm_per_rad": "a stiffness >= 0 in N mm/rad",
+    "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",
+    "elastic_modulus_MPa": "a modulus > 0 in MPa",
+}
+
 
 def _rigid_or_bounded(value: float) -> float:
     if value > STIFFEST and not math.isinf(value):

@@ -9,8 +9,8 @@ from dpgcli.files.output import whole_file
 
 
 @contextmanager
-def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[Any]:
-    """Axes to draw on; when all went well, an SVG or PNG file of that size in inches."""
+def figure_to(path: Path, width: float, height: float) -> Iterator[Any]:
+    """A figure to add axes to; when all went well, an SVG or PNG file of that size in inches."""
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -18,10 +18,17 @@ def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[A
     with mpl.rc_context({"svg.hashsalt": "dpg", "svg.fonttype": "none"}):
         figure = Figure(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
-        drawn = figure.add_subplot(**axes)
-        drawn.grid(visible=True, alpha=0.25)
-        yield drawn
+        yield figure
         kind = path.suffix.lower().removeprefix(".")
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         with whole_file(path) as temporary:
             figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
+
+
+@contextmanager
+def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[Any]:
+    """Axes to draw on; when all went well, an SVG or PNG file of that size in inches."""
+    with figure_to(path, width, height) as figure:
+        drawn = figure.add_subplot(**axes)
+        drawn.grid(visible=True, alpha=0.25)
+        yield drawn

@@ -7,7 +7,8 @@ from scipy.optimize import curve_fit
 
 from dpgcli.arrays import Array
 from dpgcli.calibration import search
-from dpgcli.calibration.fits import Fit, Loss, Parameter, fit
+from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.fits import Fit, Parameter, fit
 from dpgcli.calibration.losses import TUNING, growth, influence
 from dpgcli.errors import FitError
 

@@ -96,8 +96,8 @@ def test_the_models_own_error(call: Any, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("pattern,tip_x_mm\n111,3\n", "no column tip_y_mm; found pattern, tip_x_mm"),
-        ("pattern,tip_x_mm,tip_y_mm\n", "no states in it"),
+        ("pattern,tip_x_mm\n111,3\n", "a column tip_y_mm, found pattern, tip_x_mm"),
+        ("pattern,tip_x_mm,tip_y_mm\n", "expected rows below the header, found none"),
         (
             "pattern,tip_x_mm,tip_y_mm\n11,1,2\n",
             "fe.csv:2: pattern: expected 3 digits 0 and 1",
@@ -108,10 +108,13 @@ def test_the_models_own_error(call: Any, folder: Path) -> None:
         ),
         ("pattern,tip_x_mm,tip_y_mm\n111,1,nan\n", "fe.csv:2: tip_y_mm: expected a number"),
         ("pattern,tip_x_mm,tip_y_mm\n111,1,1e300\n", "fe.csv:2: tip_y_mm: expected a number"),
-        ("pattern,tip_x_mm,tip_y_mm\n\n# b\n111,1,2\n111,1,2\n", "fe.csv:5: 111 for the second"),
-        ("pattern,tip_x_mm,tip_y_mm\n111,1,2,3\n", "fe.csv:2: expected 3 cells, found 4"),
+        (
+            "pattern,tip_x_mm,tip_y_mm\n\n# b\n111,1,2\n111,1,2\n",
+            "fe.csv:5: pattern: expected each pattern once, found 111 for the second",
+        ),
+        ("pattern,tip_x_mm,tip_y_mm\n111,1,2,3\n", "fe.csv:2: row: expected 3 cells, found 4"),
         ("pattern;tip_x_mm;tip_y_mm\n111;1;2\n", "separate columns with commas"),
-        ("", "no column pattern, tip_x_mm, tip_y_mm"),
+        ("", "fe.csv: file: expected a header and rows, found nothing"),
     ],
 )
 def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: str) -> None:
@@ -134,7 +137,7 @@ def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: s
         (("--output", "b", "--json", "b"), "expected names that differ"),
         (("--json", "none/b.json"), "cannot write none/b.json"),
         (("--plot", "none/b.svg"), "cannot write none/b.svg"),
-        (("--against", "none.csv"), "cannot read none.csv"),
+        (("--against", "none.csv"), "none.csv: file: expected a readable file"),
         (("--compare", "three_unit.yaml"), "not JSON"),
         (("--compare", "none.json"), "no record of dpg bench --json"),
         (("--repeats", "0"), "--repeats"),

@@ -4,7 +4,7 @@ Written by `dpg fit`, read by specs. Keys of values and geometry are those of a 
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
@@ -28,9 +28,9 @@ from dpgcli.files.calibration.models import (
     Values,
 )
 from dpgcli.files.output import whole_file
-from dpgcli.files.sections import Geometry, Section
-from dpgcli.files.spec.places import KeyPath, in_order, shown
-from dpgcli.files.spec.source import Document, read_document
+from dpgcli.files.sections import EXPECTED, Geometry, Section, UnitGeometry
+from dpgcli.files.spec.places import KeyPath, Place, in_order, located, shown
+from dpgcli.files.spec.source import Document, parse_value, read_document
 
 __all__ = [
     "VERSION",
@@ -43,6 +43,7 @@ __all__ = [
     "ScalingLaw",
     "TravelToOpening",
     "Values",
+    "geometry_of",
     "made_by",
     "read_calibration",
     "source_of",
@@ -86,9 +87,36 @@ def read_calibration(path: str | Path) -> Calibration:
     except ValidationError as error:
         problems = [_problem(document, e) for e in error.errors(include_url=False)]
         raise SpecError(in_order([*document.problems, *problems])) from None
-    problems = [document.problem(*issue) for issue in _issues(found)]
+    problems = [document.problem(*i) for i in (*_issues(found), *_order_issues(found, document))]
     if problems or document.problems:
         raise SpecError(in_order([*document.problems, *problems]))
+    return found
+
+
+def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geometry:
+    """A geometry from "KEY=VALUE" texts, over those of a base.
+
+    Raises SpecError with every problem.
+    """
+    data: dict[str, Any] = {} if base is None else base.model_dump(exclude_none=True)
+    place = Place("--geometry")
+    problems: list[Problem] = []
+    for text in settings:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            data[key] = parse_value(value, place)
+        except SpecError as error:
+            problems += error.problems
+        if not equals or not key:
+            problems.append(located(place, "setting", "KEY=VALUE", shown(text)))
+    try:
+        found = Geometry.model_validate(data)
+    except ValidationError as error:
+        document = Document(place.file, {}, {})
+        located_errors = ({**e, "loc": ("geometry", *e["loc"])} for e in error.errors())
+        problems += [_problem(document, e) for e in located_errors]
+    if problems:
+        raise SpecError(in_order(problems))
     return found
 
 
@@ -101,6 +129,8 @@ def _problem(document: Document, error: Any) -> Problem:
         close = get_close_matches(str(path[-1]), known, n=1)
         hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
         return document.problem(path, "a known key", shown(path[-1]), hint)
+    if issubclass(section, UnitGeometry):
+        description = EXPECTED.get(str(path[-1]), "a length > 0 in mm")
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
     return document.problem(path, description, found)
 
@@ -153,6 +183,14 @@ def _correlation_issues(rows: list[list[float]], keys: list[str]) -> Iterator[Is
         yield path, "a symmetric matrix with 1 on its diagonal", "another"
     elif len(keys) and np.linalg.eigvalsh(matrix)[0] < -1e-9:
         yield path, "a matrix without negative eigenvalue", "one with"
+
+
+def _order_issues(calibration: Calibration, document: Document) -> Iterator[Issue]:
+    """A correlation counts its rows by the order of the values, which has to be one order."""
+    order = list(calibration.uncertain)
+    written = [key for key in document.data.get("values") or {} if key in order]
+    if calibration.correlation is not None and written != order:
+        yield ("values",), f"the order {', '.join(order)} for a correlation", ", ".join(written)
 
 
 def _curve_issues(curve: Curve) -> Iterator[Issue]:

@@ -37,14 +37,14 @@ class Fitted(Section, Generic[T]):
 
 
 class Values(Section):
-    """Lattice values; keys as in a spec."""
+    """Lattice values; keys as in a spec, and in the order of these fields."""
 
-    segment_length_mm: Fitted[Positive] | None = None
-    segment_height_mm: Fitted[Positive] | None = None
-    stroke_mm: Fitted[Positive] | None = None
     bistable_stiffness_N_per_mm: Fitted[Positive] | None = None
     force_linearity: Fitted[Fraction] | None = None
+    stroke_mm: Fitted[Positive] | None = None
     hinge_stiffness_N_mm_per_rad: Fitted[NotNegative] | None = None
+    segment_height_mm: Fitted[Positive] | None = None
+    segment_length_mm: Fitted[Positive] | None = None
     linear_stiffness_N_per_mm: Fitted[BarStiffness] | None = None
 
     def given(self) -> dict[str, Fitted[float]]:

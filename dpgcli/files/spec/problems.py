@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.sections import Geometry, Lattice, Section, UnitGeometry, UnitLattice
+from dpgcli.files.sections import EXPECTED, Geometry, Lattice, Section, UnitGeometry, UnitLattice
 from dpgcli.files.spec.models import (
     MAX_UNITS,
     FingerSpec,
@@ -34,16 +34,11 @@ SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
     *UnitLattice.model_fields,
 }
 
-EXPECTED = {
+OWN = {
     "units": f"a whole number from 1 to {MAX_UNITS}",
-    "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
     "calibration": '"published", the name of a calibration file, or a list of these',
     "law": '"published", "tabulated" or "push_only"',
-    "force_linearity": "a number from 0 to 1",
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
-    "hinge_stiffness_N_mm_per_rad": "a stiffness >= 0 in N mm/rad",
-    "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",
-    "elastic_modulus_MPa": "a modulus > 0 in MPa",
 }
 
 HINTS = {
@@ -108,7 +103,7 @@ def _expected(path: KeyPath) -> str:
     key = str(path[-1]) if path else "document"
     if _pattern(path) in SECTIONS or key == "overrides":
         return "a section of keys"
-    return EXPECTED.get(key, "a length > 0 in mm")
+    return {**EXPECTED, **OWN}.get(key, "a length > 0 in mm")
 
 
 def _hint(key: str, error: Any) -> str:

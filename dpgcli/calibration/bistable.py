@@ -1,0 +1,289 @@
+"""The published law's three values from a dome's curve.
+
+E = ½ k_b x² [1 + (1−α)(x²/d² − 2x/d)] at the opening x = f u that a travel u stands for. Energies
+are compared as they are, forces as f F(x), since dE/du = f dE/dx.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.calibration.choices import Loss, Quantity, Rule
+from dpgcli.calibration.curves import (
+    Curve,
+    alikeness,
+    cleaned,
+    dirt,
+    in_order,
+    integral,
+    inverted_well,
+    quasi_static,
+    unsampled,
+    work,
+)
+from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.errors import FitError
+from dpgcli.mechanics import laws
+
+STIFFNESS, LINEARITY, STROKE = KEYS = (
+    "bistable_stiffness_N_per_mm",
+    "force_linearity",
+    "stroke_mm",
+)
+LIMIT = 1.0 / 9.0  # of the linearity: from here on there is one well only
+HARDLY = 0.9  # of the limit: from here on the hinge may cost the second well
+LOW = 0.95  # R² below this is said
+ALIKE = 0.5  # correlation of neighboring residuals above this is said
+SPAN = (0.01, 100.0)  # of the largest opening: bounds of the stroke
+
+
+UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
+
+
+@dataclass(frozen=True)
+class Opening:
+    """x = factor u: `amount` is the factor, or the opening (mm) of the inverted well."""
+
+    rule: Rule
+    amount: float = 1.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What to fit, to which part of the record, and how; `fixed` are values by key."""
+
+    opening: Opening
+    quantity: Quantity
+    is_quasi_static: bool = False
+    area: float = float("nan")
+    fixed: Mapping[str, float] | None = None
+    loss: Loss = Loss.LINEAR
+    loss_scale: float | None = None
+    resamples: int = 0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class BistableFit:
+    """The fit, the points it was made to (travel in mm; energy in mJ or force in N), and the curve.
+
+    `factor` is x/u; `well` the travel of the data's inverted well, None if not sampled; `gaps`
+    stretches without data; `curve` travel and energy by travel, None where the energy is not known;
+    `warnings` those of the fit and of the data.
+    """
+
+    fit: Fit
+    travel: Array
+    observed: Array
+    factor: float
+    well: float | None
+    gaps: list[tuple[float, float]]
+    curve: tuple[Array, Array] | None
+    warnings: tuple[str, ...]
+
+
+def law(opening: Array, values: Array, quantity: Quantity) -> Array:
+    """Energy (mJ) or force (N, by the opening) of the law; `values` are k_b, α, d.
+
+    >>> at_stroke = law(np.array([3.5]), np.array([12.84, 0.043, 3.5]), Quantity.ENERGY)
+    >>> round(float(at_stroke[0]), 8)  # ½ α k_b d²
+    3.381735
+    """
+    response = laws.bistable(opening, values[0], values[1], values[2])
+    return response.energy if UNITS[quantity] == "mJ" else response.force
+
+
+def slopes(opening: Array, values: Array, quantity: Quantity) -> Array:
+    """Derivatives of `law` by k_b, α and d, shape (point, 3).
+
+    With u = x/d, β = 1−α: E_α = ½ k_b x² u(2−u), E_d = k_b x² β u(1−u)/d,
+    F_α = k_b x u(3−2u), F_d = k_b x β u(3−4u)/d; both are proportional to k_b. Our derivation.
+    """
+    stiffness, linearity, stroke = values
+    relative, softening = opening / stroke, 1.0 - linearity
+    by_stiffness = law(opening, np.array([1.0, linearity, stroke]), quantity)
+    if UNITS[quantity] == "mJ":
+        size = stiffness * opening**2 * relative
+        by_linearity = 0.5 * size * (2.0 - relative)
+        by_stroke = size * softening * (1.0 - relative) / stroke
+    else:
+        size = stiffness * opening * relative
+        by_linearity = size * (3.0 - 2.0 * relative)
+        by_stroke = size * softening * (3.0 - 4.0 * relative) / stroke
+    return np.stack((by_stiffness, by_linearity, by_stroke), axis=1)
+
+
+def turning_points(values: Array) -> tuple[float, float] | None:
+    """Openings (mm) of the barrier and of the inverted well, u = [3β ± √(9β² − 8β)]/(4β).
+
+    None for a law without a second well.
+
+    >>> turning_points(np.array([1.0, 0.0, 2.0]))  # symmetric wells
+    (1.0, 2.0)
+    """
+    beta = 1.0 - float(values[1])
+    if not beta > 8.0 / 9.0:
+        return None
+    root = np.sqrt(9.0 * beta**2 - 8.0 * beta)
+    stroke = float(values[2])
+    barrier, well = ((3.0 * beta + sign * root) / (4.0 * beta) for sign in (-1.0, 1.0))
+    return float(stroke * barrier), float(stroke * well)
+
+
+def fit_bistable(record: Curve, choice: Choice) -> BistableFit:
+    """Fit the published law to a record of a dome.
+
+    Raises FitError if the record lacks what is asked for, or the fit fails.
+    """
+    record, said = in_order(record)
+    observed = _observed(record, choice)
+    kept = np.ones(len(observed), bool)
+    warnings = [*said, *dirt(record, is_cut=choice.is_quasi_static)]
+    if choice.is_quasi_static:
+        kept, cut = quasi_static(record)
+        warnings.append(cut)
+    curve, observed = record.points(kept), observed[kept]
+    well = inverted_well(curve)
+    factor = _factor(choice.opening, well)
+    found = _fitted(factor * curve.travel, observed, factor, choice)
+    gaps = unsampled(curve.travel)
+    result = BistableFit(found, curve.travel, observed, factor, well, gaps, None, ())
+    energies, missing = _energies(curve, observed, choice, gaps, warnings)
+    judged = _judgments(result)
+    every = (*found.warnings, *warnings, *missing, *judged)
+    return replace(result, curve=energies, warnings=every)
+
+
+def _observed(record: Curve, choice: Choice) -> Array:
+    """What the law is held against: energies in mJ, or forces along the travel in N."""
+    if choice.quantity is Quantity.WORK:
+        return work(record)
+    column = getattr(record, choice.quantity.value)
+    if column is None:
+        raise FitError(f"no {choice.quantity.value} in the curve")
+    return np.asarray(column * choice.area if choice.quantity is Quantity.PRESSURE else column)
+
+
+def _factor(opening: Opening, well: float | None) -> float:
+    if opening.rule is not Rule.STROKE:
+        return opening.amount
+    if well is None:
+        raise FitError(
+            "the curve does not show where the inverted dome rests, so no travel stands for the "
+            f"opening of {opening.amount:g} mm: give proportional:FACTOR instead"
+        )
+    return opening.amount / well
+
+
+def _fitted(opening: Array, observed: Array, factor: float, choice: Choice) -> Fit:
+    size = 1.0 if UNITS[choice.quantity] == "mJ" else factor
+    return fit(
+        _parameters(opening, observed / size, choice),
+        lambda values: size * law(opening, values, choice.quantity) - observed,
+        lambda values: size * slopes(opening, values, choice.quantity),
+        observed=observed,
+        loss=choice.loss,
+        loss_scale=choice.loss_scale,
+        resamples=choice.resamples,
+        seed=choice.seed,
+    )
+
+
+def _parameters(opening: Array, observed: Array, choice: Choice) -> list[Parameter]:
+    """Where to start: the best of a few strokes and linearities, each with its best stiffness."""
+    fixed = choice.fixed or {}
+    reach = float(np.abs(opening).max())
+    if reach == 0.0:
+        raise FitError("the travel is 0 throughout")
+    strokes = [fixed[STROKE]] if STROKE in fixed else (reach * np.geomspace(0.2, 5.0, 60)).tolist()
+    linearities = [fixed[LINEARITY]] if LINEARITY in fixed else [0.005, 0.02, 0.05, 0.1, 0.3, 0.9]
+    best = (np.inf, 1.0, 0.05, reach)
+    for stroke in strokes:
+        for linearity in linearities:
+            unit = law(opening, np.array([1.0, linearity, stroke]), choice.quantity)
+            size = float((unit**2).sum()) or 1.0
+            stiffness = fixed.get(STIFFNESS, max(float(unit @ observed) / size, 0.0))
+            cost = float(((stiffness * unit - observed) ** 2).sum())
+            best = min(best, (cost, stiffness, linearity, stroke))
+    _, stiffness, linearity, stroke = best
+    if stiffness == 0.0:
+        raise FitError("no positive stiffness follows the curve: is its sign the other way round?")
+    return [
+        Parameter(STIFFNESS, stiffness, 1e-6 * stiffness, np.inf, STIFFNESS not in fixed),
+        Parameter(LINEARITY, linearity, 0.0, 1.0, LINEARITY not in fixed),
+        _stroke(stroke, reach, is_free=STROKE not in fixed),
+    ]
+
+
+def _stroke(start: float, reach: float, *, is_free: bool) -> Parameter:
+    if not is_free:
+        return Parameter(STROKE, start, is_free=False)
+    return Parameter(STROKE, start, SPAN[0] * reach, SPAN[1] * reach)
+
+
+def _energies(
+    curve: Curve,
+    observed: Array,
+    choice: Choice,
+    gaps: list[tuple[float, float]],
+    warnings: list[str],
+) -> tuple[tuple[Array, Array] | None, list[str]]:
+    """The dome's energy by travel, or why it is not known."""
+    if any(text.startswith("ringing") for text in warnings):
+        return None, ["no curve written: its energies are those of a ringing dome"]
+    if UNITS[choice.quantity] == "mJ":
+        return cleaned(curve.travel, observed), []
+    if curve.energy is not None:
+        return cleaned(curve.travel, curve.energy), []
+    if gaps:
+        start, end = gaps[0]
+        why = f"the force is not known from {start:.4g} to {end:.4g} mm"
+        return None, [f"no curve written: {why}, so its energy is not"]
+    travel, force = cleaned(curve.travel, observed)
+    before = 0.5 * travel[0] * force[0]  # from rest, where the force is 0
+    return (travel, before + integral(force, travel)), []
+
+
+def _judgments(found: BistableFit) -> Iterator[str]:
+    """What a user should know about the values."""
+    linearity = float(found.fit.values[1])
+    hinge = "the hinge takes another 8/9 k_theta/(k_b H^2) off that limit"
+    if linearity >= LIMIT:
+        yield f"not bistable: force_linearity {linearity:.4g} is not below 1/9, and {hinge}"
+    elif linearity >= HARDLY * LIMIT:
+        yield f"hardly bistable: force_linearity {linearity:.4g} is close to 1/9, and {hinge}"
+    yield from _unsampled_points(found)
+    if found.fit.r_squared < LOW:
+        yield f"the law does not follow the curve: R^2 = {found.fit.r_squared:.3f}"
+    rho = alikeness(found.fit.residuals[np.argsort(found.travel, kind="stable")])
+    if rho > ALIKE and found.fit.rms > 1e-6 * np.abs(found.observed).max():
+        factor = np.sqrt((1.0 + rho) / (1.0 - rho))
+        yield (
+            f"neighboring residuals are alike (correlation {rho:.2f}): the law has another shape "
+            f"than the curve, and standard errors are too small by a factor of about {factor:.1f}"
+        )
+
+
+def _unsampled_points(found: BistableFit) -> Iterator[str]:
+    turning = turning_points(found.fit.values)
+    reach = float(found.travel.max())
+    if found.well is None:
+        where = (
+            "" if turning is None else f"; the fitted one, at {turning[1] / found.factor:.4g} mm, "
+        )
+        yield (
+            f"the inverted well is not sampled (travel up to {reach:.4g} mm)"
+            + (f"{where}is an extrapolation" if where else "")
+        )
+    if turning is None:
+        return
+    top = turning[0] / found.factor
+    height = float(law(np.array(turning[:1]), found.fit.values, Quantity.ENERGY)[0])
+    barrier = f"the fitted barrier, {height:.4g} mJ at {top:.4g} mm, is an extrapolation"
+    for start, end in found.gaps:
+        if start < top < end:
+            yield f"nothing is sampled from {start:.4g} to {end:.4g} mm: {barrier}"
+    if top > reach:
+        yield f"nothing is sampled beyond {reach:.4g} mm: {barrier}"

@@ -1,0 +1,286 @@
+"""A dome's curve as it was simulated or measured, and what is wrong with it.
+
+Travel u of the dome's pole in mm, positive towards inversion, with any of: energy (mJ), force (N),
+pressure (MPa), enclosed volume (mm³), time. Data with time are ordered by it, others by travel.
+All thresholds are ours; messages give the numbers behind a judgment.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.errors import FitError
+
+LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
+NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
+BEYOND_REST = 0.4  # of the largest travel: where an inverted well may be
+FAST = 10.0  # times the speed that three quarters of the time stay below
+SHORTEST_PIECE = 0.01  # of the record's duration: slower for less than that is a turning point
+SMALLEST_SWING = 0.02  # of the range of travels: smaller ones do not count as a reversal
+CELLS = 100
+DISAGREEMENT = 0.02  # of the range of energies: standard deviation at one travel
+MOST_POINTS = 200
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Arrays (point,), or None where not known; see the module for units."""
+
+    travel: Array
+    energy: Array | None = None
+    force: Array | None = None
+    pressure: Array | None = None
+    volume: Array | None = None
+    time: Array | None = None
+
+    def points(self, index: Indices | Flags) -> "Curve":
+        """The curve at some of its points."""
+        chosen: dict[str, Any] = {k: v if v is None else v[index] for k, v in vars(self).items()}
+        return replace(self, **chosen)
+
+    @property
+    def reach(self) -> float:
+        """The largest travel, in mm."""
+        return float(self.travel.max())
+
+
+def in_order(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
+    """The curve by time, else by travel, without repeated points; and what had to be done.
+
+    >>> curve, said = in_order(Curve(np.array([1.0, 0.0, 1.0]), energy=np.array([2.0, 0.0, 2.0])))
+    >>> curve.travel.tolist(), said
+    ([0.0, 1.0], ('the points were not in order of travel: sorted', '1 repeated point left out'))
+    """
+    said = []
+    leading = curve.travel if curve.time is None else curve.time
+    if (np.diff(leading) < 0.0).any():
+        name = "travel" if curve.time is None else "time"
+        said.append(f"the points were not in order of {name}: sorted")
+        curve = curve.points(np.argsort(leading, kind="stable"))
+    arrays = [v for v in vars(curve).values() if v is not None]
+    first = np.sort(np.unique(np.stack(arrays), axis=1, return_index=True)[1])
+    if n_repeated := len(curve.travel) - len(first):
+        said.append(f"{n_repeated} repeated point{'s' * (n_repeated != 1)} left out")
+        curve = curve.points(first)
+    return curve, tuple(said)
+
+
+def unsampled(travel: Array) -> list[tuple[float, float]]:
+    """Stretches of the travel (mm) longer than 15 % of its reach without a point.
+
+    >>> unsampled(np.array([0.0, 1.0, 9.0, 10.0]))
+    [(1.0, 9.0)]
+    """
+    ascending = np.sort(travel)
+    wide = np.flatnonzero(np.diff(ascending) > LARGEST_STEP * ascending[-1])
+    return [(float(ascending[i]), float(ascending[i + 1])) for i in wide]
+
+
+def integral(values: Array, along: Array) -> Array:
+    """The integral up to each point, from 0 at the first, by trapezoids.
+
+    >>> integral(np.array([0.0, 2.0, 2.0]), np.array([0.0, 1.0, 3.0])).tolist()
+    [0.0, 1.0, 5.0]
+    """
+    return np.append(0.0, np.cumsum(0.5 * np.diff(along) * (values[1:] + values[:-1])))
+
+
+def work(curve: Curve) -> Array:
+    """Energy by integrating ∫F du, or ∫p dV where there is no force (mJ, trapezoids).
+
+    Raises FitError where neither is known, or where a static curve has an unsampled stretch.
+    """
+    along, push = (
+        (curve.travel, curve.force) if curve.force is not None else (curve.volume, curve.pressure)
+    )
+    if along is None or push is None:
+        raise FitError("no work without force_N, or pressure_MPa and volume_mm3")
+    if curve.time is None and (gaps := unsampled(curve.travel)):
+        start, end = gaps[0]
+        raise FitError(f"no work across {start:g} to {end:g} mm, where nothing is known")
+    return integral(push, along)
+
+
+def inverted_well(curve: Curve) -> float | None:
+    """Travel (mm) at which the inverted dome rests, None if the curve does not show it.
+
+    The minimum of a cubic through the energies (without them, the integrated force) around the
+    lowest one in the last 60 % of the travel, if it is near the points.
+
+    >>> travel = np.linspace(0.0, 3.0, 31)
+    >>> round(inverted_well(Curve(travel, energy=travel**2 * (travel - 2.5) ** 2)), 3)
+    2.5
+    """
+    curve = curve.points(np.argsort(curve.travel, kind="stable"))
+    energy, reach = curve.energy, curve.reach
+    if energy is None:
+        push = curve.force if curve.force is not None else curve.pressure
+        if push is None:
+            return None
+        energy = integral(push, curve.travel)
+    late = curve.travel > BEYOND_REST * reach
+    if not late.any():
+        return None
+    lowest = curve.travel[late][np.argmin(energy[late])]
+    away = np.where(late, np.abs(curve.travel - lowest), np.inf)
+    enough = np.unique(away)[:5][-1]  # at least five points, if they are not far
+    near = away <= max(NEAR_WELL * reach, min(enough, LARGEST_STEP * reach))
+    if len(np.unique(curve.travel[near])) < 4:
+        return None
+    cubic = np.polynomial.Polynomial.fit(curve.travel[near], energy[near], 3)
+    flat = cubic.deriv().roots()
+    flat = flat[np.isreal(flat)].real
+    wells = flat[cubic.deriv(2)(flat) > 0.0]
+    if not len(wells):
+        return None
+    well = float(wells[0])
+    is_near = np.abs(curve.travel[late] - well).min() <= NEAR_WELL * reach
+    return well if is_near and well > BEYOND_REST * reach else None
+
+
+def speeds(curve: Curve) -> tuple[Array, float]:
+    """Speed between points (point − 1,), and the limit above which the dome snaps or rings."""
+    assert curve.time is not None, "speed needs time"
+    lasting = np.diff(curve.time)
+    speed = np.abs(np.diff(curve.travel)) / np.maximum(lasting, np.finfo(float).tiny)
+    ascending = np.argsort(speed, kind="stable")
+    elapsed = np.cumsum(lasting[ascending])
+    usual = speed[ascending][np.searchsorted(elapsed, 0.75 * elapsed[-1])]
+    return speed, FAST * float(usual)
+
+
+class Pieces(NamedTuple):
+    """Points that belong to slow pieces of a record, and how they were told, in words."""
+
+    kept: Flags
+    said: str
+
+
+def quasi_static(curve: Curve) -> Pieces:
+    """The slow pieces of a record: before a snap, and after its ringing has died.
+
+    Slow is at most ten times the speed that three quarters of the time stay below, for at least
+    a hundredth of the record. Raises FitError if nothing is left.
+    """
+    if curve.time is None:
+        return Pieces(np.ones(len(curve.travel), bool), "no time: all points are taken as static")
+    speed, limit = speeds(curve)
+    slow = speed <= limit
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False])).astype(int)))
+    shortest = SHORTEST_PIECE * np.ptp(curve.time)
+    runs = [
+        (a, b)
+        for a, b in edges.reshape(-1, 2).tolist()
+        if curve.time[b] - curve.time[a] >= shortest
+    ]
+    kept = np.zeros(len(curve.travel), bool)
+    for first, last in runs:
+        kept[first : last + 1] = True
+    if not kept.any():
+        raise FitError("no quasi-static piece: the travel is fast or rings all the time")
+    times = ", ".join(f"{curve.time[a]:.4g} to {curve.time[b]:.4g}" for a, b in runs)
+    dropped = f"dropped {int((~kept).sum())} of {len(kept)} points"
+    why = f"that snap or ring (faster than {limit:.3g} mm/s)"
+    return Pieces(kept, f"quasi-static pieces, time {times}: {dropped} {why}")
+
+
+def dirt(curve: Curve, *, is_cut: bool) -> Iterator[str]:
+    """What is wrong with a record, in words; `is_cut` where only slow pieces are used."""
+    if curve.time is not None and not is_cut and (n_reversals := _reversals(curve)) > 2:
+        yield (
+            f"ringing: the travel reverses {n_reversals} times while it is fast; "
+            "--branches quasi-static leaves that out"
+        )
+    if curve.energy is None:
+        return
+    yield from _disagreement(curve.travel, curve.energy)
+    has_work = curve.force is not None or (curve.pressure is not None and curve.volume is not None)
+    if has_work and (curve.time is not None or not unsampled(curve.travel)):
+        yield from _departure(curve.energy, work(curve))
+    at_rest = np.abs(curve.travel) <= 0.01 * curve.reach
+    if at_rest.any():
+        offset = float(curve.energy[at_rest][0])
+        if abs(offset) > 0.01 * np.ptp(curve.energy):
+            yield f"the energy at rest is {offset:.4g} mJ, not 0 as the law has it"
+
+
+def _reversals(curve: Curve) -> int:
+    """How often the travel turns back while it is fast."""
+    speed, limit = speeds(curve)
+    fast = np.flatnonzero(speed > limit)
+    if not len(fast):
+        return 0
+    travel = curve.travel[fast[0] : fast[-1] + 2]
+    swing = SMALLEST_SWING * np.ptp(curve.travel)
+    return sum(len(find_peaks(sign * travel, prominence=swing)[0]) for sign in (1.0, -1.0))
+
+
+def _disagreement(travel: Array, energy: Array) -> Iterator[str]:
+    """Energies that differ at the same travel: the record drifts, dissipates or is noisy."""
+    width = np.ptp(travel) / CELLS
+    cell = np.floor((travel - travel.min()) / width).astype(int) if width > 0.0 else travel * 0
+    most, place = 3, -1
+    for number in np.unique(cell):
+        inside = cell == number
+        if inside.sum() > most:
+            away = travel[inside] - travel[inside].mean()
+            rest = energy[inside] - np.polyval(np.polyfit(away, energy[inside], 1), away)
+            if rest.std() > DISAGREEMENT * np.ptp(energy):
+                most, place = int(inside.sum()), int(number)
+    if place >= 0:
+        inside = cell == place
+        low, high = energy[inside].min(), energy[inside].max()
+        yield (
+            f"drifting energy: at {most} points near a travel of {travel[inside].mean():.4g} mm it "
+            f"is anything from {low:.4g} to {high:.4g} mJ"
+        )
+
+
+def _departure(energy: Array, done: Array) -> Iterator[str]:
+    """An energy that is not the work done."""
+    away = np.abs(energy - energy[0] - done)
+    worst = int(away.argmax())
+    if away[worst] > 0.05 * np.ptp(energy):
+        yield (
+            f"the energy is not the work done: {energy[worst]:.4g} mJ where the work is "
+            f"{energy[0] + done[worst]:.4g} mJ; --quantity work integrates it"
+        )
+
+
+def cleaned(travel: Array, energy: Array) -> tuple[Array, Array]:
+    """The curve by ascending travel, thinned to about 200 points at most.
+
+    Points that are closer than a two-hundredth of the sampled travel are averaged.
+
+    >>> cleaned(np.array([2.0, 0.0, 2.0]), np.array([5.0, 0.0, 7.0]))
+    (array([0., 2.]), array([0., 6.]))
+    """
+    ascending = np.argsort(travel, kind="stable")
+    travel, energy = travel[ascending], energy[ascending]
+    gaps = sum(end - start for start, end in unsampled(travel))
+    width = (np.ptp(travel) - gaps) / MOST_POINTS
+    for cell in (np.floor(travel / width) if width > 0.0 else travel, None):
+        if cell is None:  # neighbors on both sides of a cell's edge
+            cell = np.cumsum(np.diff(travel, prepend=travel[0]) > 0.25 * width)
+        _, group, counts = np.unique(cell, return_inverse=True, return_counts=True)
+        travel, energy = (np.bincount(group, values) / counts for values in (travel, energy))
+    return travel, energy
+
+
+def alikeness(residuals: Array) -> float:
+    """Correlation of neighboring residuals, in their order: 0 if independent, towards 1 if alike.
+
+    >>> round(alikeness(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])), 3)
+    0.5
+    """
+    squares = float((residuals**2).sum())
+    return float((residuals[1:] * residuals[:-1]).sum()) / squares if squares > 0.0 else 0.0
+
+
+def with_energy(curve: Curve, energy: Array) -> Curve:
+    """The curve with another energy."""
+    return replace(curve, energy=energy)

@@ -1,0 +1,189 @@
+"""Quantities known at some geometries, at any other: a scaling law or an interpolation.
+
+Both work on logarithms, so that products of powers are straight: ln q over ln g. A scaling law is
+their least-squares plane, ln q = a + Σ b_i ln(g_i/r_i); an interpolation meets the points, by
+thin-plate splines (scipy's RBFInterpolator, exact for products of powers) or, where the points
+fill a grid, linear between its nodes (RegularGridInterpolator).
+"""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
+from scipy.spatial import Delaunay, QhullError
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.calibration.choices import Method
+from dpgcli.calibration.fits import Fit, Parameter, fit_linear
+from dpgcli.errors import FitError
+
+SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its corners
+CONSTANT = "ln(value at reference)"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Values, their relative standard errors, and whether they lie inside the hull; (design,).
+
+    Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an
+    interpolation the root mean square of the leave-one-out errors, the same everywhere. NaN where
+    there are too few points to know.
+    """
+
+    value: Array
+    relative_error: Array
+    is_inside: Flags
+
+
+@dataclass(frozen=True)
+class Points:
+    """Geometries (point, key), each key of `over` a column, and quantities (point,) by key."""
+
+    over: tuple[str, ...]
+    geometry: Array
+    quantities: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        if self.geometry.shape[1:] != (len(self.over),):
+            raise ValueError(f"geometry has shape {self.geometry.shape} for {self.over}")
+        if not all((v > 0.0).all() for v in (self.geometry, *self.quantities.values())):
+            raise ValueError("geometries and quantities are positive")
+
+    @cached_property
+    def reference(self) -> Array:
+        """The point nearest to the middle: where a scaling law's errors are small (key,)."""
+        away = np.log(self.geometry)
+        size = np.ptp(away, axis=0)
+        away = (away - away.mean(axis=0)) / np.where(size > 0.0, size, 1.0)
+        return np.asarray(self.geometry[np.argmin((away**2).sum(axis=1))])
+
+    def without(self, place: int) -> "Points":
+        """All points but one."""
+        rest = {key: np.delete(values, place) for key, values in self.quantities.items()}
+        return Points(self.over, np.delete(self.geometry, place, axis=0), rest)
+
+    def are_inside(self, geometry: Array) -> Flags:
+        """Whether geometries (design, key) lie in the convex hull of the points, edges included."""
+        low, high = self.geometry.min(axis=0), self.geometry.max(axis=0)
+        size = np.where(high > low, high - low, 1.0)
+        scaled = (geometry - low) / size
+        in_range = ((scaled >= -SLACK) & (scaled <= (high - low) / size + SLACK)).all(axis=1)
+        if len(self.over) == 1:
+            return np.asarray(in_range)
+        return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=SLACK) >= 0))
+
+    @cached_property
+    def _hull(self) -> Any:
+        low = self.geometry.min(axis=0)
+        size = np.ptp(self.geometry, axis=0)
+        try:
+            return Delaunay((self.geometry - low) / np.where(size > 0.0, size, 1.0))
+        except (QhullError, ValueError):
+            raise FitError(
+                f"the points leave no room between them over {', '.join(self.over)}: "
+                f"expected at least {len(self.over) + 1} that are not in one line or plane"
+            ) from None
+
+
+@dataclass(frozen=True)
+class Law:
+    """A way between points, for all their quantities."""
+
+    method: Method
+    points: Points
+
+    def at(self, key: str, geometry: Array) -> Estimate:
+        """A quantity at geometries (design, key), in the order of `points.over`.
+
+        >>> heights = np.array([[1.0], [2.0], [4.0]])
+        >>> points = Points(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})
+        >>> found = Law(Method.SCALING, points).at("area", np.array([[3.0], [8.0]]))
+        >>> found.value.round(9).tolist(), found.is_inside.tolist()
+        ([27.0, 192.0], [True, False])
+        """
+        return Estimate(
+            self._value(key, geometry),
+            self._relative_error(key, geometry),
+            self.points.are_inside(geometry),
+        )
+
+    def scaling(self, key: str) -> Fit:
+        """The scaling law of one quantity: ln of its value at the reference, then exponents.
+
+        Raises FitError where the points cannot tell exponents apart.
+        """
+        return self._scalings[key]
+
+    @cached_property
+    def _scalings(self) -> dict[str, Fit]:
+        design = self._design(self.points.geometry)
+        terms = [Parameter(name, 0.0) for name in (CONSTANT, *self.points.over)]
+        known = self.points.quantities.items()
+        return {key: fit_linear(terms, design, np.log(values)) for key, values in known}
+
+    def leave_one_out(self, key: str) -> tuple[float, float]:
+        """Largest and root mean square relative error of each point from the others.
+
+        NaN where the others are too few. Without one of its points a grid is none any more:
+        thin-plate splines then take the place of the grid.
+        """
+        errors = self._left_out[key]
+        return float(np.abs(errors).max()), float(np.sqrt(np.mean(errors**2)))
+
+    @cached_property
+    def _left_out(self) -> dict[str, Array]:
+        """Relative errors (point,) by key."""
+        known, geometry = self.points.quantities, self.points.geometry
+        errors = {key: np.full(len(geometry), np.nan) for key in known}
+        for place in range(len(geometry)):
+            rest = Law(self.method, self.points.without(place))
+            with suppress(FitError):  # too few to go without one
+                for key, values in known.items():
+                    guess = rest._value(key, geometry[place : place + 1])
+                    errors[key][place] = guess[0] / values[place] - 1.0
+        return errors
+
+    def _value(self, key: str, geometry: Array) -> Array:
+        if self.method is Method.SCALING:
+            return np.exp(self._design(geometry) @ self.scaling(key).values)
+        return np.asarray(np.exp(self._interpolants[key](np.log(geometry))))
+
+    def _relative_error(self, key: str, geometry: Array) -> Array:
+        if self.method is Method.INTERPOLATION:
+            return np.full(len(geometry), self.leave_one_out(key)[1])
+        found, design = self.scaling(key), self._design(geometry)
+        n_spare = found.n_points - len(found.values)
+        noise = (found.residuals**2).sum() / n_spare if n_spare else np.nan
+        return np.asarray(np.sqrt(noise + ((design @ found.covariance) * design).sum(axis=1)))
+
+    @cached_property
+    def _interpolants(self) -> dict[str, Any]:
+        known = self.points.quantities.items()
+        return {key: _interpolant(self.points, np.log(values)) for key, values in known}
+
+    def _design(self, geometry: Array) -> Array:
+        logs = np.log(geometry / self.points.reference)
+        return np.concatenate((np.ones((len(logs), 1)), logs), axis=1)
+
+
+def _interpolant(points: Points, logs: Array) -> Any:
+    """A function of ln geometry (design, key) through the points."""
+    axes = [np.unique(column) for column in points.geometry.T]
+    if np.prod([len(axis) for axis in axes]) == len(logs) and min(map(len, axes)) > 1:
+        order = np.lexsort(points.geometry.T[::-1])
+        shape = tuple(len(axis) for axis in axes)
+        nodes = tuple(np.log(axis) for axis in axes)
+        return RegularGridInterpolator(
+            nodes, logs[order].reshape(shape), bounds_error=False, fill_value=None
+        )
+    try:
+        return RBFInterpolator(np.log(points.geometry), logs, kernel="thin_plate_spline", degree=1)
+    except (ValueError, np.linalg.LinAlgError):
+        raise FitError(
+            f"no interpolation over {', '.join(points.over)} through {len(logs)} points: expected "
+            f"at least {len(points.over) + 1} that are not in one line or plane"
+        ) from None

@@ -1,0 +1,16 @@
+"""`dpg fit`: spring constants from curves and tables."""
+
+import typer
+
+from dpgcli.cli.exits import command
+from dpgcli.cli.fit.bistable import bistable
+from dpgcli.cli.fit.grid import grid
+from dpgcli.cli.fit.hinge import hinge
+
+app = typer.Typer(
+    help="Calibrate spring constants from curves, tables and known states.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+for _function in (bistable, hinge, grid):
+    app.command()(command(_function))

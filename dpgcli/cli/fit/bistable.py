@@ -1,0 +1,266 @@
+"""`dpg fit bistable`: the bistable law from a dome's curve."""
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dpgcli.calibration.choices import Branches, Loss, Quantity, Rule
+from dpgcli.cli.fit.common import (
+    NO_GEOMETRY,
+    Bootstrap,
+    GeometrySpec,
+    GeometryValues,
+    LossScale,
+    Output,
+    Plot,
+    Printed,
+    Seed,
+    check_files,
+    geometry_from,
+    known,
+    method_of,
+    print_fit,
+    quality_line,
+    tell,
+    write,
+)
+from dpgcli.cli.options import Quiet
+from dpgcli.cli.printing import Format
+
+if TYPE_CHECKING:
+    from dpgcli.calibration.bistable import BistableFit, Choice, Opening
+    from dpgcli.files.measured import Measured
+
+KEYS = ("bistable_stiffness_N_per_mm", "force_linearity", "stroke_mm")
+WHY_OPENING = """\
+--travel-to-opening is needed: a dome's travel u and the opening x of a unit, in which the law is
+written, are not the same, and no curve tells how they relate. One of:
+  equal                x = u, as if the unit opened by all that the dome travels
+  proportional:FACTOR  x = FACTOR u
+  stroke:3.5           x = FACTOR u such that the inverted dome rests at an opening of 3.5 mm,
+                       for example the dome height less the unit separation, as published"""
+
+
+def bistable(
+    curve: Annotated[
+        Path, typer.Argument(metavar="CURVE", help="CSV: travel with energy, force or pressure")
+    ],
+    output: Output = None,
+    travel_to_opening: Annotated[
+        str | None,
+        typer.Option(metavar="RULE", help="equal, proportional:FACTOR or stroke:MM; needed"),
+    ] = None,
+    quantity: Annotated[
+        Quantity | None,
+        typer.Option(help="What to fit  [default: energy, else force, else pressure]"),
+    ] = None,
+    area: Annotated[
+        float | None, typer.Option("--area", metavar="MM2", help="Effective area, for pressure")
+    ] = None,
+    branches: Annotated[
+        Branches, typer.Option(help="All points, or slow stable pieces only")
+    ] = Branches.ALL,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option("--fix", metavar="KEY=VALUE", help="Hold a value; repeatable"),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option("--free", metavar="KEY", help="Fit only this; repeatable  [default: all]"),
+    ] = None,
+    geometry: GeometryValues = None,
+    spec: GeometrySpec = None,
+    loss: Annotated[Loss, typer.Option(help="How residuals count")] = Loss.LINEAR,
+    loss_scale: LossScale = None,
+    bootstrap: Bootstrap = 0,
+    seed: Seed = 0,
+    printed_as: Printed = Format.TABLE,
+    plot: Plot = None,
+    quiet: Quiet = False,
+) -> None:
+    """Fit k_b, alpha and d of the bistable law to a dome's curve."""
+    from dpgcli.calibration.bistable import Choice, fit_bistable
+    from dpgcli.files.measured import read_curve
+
+    opening, fixed = _opening(travel_to_opening), _fixed(fix or [], free)
+    check_files((curve, spec), output, plot)
+    where = geometry_from(geometry, spec)
+    measured = read_curve(curve, known(where))
+    chosen = _quantity(measured, quantity)
+    choice = Choice(
+        opening,
+        chosen,
+        is_quasi_static=branches is Branches.QUASI_STATIC,
+        area=_area(chosen, area),
+        fixed=fixed,
+        loss=loss,
+        loss_scale=_positive("--loss-scale", loss_scale),
+        resamples=bootstrap,
+        seed=seed,
+    )
+    found = fit_bistable(measured.curve, choice)
+    warnings = [*found.warnings, *([] if where else [NO_GEOMETRY])]
+    if measured.ignored:
+        warnings.append(f"columns not used: {', '.join(measured.ignored)}")
+    _write(output, curve, found, choice, where, warnings)
+    if plot is not None:
+        _draw(found, choice, curve.name, plot)
+    print_fit(found.fit, printed_as)
+    if not quiet:
+        tell(_summary(found, choice), warnings, output, plot)
+
+
+def _opening(text: str | None) -> "Opening":
+    from dpgcli.calibration.bistable import Opening
+    from dpgcli.errors import UsageError
+
+    if text is None:
+        raise UsageError(WHY_OPENING)
+    rule, _, amount = text.partition(":")
+    if text == Rule.EQUAL:
+        return Opening(Rule.EQUAL)
+    if rule in (Rule.PROPORTIONAL, Rule.STROKE) and (size := _number(amount)) is not None:
+        return Opening(Rule(rule), size)
+    raise UsageError(
+        f"--travel-to-opening {text}: expected equal, proportional:FACTOR or stroke:MM, "
+        "with a number > 0"
+    )
+
+
+def _number(text: str) -> float | None:
+    """A number above zero, None for anything else."""
+    if not re.fullmatch(r"\s*[0-9]*\.?[0-9]*(?:[eE][-+]?[0-9]+)?\s*", text):
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if 0.0 < value < float("inf") else None
+
+
+def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
+    """Values that are held, by key."""
+    from difflib import get_close_matches
+
+    from dpgcli.errors import UsageError
+
+    fixed: dict[str, float] = {}
+    for text in fix:
+        key, _, value = (part.strip() for part in text.partition("="))
+        number = 0.0 if key == KEYS[1] and value in ("0", "0.0") else _number(value)
+        if key in KEYS and (number is None or (key == KEYS[1] and number > 1.0)):
+            bound = "from 0 to 1" if key == KEYS[1] else "> 0"
+            raise UsageError(f"--fix {text}: expected a number {bound}")
+        fixed[key] = number or 0.0
+    for option, keys in (("--fix", list(fixed)), ("--free", free or [])):
+        for key in keys:
+            if key not in KEYS:
+                nearest = get_close_matches(key, KEYS, n=1)
+                hint = f"did you mean {nearest[0]}?" if nearest else f"one of {', '.join(KEYS)}"
+                raise UsageError(f"{option} {key}: no value of the law ({hint})")
+    for key in KEYS:
+        if free is not None and key in free and key in fixed:
+            raise UsageError(f"{key} is both in --fix and in --free")
+        if free is not None and key not in free and key not in fixed:
+            raise UsageError(f"{key} is not free: give its value, --fix {key}=VALUE")
+    return fixed
+
+
+def _quantity(measured: "Measured", asked: Quantity | None) -> Quantity:
+    """What to fit: what is asked for, or the first that there is."""
+    from dpgcli.errors import UsageError
+
+    has = [q for q in Quantity if getattr(measured.curve, q.value, None) is not None]
+    if asked is None:
+        return has[0]
+    if asked is not Quantity.WORK and asked not in has:
+        raise UsageError(f"--quantity {asked}: the curve has {', '.join(has)}")
+    return asked
+
+
+def _area(quantity: Quantity, area: float | None) -> float:
+    from dpgcli.errors import UsageError
+
+    if quantity is Quantity.PRESSURE and area is None:
+        raise UsageError("pressure needs --area MM2, the effective area A in F = p A")
+    if quantity is not Quantity.PRESSURE and area is not None:
+        raise UsageError(f"--area is for pressure; the fit is to the {quantity}")
+    return _positive("--area", area) or float("nan")
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    from dpgcli.errors import UsageError
+
+    if value is not None and not 0.0 < value < float("inf"):
+        raise UsageError(f"{option} {value:g}: expected a number > 0")
+    return value
+
+
+def _summary(found: "BistableFit", choice: "Choice") -> list[str]:
+    """Quality, the assumed mapping, and the inverted wells of law and data."""
+    from dpgcli.calibration.bistable import UNITS, turning_points
+
+    how = "as given"
+    if choice.opening.rule is Rule.STROKE:
+        how = f"so that the inverted well opens {choice.opening.amount:g} mm"
+    wells = [f"{found.well:.4g} mm in the data"] if found.well is not None else []
+    turning = turning_points(found.fit.values)
+    wells += [f"{turning[1] / found.factor:.4g} mm in the law"] if turning else []
+    return [
+        quality_line(found.fit, UNITS[choice.quantity]),
+        f"opening = {found.factor:.5g} travel, {how} (assumed, not fitted)",
+        *([f"travel at the inverted well: {', '.join(wells)}"] if wells else []),
+    ]
+
+
+def _write(
+    output: Path | None,
+    curve: Path,
+    found: "BistableFit",
+    choice: "Choice",
+    geometry: object,
+    warnings: list[str],
+) -> None:
+    from dpgcli.calibration.bistable import UNITS
+    from dpgcli.files.calibration import source_of
+    from dpgcli.files.calibration.results import correlation_of, curve_of, quality_of, values_of
+
+    method = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
+    if choice.quantity is Quantity.PRESSURE:
+        method += f", area {choice.area:g} mm2"
+    content = {
+        "method": method + (", quasi-static pieces" if choice.is_quasi_static else ""),
+        "values": values_of(found.fit),
+        "correlation": correlation_of(found.fit),
+        "geometry": geometry,
+        "curve": curve_of(found),
+        "quality": quality_of(found.fit, UNITS[choice.quantity]),
+        "warnings": warnings,
+        "sources": [source_of(curve, found.fit.n_points)],
+    }
+    write(output, content)
+
+
+def _draw(found: "BistableFit", choice: "Choice", name: str, path: Path) -> None:
+    import numpy as np
+
+    from dpgcli.calibration.bistable import UNITS, law
+    from dpgcli.report.fits import FitFigure, draw_fit
+
+    unit = UNITS[choice.quantity]
+    along = np.linspace(min(0.0, float(found.travel.min())), float(found.travel.max()), 400)
+    fitted = law(found.factor * along, found.fit.values, choice.quantity)
+    figure = FitFigure(
+        title=f"{name}: bistable law, opening = {found.factor:.4g} travel",
+        x=found.travel,
+        observed=found.observed,
+        residuals=found.fit.residuals,
+        line=(along, fitted if unit == "mJ" else found.factor * fitted),
+        x_label="travel of the dome (mm)",
+        y_label=f"{'energy' if unit == 'mJ' else 'force along the travel'} ({unit})",
+        unit=unit,
+        gaps=found.gaps,
+    )
+    draw_fit(figure, path)

@@ -1,0 +1,95 @@
+"""From a fit to what a calibration file says about it."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dpgcli.calibration.bistable import BistableFit
+from dpgcli.calibration.choices import Method
+from dpgcli.calibration.fits import Fit
+from dpgcli.calibration.grid import Law
+from dpgcli.files.calibration.models import (
+    Curve,
+    Grid,
+    Quality,
+    ScalingLaw,
+    TravelToOpening,
+    Values,
+)
+
+
+def values_of(fit: Fit) -> Values:
+    """Values, errors and intervals of a fit whose parameters are lattice keys."""
+    said: dict[str, Any] = {}
+    for place, parameter in enumerate(fit.parameters):
+        entry: dict[str, Any] = {"value": float(fit.values[place])}
+        if math.isfinite(error := float(fit.standard_errors[place])):
+            entry["standard_error"] = error
+        if fit.intervals is not None and np.isfinite(fit.intervals[place]).all():
+            entry["interval"] = fit.intervals[place].tolist()
+        said[parameter.key] = entry
+    return Values.model_validate(said)
+
+
+def correlation_of(fit: Fit) -> list[list[float]] | None:
+    """Correlation of the values that have errors, in the order of `Values`; None if there are none.
+
+    The matrix is symmetric and its diagonal 1 to the last bit.
+    """
+    keys = [parameter.key for parameter in fit.parameters]
+    known = [k for k, error in zip(keys, fit.standard_errors, strict=True) if np.isfinite(error)]
+    rows = [keys.index(key) for key in Values.model_fields if key in known]
+    matrix = fit.correlation[np.ix_(rows, rows)]
+    return (0.5 * (matrix + matrix.T)).tolist() or None
+
+
+def quality_of(fit: Fit, unit: str) -> Quality:
+    """Points, R² and residual of a fit."""
+    r_squared = fit.r_squared if math.isfinite(fit.r_squared) else None
+    return Quality(
+        n_points=fit.n_points, r_squared=r_squared, rms_residual=fit.rms, residual_unit=unit
+    )
+
+
+def curve_of(found: BistableFit) -> Curve | None:
+    """The dome's energy over its travel, None where it is not known."""
+    if found.curve is None:
+        return None
+    travel, energy = found.curve
+    rule = "equal" if found.factor == 1.0 else "proportional"
+    return Curve(
+        travel_mm=travel.tolist(),
+        energy_mJ=energy.tolist(),
+        travel_to_opening=TravelToOpening.model_validate({"rule": rule, "factor": found.factor}),
+        unsampled_mm=[list(gap) for gap in found.gaps],
+    )
+
+
+def grid_of(law: Law) -> Grid:
+    """The points of a grid, its scaling laws if it has them, and its leave-one-out errors."""
+    points = law.points
+    columns = dict(zip(points.over, points.geometry.T.tolist(), strict=True))
+    left_out = {key: law.leave_one_out(key)[0] for key in points.quantities}
+    is_scaling = law.method is Method.SCALING
+    reference = dict(zip(points.over, points.reference.tolist(), strict=True))
+    return Grid(
+        method=law.method.value,
+        over=list(points.over),
+        points={**columns, **{key: v.tolist() for key, v in points.quantities.items()}},
+        reference=reference if is_scaling else None,
+        scaling={k: _scaling_of(law, k) for k in points.quantities} if is_scaling else None,
+        leave_one_out={k: v for k, v in left_out.items() if math.isfinite(v)} or None,
+    )
+
+
+def _scaling_of(law: Law, key: str) -> ScalingLaw:
+    fit, over = law.scaling(key), law.points.over
+    errors = fit.standard_errors.tolist()
+    is_known = bool(np.isfinite(fit.standard_errors).all())
+    return ScalingLaw(
+        at_reference=float(np.exp(fit.values[0])),
+        standard_error=errors[0] if is_known else None,
+        exponents=dict(zip(over, fit.values[1:].tolist(), strict=True)),
+        standard_errors=dict(zip(over, errors[1:], strict=True)) if is_known else None,
+    )

@@ -1,0 +1,237 @@
+"""Curves of domes and hinges and tables of geometries, read from CSV with units in column names."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.calibration.curves import Curve
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.sections import Geometry
+from dpgcli.files.sheet import Sheet, read_sheet
+from dpgcli.files.spec.places import in_order
+
+TRAVELS = ("pole_travel_mm", "travel_mm")
+QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}
+OTHERS = {"volume_mm3": "volume", "time_s": "time"}
+MOMENT, ROTATIONS = "moment_N_mm", ("rotation_rad", "rotation_mid_chamber_rad")
+
+PLAUSIBLE = {  # of the largest value, for what soft fingers are made of; without geometry
+    "travel": (0.1, 1e3),
+    "energy": (0.1, 1e5),
+    "force": (1e-3, 1e4),
+    "pressure": (1e-4, 10.0),
+    "moment": (0.02, 1e6),
+    "rotation": (1e-6, 3.2),
+}
+GUESSES = {  # the unit behind values that are too small, and too large
+    "travel": ("meters?", "micrometers?"),
+    "energy": ("joules?", "microjoules?"),
+    "force": ("kilonewtons?", "millinewtons?"),
+    "pressure": ("gigapascals?", "kPa or Pa?"),
+    "moment": ("N m?", "N um?"),
+    "rotation": ("", "degrees?"),
+}
+MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit is 1000 off
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A curve, the columns that were not used, and how many rows there are."""
+
+    curve: Curve
+    ignored: tuple[str, ...]
+    n_rows: int
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Moments (N mm) over rotations (rad), (row,); the texts of columns that hold text, by name."""
+
+    moment: Array
+    rotation: Array
+    texts: Mapping[str, tuple[str, ...]]
+    ignored: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Geometries (point, key) by `over`, and positive quantities (point,) by key.
+
+    `constant` holds geometry that is the same in all points.
+    """
+
+    over: tuple[str, ...]
+    geometry: Array
+    quantities: dict[str, Array]
+    constant: dict[str, float]
+    ignored: tuple[str, ...]
+
+
+def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measured:
+    """A dome's curve from CSV; the geometry tells units that are a thousand times off.
+
+    Raises SpecError with every problem at once.
+    """
+    sheet = read_sheet(path)
+    travel = _one_of(sheet, TRAVELS)
+    known = {travel: "travel", **QUANTITIES, **OTHERS}
+    if not set(QUANTITIES) & set(sheet.names):
+        raise SpecError((sheet.missing(" or ".join(QUANTITIES)),))
+    columns = sheet.numbers([name for name in sheet.names if name in known])
+    arrays = {known[name]: values for name, values in columns.items()}
+    problems = [*_signs(sheet, travel, arrays["travel"]), *_scales(sheet, columns, known, geometry)]
+    if problems:
+        raise SpecError(in_order(problems))
+    return Measured(Curve(**arrays), _unused(sheet, known), len(sheet.rows))
+
+
+def read_moments(path: Path, where: str | None = None) -> Moments:
+    """Moments and rotations of a hinge from CSV; `where` "COLUMN=TEXT" chooses rows.
+
+    Raises SpecError with every problem at once.
+    """
+    sheet = read_sheet(path)
+    rotation = _one_of(sheet, ROTATIONS)
+    sheet.check_names([MOMENT])
+    if where is not None:
+        sheet = _chosen(sheet, where)
+    known = {MOMENT: "moment", rotation: "rotation"}
+    columns = sheet.numbers(list(known))
+    problems = list(_scales(sheet, columns, known, None))
+    if problems:
+        raise SpecError(in_order(problems))
+    texts = {name: tuple(sheet.cells(name)) for name in sheet.names if not _is_numeric(sheet, name)}
+    unused = tuple(name for name in _unused(sheet, known) if name not in texts)
+    return Moments(columns[MOMENT], columns[rotation], texts, unused)
+
+
+def read_table(path: Path) -> Table:
+    """Quantities over geometries from CSV: columns that are keys of the geometry, and the others.
+
+    Columns of text are left out. Raises SpecError with every problem at once.
+    """
+    sheet = read_sheet(path)
+    keys = [name for name in sheet.names if name in Geometry.model_fields]
+    others = [n for n in sheet.names if n not in keys and _is_numeric(sheet, n)]
+    if not keys:
+        raise SpecError((sheet.missing("of the geometry, such as dome_height_mm"),))
+    if not others:
+        raise SpecError((sheet.missing("of a quantity, such as bistable_stiffness_N_per_mm"),))
+    columns = sheet.numbers([*keys, *others])
+    problems = [
+        sheet.problem(row, name, "a number > 0, since logarithms are fitted", f"{values[row]:g}")
+        for name, values in columns.items()
+        for row in np.flatnonzero(values <= 0.0).tolist()
+    ]
+    problems += _repeated(sheet, np.stack([columns[key] for key in keys], axis=1))
+    over = tuple(key for key in keys if np.ptp(columns[key]) > 0.0)
+    if not over and not problems:
+        problems.append(sheet.problem(None, "file", "geometries that differ", "one and the same"))
+    if problems:
+        raise SpecError(in_order(problems))
+    return Table(
+        over,
+        np.stack([columns[key] for key in over], axis=1),
+        {name: columns[name] for name in others},
+        {key: float(columns[key][0]) for key in keys if key not in over},
+        tuple(name for name in sheet.names if name not in columns),
+    )
+
+
+def _one_of(sheet: Sheet, names: tuple[str, ...]) -> str:
+    found = [name for name in names if name in sheet.names]
+    if len(found) > 1:
+        raise SpecError(
+            (sheet.problem(None, "header", f"one of {', '.join(names)}", " and ".join(found)),)
+        )
+    if not found:
+        raise SpecError((sheet.missing(" or ".join(names)),))
+    return found[0]
+
+
+def _unused(sheet: Sheet, known: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(name for name in sheet.names if name not in known)
+
+
+def _is_numeric(sheet: Sheet, name: str) -> bool:
+    """Whether at least one cell of a column is a number, so that all should be."""
+    for cell in sheet.cells(name):
+        try:
+            float(cell)
+        except ValueError:
+            continue
+        return True
+    return False
+
+
+def _chosen(sheet: Sheet, where: str) -> Sheet:
+    name, equals, text = where.partition("=")
+    if not equals:
+        raise SpecError((sheet.problem(None, "--where", "COLUMN=TEXT", repr(where)),))
+    sheet.check_names([name.strip()])
+    cells = sheet.cells(name.strip())
+    kept = [row for row, cell in enumerate(cells) if cell == text.strip()]
+    if not kept:
+        there = "; ".join(dict.fromkeys(cells))
+        raise SpecError((sheet.problem(None, "--where", f"a text of {name}", repr(text), there),))
+    return sheet.chosen(kept)
+
+
+def _repeated(sheet: Sheet, geometry: Array) -> Iterator[Problem]:
+    first: dict[tuple[float, ...], int] = {}
+    for row, values in enumerate(map(tuple, geometry.tolist())):
+        if values in first:
+            found = f"that of line {sheet.lines[first[values]]} again"
+            yield sheet.problem(row, "geometry", "each geometry once", found)
+        first.setdefault(values, row)
+
+
+def _signs(sheet: Sheet, name: str, travel: Array) -> Iterator[Problem]:
+    if travel.max() <= 0.0 or travel.min() < -0.5 * travel.max():
+        found = f"{travel.min():g} to {travel.max():g}"
+        yield sheet.problem(None, name, "travels that are positive towards inversion", found)
+
+
+def _scales(
+    sheet: Sheet,
+    columns: Mapping[str, Array],
+    known: Mapping[str, str],
+    geometry: Mapping[str, float] | None,
+) -> Iterator[Problem]:
+    """Columns whose largest value no dome has: most likely in another unit."""
+    ranges = {**PLAUSIBLE, **_of_dome(geometry or {})}
+    for name, values in columns.items():
+        kind = known[name]
+        largest = float(np.abs(values).max())
+        if kind not in ranges or largest == 0.0:
+            continue
+        low, high = ranges[kind]
+        if not low <= largest <= high:
+            hint = GUESSES[kind][largest > high]
+            if kind not in ("moment", "rotation") and not geometry:
+                hint += " if it is right, say how large the dome is: --geometry dome_height_mm=..."
+            expected = f"a largest value of {low:.3g} to {high:.3g}"
+            yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
+
+
+def _of_dome(geometry: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Largest values that a dome of this geometry may have.
+
+    Energy E t^2.8 h^1.75 and pressure E t^2.5 h^1.2, from 68 mJ and 0.15 MPa at h = 6.5 mm,
+    t = 0.75 mm, E = 26 MPa: the finite-element grid of configs/calibration.
+    """
+    height = geometry.get("dome_height_mm")
+    if height is None:
+        return {}
+    ranges = {"travel": (0.05 * height, 20.0 * height)}
+    if {"dome_thickness_mm", "elastic_modulus_MPa"} <= set(geometry):
+        thickness = geometry["dome_thickness_mm"] / 0.75
+        modulus, relative = geometry["elastic_modulus_MPa"] / 26.0, height / 6.5
+        energy = 68.0 * modulus * thickness**2.8 * relative**1.75
+        pressure = 0.15 * modulus * thickness**2.5 * relative**1.2
+        usual = {"energy": energy, "force": energy / height, "pressure": pressure}
+        ranges |= {kind: (size / MARGIN, size * MARGIN) for kind, size in usual.items()}
+    return ranges
