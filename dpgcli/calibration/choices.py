@@ -41,3 +41,10 @@ class Method(StrEnum):
 
     SCALING = "scaling"
     INTERPOLATION = "interpolation"
+
+
+class Target(StrEnum):
+    """What of known states is met."""
+
+    TIPS = "tips"
+    ANGLES = "angles"

@@ -4,116 +4,161 @@ The residuals are those of states that are solved and certified at every trial; 
 are exact (`states.sensitivities`).
 """
 
-from collections.abc import Sequence
-from enum import StrEnum
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.calibration.fits import Fit, Loss, fit
+from dpgcli.calibration.choices import Loss, Target
+from dpgcli.calibration.comparison import Comparison, compare
+from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
 from dpgcli.errors import FitError
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import STEP, sensitivities
-from dpgcli.states.solve import Status
+from dpgcli.states.solve import Status, reach
 
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
 BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (1.0, 1e12)}
 
 
-class Target(StrEnum):
-    """What of the known states is met."""
+@dataclass(frozen=True)
+class FingerFit:
+    """Fits values, the same in all units, to known tips (mm) or angles of phalanges (rad).
 
-    TIPS = "tips"
-    ANGLES = "angles"
-
-
-def fit_finger(
-    finger: Finger,
-    known: KnownStates,
-    frame: Frame,
-    free: Sequence[str],
-    *,
-    target: Target | str = Target.TIPS,
-    loss: Loss | str = Loss.LINEAR,
-    resamples: int = 0,
-    seed: int = 0,
-) -> Fit:
-    """Fit values, the same in all units, to known tips (mm) or angles of phalanges (rad).
-
-    `free` names values by the keys of `mechanics.finger.KEYS`; the finger has the others, and where
-    to start. Raises FitError where units differ in a free value, where the finger lacks a known
-    state to start with, and as `fits.fit` does.
+    `free` names values by the keys of `mechanics.finger.KEYS`; the finger has the others, and
+    where to start. Raises FitError where units differ in a free value.
     """
-    target = Target(target)
-    values = {key: getattr(finger, array) for key, array in KEYS.items()}
-    _check(values, free)
-    shared = [key for key, value in values.items() if value.size == 1 and np.isfinite(value).all()]
-    parameters = [_parameter(key, float(values[key][0, 0]), key in free) for key in shared]
-    observed = known.tip if target is Target.TIPS else known.angles
-    given = np.isfinite(observed)
-    if not given.any():
-        raise FitError(f"the data have no {target} to fit to")
 
-    def solved(trial: Array) -> LatticeStates:
-        changed = finger.with_values(dict(zip(shared, trial.tolist(), strict=True)))
-        return lattice_states(changed, known.patterns, frame)
+    finger: Finger
+    known: KnownStates
+    frame: Frame
+    free: tuple[str, ...]
+    target: Target = Target.TIPS
+    loss: Loss = Loss.LINEAR
 
-    def residual(trial: Array) -> Array:
-        states = solved(trial)
-        found = states.tip if target is Target.TIPS else states.angles
-        return np.asarray((found - observed)[given])
+    def __post_init__(self) -> None:
+        values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
+        for key in self.free:
+            if key not in values:
+                raise FitError(f"--free {key}: expected one of {', '.join(values)}")
+            if values[key].size > 1:
+                raise FitError(f"--free {key}: units differ in it, expected one value for all")
+            if not np.isfinite(values[key]).all():
+                raise FitError(f"--free {key}: is infinite, start from a finite value")
 
-    def jacobian(trial: Array) -> Array:
-        return _slopes(solved(trial), shared, frame, target, given)
+    def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
+        """The least-squares fit.
 
-    _check_start(finger, known, frame)
-    return fit(
-        parameters,
-        residual,
-        jacobian,
-        observed=observed[given],
-        loss=loss,
-        resamples=resamples,
-        seed=seed,
-    )
+        Raises FitError where the finger lacks a known state to start with, where the data have
+        nothing to fit to, and as `fits.fit` does.
+        """
+        self._check_start()
+        return fit(
+            self._parameters,
+            self._residual,
+            self._jacobian,
+            observed=(self._observed - self._straight)[self._given],
+            loss=self.loss,
+            resamples=resamples,
+            seed=seed,
+        )
 
+    def compared(self, found: Fit | None) -> Comparison:
+        """The states beside the known ones: as the finger is, or as it was fitted."""
+        finger = self.finger if found is None else self.finger.with_values(found.by_key)
+        return compare(finger, self.known, self.frame)
 
-def _check(values: dict[str, Array], free: Sequence[str]) -> None:
-    for key in free:
-        if key not in values:
-            raise FitError(f"{key}: expected one of {', '.join(values)}")
-        if values[key].size > 1:
-            raise FitError(f"{key}: units differ in it, expected one value for all")
-        if not np.isfinite(values[key]).all():
-            raise FitError(f"{key}: is infinite, give it a finite value to start from")
+    def left_out(self) -> Array:
+        """Relative errors (state,) of tips, each predicted by a fit to the other states.
+
+        NaN for states that hardly move, and where the others do not suffice.
+        """
+        errors = np.full(self.known.patterns.shape[1], np.nan)
+        for state in np.flatnonzero(np.isfinite(self.compared(None).relative)):
+            others = np.delete(np.arange(len(errors)), state)
+            with suppress(FitError):
+                found = replace(self, known=self.known.chosen(others)).fit()
+                errors[state] = self.compared(found).relative[state]
+        return errors
+
+    @cached_property
+    def _observed(self) -> Array:
+        return self.known.tip if self.target is Target.TIPS else self.known.angles
+
+    @cached_property
+    def _straight(self) -> Array:
+        """What the straight finger would have, (…, 1): R² is of the deflections."""
+        if self.target is Target.ANGLES:
+            return np.zeros((1, 1))
+        return self.frame.tips(np.array([reach(self.finger), [0.0], [0.0]]))
+
+    @cached_property
+    def _given(self) -> Flags:
+        return np.isfinite(self._observed)
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        """Values that all units share, the infinite ones left out."""
+        values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
+        return tuple(
+            _parameter(key, float(value[0, 0]), key in self.free)
+            for key, value in values.items()
+            if value.size == 1 and np.isfinite(value).all()
+        )
+
+    def _states(self, values: Array) -> LatticeStates:
+        """The states at a trial; those of the last one are kept for its derivatives."""
+        key = values.tobytes()
+        if self._last.get("key") != key:
+            keys = (parameter.key for parameter in self._parameters)
+            changed = self.finger.with_values(dict(zip(keys, values.tolist(), strict=True)))
+            states = lattice_states(changed, self.known.patterns, self.frame)
+            self._last.update(key=key, states=states)
+        last: LatticeStates = self._last["states"]
+        return last
+
+    @cached_property
+    def _last(self) -> dict[str, Any]:
+        return {}
+
+    def _residual(self, values: Array) -> Array:
+        states = self._states(values)
+        found = states.tip if self.target is Target.TIPS else states.angles
+        return np.asarray((found - self._observed)[self._given])
+
+    def _jacobian(self, values: Array) -> Array:
+        """Derivatives of what is fitted, (point, value)."""
+        states = self._states(values)
+        free = [place for place, p in enumerate(self._parameters) if p.is_free]
+        steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
+        found = sensitivities(states.batch, steps)
+        slopes = found.strut_angles
+        if self.target is Target.TIPS:
+            moved = states.pose[:, None] + 1j * STEP * found.pose
+            slopes = self.frame.tips(moved).imag / STEP
+        jacobian = np.zeros((int(self._given.sum()), len(self._parameters)))
+        jacobian[:, free] = slopes.transpose(0, 2, 1)[self._given]
+        return jacobian
+
+    def _check_start(self) -> None:
+        if not self._given.any():
+            raise FitError(f"the data have no {self.target} to fit to")
+        states = lattice_states(self.finger, self.known.patterns, self.frame)
+        missing = [
+            f"{pattern.decode()} is {Status(status).text}"
+            for pattern, status in zip(texts(self.known.patterns), states.status, strict=True)
+            if status != Status.STABLE
+        ]
+        if missing:
+            raise FitError(f"at the start not every known state exists: {', '.join(missing)}")
 
 
 def _parameter(key: str, start: float, is_free: bool) -> Parameter:
     lower, upper = BOUNDS.get(key, (start / WIDEST, start * WIDEST))
     return Parameter(key, start, lower, upper, is_free)
-
-
-def _check_start(finger: Finger, known: KnownStates, frame: Frame) -> None:
-    states = lattice_states(finger, known.patterns, frame)
-    missing = [
-        f"{pattern.decode()} is {Status(status).text}"
-        for pattern, status in zip(texts(known.patterns), states.status, strict=True)
-        if status != Status.STABLE
-    ]
-    if missing:
-        raise FitError(f"at the start not every known state exists: {', '.join(missing)}")
-
-
-def _slopes(
-    states: LatticeStates, keys: Sequence[str], frame: Frame, target: Target, given: Flags
-) -> Array:
-    """Derivatives of what is fitted, (point, value)."""
-    found = sensitivities(states.batch, [{KEYS[key]: np.ones((1, 1))} for key in keys])
-    if target is Target.ANGLES:
-        slopes = found.strut_angles
-    else:
-        slopes = frame.tips(states.pose[:, None] + 1j * STEP * found.pose).imag / STEP
-    return np.asarray(slopes.transpose(0, 2, 1)[given])

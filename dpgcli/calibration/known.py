@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain, internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
@@ -29,6 +29,18 @@ class KnownStates:
     pushes: Array
     seconds: Array
     shapes: tuple[Array, ...] = ()
+
+    def chosen(self, states: Indices) -> "KnownStates":
+        """Some of the states."""
+        return KnownStates(
+            self.patterns[:, states],
+            self.tip[:, states],
+            self.angles[:, states],
+            self.openings[:, states],
+            self.pushes[:, states],
+            self.seconds[states],
+            tuple(self.shapes[state] for state in states) if self.shapes else (),
+        )
 
     @classmethod
     def of_tips(cls, patterns: Flags, tip: Array, tip_angle: Array | None = None) -> "KnownStates":

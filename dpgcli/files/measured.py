@@ -9,9 +9,9 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.curves import Curve
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.places import in_order
 from dpgcli.files.sections import Geometry
 from dpgcli.files.sheet import Sheet, read_sheet
-from dpgcli.files.spec.places import in_order
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}

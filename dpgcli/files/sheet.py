@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.spec.places import Place, in_order, located, shown
+from dpgcli.files.places import Place, in_order, located, shown
 
 LARGEST = 1e12  # a number beyond that has another meaning, or is a mistake
 

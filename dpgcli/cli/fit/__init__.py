@@ -4,6 +4,7 @@ import typer
 
 from dpgcli.cli.exits import command
 from dpgcli.cli.fit.bistable import bistable
+from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 
@@ -12,5 +13,5 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-for _function in (bistable, hinge, grid):
+for _function in (bistable, hinge, finger, grid):
     app.command()(command(_function))

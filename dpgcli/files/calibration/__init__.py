@@ -28,9 +28,9 @@ from dpgcli.files.calibration.models import (
     Values,
 )
 from dpgcli.files.output import whole_file
+from dpgcli.files.places import KeyPath, Place, in_order, located, shown
 from dpgcli.files.sections import EXPECTED, Geometry, Section, UnitGeometry
-from dpgcli.files.spec.places import KeyPath, Place, in_order, located, shown
-from dpgcli.files.spec.source import Document, parse_value, read_document
+from dpgcli.files.source import Document, parse_value, read_document
 
 __all__ = [
     "VERSION",

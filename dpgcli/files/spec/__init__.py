@@ -9,12 +9,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.problems import checked
 from dpgcli.files.spec.references import with_calibrations
 from dpgcli.files.spec.scenes import scene_of
 from dpgcli.files.spec.settings import changed, with_settings
-from dpgcli.files.spec.source import Document, read_document
 from dpgcli.mechanics.scene import Scene
 
 __all__ = [

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from dpgcli.files.calibration.models import Calibration, Fitted
+from dpgcli.files.places import KeyPath
 from dpgcli.files.sections import LARGEST, SMALLEST, Geometry
-from dpgcli.files.spec.places import KeyPath
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.scene import Origin
 

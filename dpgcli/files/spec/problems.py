@@ -6,7 +6,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.places import KeyPath, dotted, in_order, shown
 from dpgcli.files.sections import EXPECTED, Geometry, Lattice, Section, UnitGeometry, UnitLattice
+from dpgcli.files.source import Document
 from dpgcli.files.spec.models import (
     MAX_UNITS,
     FingerSpec,
@@ -14,9 +16,7 @@ from dpgcli.files.spec.models import (
     Spec,
     UnitOverride,
 )
-from dpgcli.files.spec.places import KeyPath, dotted, in_order, shown
 from dpgcli.files.spec.scenes import issues, range_issues, unit_range
-from dpgcli.files.spec.source import Document
 
 SECTIONS: dict[KeyPath, type[Section]] = {
     (): Spec,

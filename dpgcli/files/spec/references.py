@@ -6,10 +6,10 @@ from typing import Any
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.places import shown
+from dpgcli.files.source import Document
 from dpgcli.files.spec.derivations import PUBLISHED
-from dpgcli.files.spec.places import shown
 from dpgcli.files.spec.settings import SETTING, changed
-from dpgcli.files.spec.source import Document
 
 EXPECTED = '"published" or the name of a calibration file'
 KEY = ("finger", "calibration")

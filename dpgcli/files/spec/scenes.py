@@ -11,6 +11,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.errors import SpecError
 from dpgcli.files.calibration.models import Calibration
+from dpgcli.files.places import KeyPath, Place, dotted, located
 from dpgcli.files.spec.derivations import (
     DERIVATIONS,
     LINEAR_STIFFNESS,
@@ -26,7 +27,6 @@ from dpgcli.files.spec.derivations import (
 )
 from dpgcli.files.spec.domes import Domes, domes_of
 from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
-from dpgcli.files.spec.places import KeyPath, Place, dotted, located
 from dpgcli.files.spec.uncertainty import Share, uncertainty_of
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.finger import Finger

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.spec.places import (
+from dpgcli.files.places import (
     KeyPath,
     Place,
     dotted,
@@ -13,7 +13,7 @@ from dpgcli.files.spec.places import (
     shortened,
     shown,
 )
-from dpgcli.files.spec.source import MAX_DEPTH, Document, parse_value
+from dpgcli.files.source import MAX_DEPTH, Document, parse_value
 
 SETTING = Place("--set")
 

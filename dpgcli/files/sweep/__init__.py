@@ -24,11 +24,11 @@ from dpgcli.exploration.space import (
     logarithmic,
     sampled,
 )
+from dpgcli.files.places import KeyPath, in_order, located, shown
+from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec import Spec, canonical_json, read_scene
-from dpgcli.files.spec.places import KeyPath, in_order, located, shown
 from dpgcli.files.spec.problems import checked, unknown_key
 from dpgcli.files.spec.settings import SETTING
-from dpgcli.files.spec.source import Document, read_document
 from dpgcli.files.sweep.models import (
     MANY_KEYS,
     ONE_KEY,

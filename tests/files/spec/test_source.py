@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dpgcli.errors import SpecError
-from dpgcli.files.spec.places import Place, shortened, shown
-from dpgcli.files.spec.source import MAX_BYTES, parse_document, parse_value, read_document
+from dpgcli.files.places import Place, shortened, shown
+from dpgcli.files.source import MAX_BYTES, parse_document, parse_value, read_document
 
 
 def problems_of(text):

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dpgcli.errors import SpecError
+from dpgcli.files.source import Document
 from dpgcli.files.spec import canonical_json, json_schema, read_spec, scene_of, starter
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.problems import SECTIONS, checked
-from dpgcli.files.spec.source import Document
 from dpgcli.mechanics.scene import Gripper, Origin, Source
 
 CONFIGS = Path(__file__).parents[3] / "configs"

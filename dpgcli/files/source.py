@@ -16,7 +16,7 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.spec.places import (
+from dpgcli.files.places import (
     MAX_SHOWN,
     KeyPath,
     Place,
