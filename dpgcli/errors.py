@@ -43,3 +43,7 @@ class NothingSelectedError(Exception):
 
 class OutputError(Exception):
     """A file cannot be written; nothing half-written is left behind."""
+
+
+class SolverError(Exception):
+    """A solver outside dpg failed, or its results make no sense; nothing is made of them."""

@@ -15,6 +15,7 @@ FLOORS = {
     "equilibrium": 2,
     "states": 3,
     "accuracy": 4,
+    "calibration": 4,
     "exploration": 5,
     "files": 6,
     "report": 6,

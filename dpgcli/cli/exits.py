@@ -15,6 +15,7 @@ from dpgcli.cli.streams import discard, open_streams, say
 from dpgcli.errors import (
     NothingSelectedError,
     OutputError,
+    SolverError,
     SpecError,
     UsageError,
     WorkplaceError,
@@ -57,7 +58,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             say(str(error))  # each problem starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
-        except (UsageError, OutputError, WorkplaceError) as error:
+        except (UsageError, OutputError, WorkplaceError, SolverError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))

@@ -11,6 +11,7 @@ from dpgcli.cli import (
     check,
     compare,
     explain,
+    fe,
     init,
     merge,
     predict,
@@ -52,6 +53,9 @@ for _function in (
     schema.schema,
 ):
     app.command()(command(_function))
+fe.app.command()(command(fe.dome))
+fe.app.command()(command(fe.hinge))
+app.add_typer(fe.app, name="fe")
 
 
 def _version(wanted: bool) -> None:

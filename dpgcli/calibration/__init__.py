@@ -1,0 +1,1 @@
+"""Springs calibrated from finite elements or tests."""
