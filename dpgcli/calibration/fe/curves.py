@@ -11,6 +11,7 @@ from dpgcli.calibration.fe.decks import Pulse
 from dpgcli.calibration.fe.dome import Dome, DomeMesh
 from dpgcli.calibration.fe.energy import strain_energy, swept_volume
 from dpgcli.calibration.fe.hinge import Chambers, chamber_turn, couple, moment
+from dpgcli.errors import SolverError
 
 
 class DomeCurve(NamedTuple):
@@ -80,8 +81,10 @@ def dome_finding(dome: Dome, curve: DomeCurve) -> str:
 
 
 def hinge_finding(curve: HingeCurve) -> str:
-    """Moment over rotation at the end of the curve."""
+    """Moment over rotation at the end of the curve. Raises SolverError if it did not open."""
     moment, rotation = curve.moment_N_mm[-1], curve.rotation_rad[-1]
+    if rotation <= 0:
+        raise SolverError(f"the moment should open the hinge; ccx turned it by {rotation:.4g} rad")
     return f"Moment over rotation at {rotation:.4g} rad: {moment / rotation:.4g} N mm/rad."
 
 

@@ -28,11 +28,12 @@ def strain_energy(dome: Dome, mesh: DomeMesh, displacements: Array) -> Array:
     points, weights = gauss(2)
     shapes, slopes = quad_shapes(points), quad_slopes(points)
     rest = mesh.nodes[mesh.elements]
-    moved = rest + displacements[..., mesh.elements, :]
+    shift = displacements[..., mesh.elements, :]
     tangents = np.einsum("enx,pnl->epxl", rest, slopes)
-    gradient = np.einsum("...enx,pnl->...epxl", moved, slopes) @ np.linalg.inv(tangents)
+    strain = np.einsum("...enx,pnl->...epxl", shift, slopes) @ np.linalg.inv(tangents)
+    gradient = np.eye(2) + strain
     radius = rest[..., 0] @ shapes.T
-    hoop = (moved[..., 0] @ shapes.T) / radius
+    hoop = 1 + (shift[..., 0] @ shapes.T) / radius
     volume = 2 * np.pi * radius * np.linalg.det(tangents) * weights
     shear, bulk = moduli(dome.elastic_modulus, dome.poisson)
     dilation = np.linalg.det(gradient) * hoop
