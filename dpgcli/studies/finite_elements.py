@@ -70,7 +70,10 @@ def run(model: Model, folder: Path, limits: Limits) -> str:
         )
     curve_path(model, folder).unlink(missing_ok=True)
     output = solve(deck, limits)
-    outcome = model.outcome(*displacements(output.displacements, model.n_nodes))
+    times, moved = displacements(output.displacements, model.n_nodes)
+    if times[-1] < (1 - 1e-6) * model.end:
+        raise SolverError(f"what ccx wrote ends at time {times[-1]:g} of {model.end:g}")
+    outcome = model.outcome(times, moved)
     comments = model.comments(version(output.log), outcome.finding)
     _write(curve_path(model, folder), csv_text(comments, outcome.curve))
     return outcome.finding

@@ -30,9 +30,10 @@ class Pulse:
     period: float
 
     @property
-    def durations(self) -> tuple[float, ...]:
-        """Durations of ramp, hold and release in s."""
-        return tuple(self.period * n_periods for n_periods in (RAMP, HOLD, RELEASE))
+    def corners(self) -> tuple[float, ...]:
+        """Times in s at the ends of ramp, hold and release, in the digits that are printed."""
+        ends = np.cumsum([RAMP, HOLD, RELEASE]) * self.period
+        return tuple(float(f"{end:.7g}") for end in ends)
 
     def pressure(self, time: Array) -> Array:
         """Pressure in MPa at times in s.
@@ -40,8 +41,7 @@ class Pulse:
         >>> Pulse(peak=2.0, period=1.0).pressure(np.array([95.0, 200.0, 310.0])).tolist()
         [1.0, 2.0, 0.0]
         """
-        ends = np.cumsum([0.0, *self.durations])
-        return np.interp(time, ends, (0.0, self.peak, self.peak, 0.0))
+        return np.interp(time, (0.0, *self.corners), (0.0, self.peak, self.peak, 0.0))
 
 
 def pulse(dome: Dome, peak: float) -> Pulse:
@@ -76,7 +76,7 @@ def dome_deck(dome: Dome, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) 
         "*AMPLITUDE, NAME=PULSE, TIME=TOTAL TIME",
         *_pulse_lines(loading),
     ]
-    for duration in loading.durations:
+    for duration in np.diff((0.0, *loading.corners)):
         lines += _dynamic_step(duration, loading.period)
     return "\n".join(lines) + "\n"
 
@@ -95,7 +95,7 @@ def dome_words(dome: Dome) -> tuple[str, ...]:
 
 def pulse_words(loading: Pulse) -> tuple[str, ...]:
     """What a dome's loading is, for people."""
-    ramp, hold, release = loading.durations
+    ramp, hold, release = np.diff((0.0, *loading.corners))
     return (
         "Pressure on the whole convex side, dome and annulus; implicit dynamics, alpha = -0.3, "
         f"density {DENSITY:g} t/mm^3:",
@@ -174,8 +174,9 @@ def _wrapped(numbers: Iterable[int], n_per_line: int) -> Iterator[str]:
 
 
 def _pulse_lines(loading: Pulse) -> Iterator[str]:
-    for time in np.cumsum([0.0, *loading.durations]):
-        yield f"{_number(time)}, {_number(float(loading.pressure(time)))}"
+    times = (0.0, *loading.corners)
+    for time, pressure in zip(times, loading.pressure(np.array(times)), strict=True):
+        yield f"{_number(time)}, {_number(pressure)}"
 
 
 def _dynamic_step(duration: float, period: float) -> list[str]:

@@ -45,12 +45,16 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """A deck, what it is in words, and what times and displacements of a run come to."""
+    """A deck, what it is in words, and what times and displacements of a run come to.
+
+    A run is whole if it comes to the time `end`.
+    """
 
     name: str
     deck: str
     words: tuple[str, ...]
     n_nodes: int
+    end: float
     outcome: Callable[[Array, Array], Outcome]
 
     def comments(self, version: str, finding: str) -> tuple[str, ...]:
@@ -81,7 +85,8 @@ def dome_model(dome: Dome, fineness: str, peak: float) -> Model:
         curve = dome_curve(dome, mesh, loading, time, moved)
         return Outcome(curve, dome_finding(dome, curve))
 
-    return Model("dome", dome_deck(dome, mesh, loading, words), words, len(mesh.nodes), outcome)
+    deck = dome_deck(dome, mesh, loading, words)
+    return Model("dome", deck, words, len(mesh.nodes), loading.corners[-1], outcome)
 
 
 def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Model:
@@ -95,7 +100,7 @@ def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Mod
         return Outcome(curve, hinge_finding(curve))
 
     deck = hinge_deck(chambers, mesh, largest_moment, words)
-    return Model("hinge", deck, words, len(mesh.nodes), outcome)
+    return Model("hinge", deck, words, len(mesh.nodes), 1.0, outcome)
 
 
 def _size(fineness: str, n_elements: int, kind: str, n_nodes: int) -> str:

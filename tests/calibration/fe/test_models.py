@@ -80,7 +80,7 @@ def test_the_pulse_goes_up_stays_and_goes_down() -> None:
     assert [pressure for _, pressure in points] == [0.0, 0.2, 0.2, 0.0]
     times = [time for time, _ in points]
     assert times == sorted(set(times))
-    assert pulse(DOME, 0.2).pressure(np.array(times)) == pytest.approx([0.0, 0.2, 0.2, 0.0], abs=1e-9)
+    assert pulse(DOME, 0.2).pressure(np.array(times)).tolist() == [0.0, 0.2, 0.2, 0.0]
     assert dome_model(DOME, "coarse", 0.2).deck.count("*DYNAMIC, ALPHA=-0.3") == 3
 
 
@@ -117,7 +117,7 @@ def test_forces_of_the_hinge_are_half_a_couple() -> None:
 def test_the_curve_of_a_dome_that_moves_as_told() -> None:
     mesh = dome_mesh(DOME, *DOME_CELLS["coarse"])
     model = dome_model(DOME, "coarse", 0.2)
-    ends = np.cumsum(pulse(DOME, 0.2).durations)
+    ends = np.array(pulse(DOME, 0.2).corners)
     inverted = np.zeros((len(mesh.nodes), 3))
     inverted[:, 1] = -2 * (mesh.nodes[:, 1] - 0.375)
     curve, finding = model.outcome(ends, np.stack([0.1 * inverted, inverted, inverted]))
