@@ -47,3 +47,7 @@ class OutputError(Exception):
 
 class FitError(Exception):
     """A fit that failed; the message says why. Nothing is written."""
+
+
+class SolverError(Exception):
+    """A solver outside dpg failed, or its results make no sense; nothing is made of them."""

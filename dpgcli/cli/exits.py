@@ -16,6 +16,7 @@ from dpgcli.errors import (
     FitError,
     NothingSelectedError,
     OutputError,
+    SolverError,
     SpecError,
     UsageError,
     WorkplaceError,
@@ -58,7 +59,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             say(str(error))  # each problem starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
-        except (UsageError, FitError, OutputError, WorkplaceError) as error:
+        except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))

@@ -11,6 +11,7 @@ from dpgcli.cli import (
     check,
     compare,
     explain,
+    fe,
     fit,
     init,
     merge,
@@ -54,6 +55,9 @@ for _function in (
 ):
     app.command()(command(_function))
 app.add_typer(fit.app, name="fit")
+fe.app.command()(command(fe.dome))
+fe.app.command()(command(fe.hinge))
+app.add_typer(fe.app, name="fe")
 
 
 def _version(wanted: bool) -> None:

@@ -169,7 +169,7 @@ def _from_file(
 ) -> Value | Issue:
     """A calibrated value, scaled by the rule where the geometry is another."""
     name = f"{found.verb}, {calibration.file}"
-    own = dimensions(calibration.geometry)
+    own = sizes_of(calibration.geometry)
     here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
     changed = [need for need, size in here.items() if need in own and not agree(size, own[need])]
     if unknown := [need for need in here if need not in own]:
@@ -196,7 +196,7 @@ def _dome(sizes: Mapping[str, float]) -> tuple[float, float]:
     return sizes["dome_height_mm"], sizes["dome_thickness_mm"]
 
 
-def dimensions(section: Geometry | None) -> dict[str, float]:
+def sizes_of(section: Geometry | None) -> dict[str, float]:
     """The dimensions that a geometry gives, the chamber's width from the unit cell if need be."""
     given = {} if section is None else {k: v for k, v in vars(section).items() if v is not None}
     if "chamber_width_mm" not in given and "unit_cell_mm" in given:

@@ -12,7 +12,7 @@ from dpgcli.files.spec.derivations import (
     STROKE,
     Derivation,
     Issue,
-    dimensions,
+    sizes_of,
 )
 from dpgcli.mechanics.curve import FEWEST_POINTS, spline
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
@@ -73,7 +73,7 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
     travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
     if not np.isfinite(travel):
         return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
-    height = dimensions(calibration.geometry).get("dome_height_mm")
+    height = sizes_of(calibration.geometry).get("dome_height_mm")
     shape = spline(*_points(curve, travel, stiffness * travel**2))
     domes = Domes(PushOnly(Tabulated(shape)), (), travel, height)
     stroke = replace(

@@ -21,8 +21,8 @@ from dpgcli.files.spec.derivations import (
     Issue,
     Value,
     agree,
-    dimensions,
     number,
+    sizes_of,
     value_of,
 )
 from dpgcli.files.spec.domes import Domes, domes_of
@@ -168,7 +168,7 @@ def _base(finger: FingerSpec) -> Group:
     """The units without an override."""
     taken = {unit for text in finger.overrides or {} for unit in unit_range(text)}
     units = tuple(unit for unit in range(1, finger.units + 1) if unit not in taken)
-    sizes, lattice = dimensions(finger.geometry), _given(finger.lattice)
+    sizes, lattice = sizes_of(finger.geometry), _given(finger.lattice)
     return Group(units, _calibrations(finger), sizes, lattice)
 
 

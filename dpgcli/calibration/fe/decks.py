@@ -1,0 +1,203 @@
+"""Decks for CalculiX as text; the same input gives the same bytes. Units: mm, N, MPa, t, s."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.calibration.fe.bricks import Bricks
+from dpgcli.calibration.fe.dome import Dome, DomeMesh
+from dpgcli.calibration.fe.energy import moduli
+from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
+
+UNITS = "Units: mm, N, MPa, s; mass in t."
+DENSITY = 1.2e-9
+"""Density in t/mm^3, that of silicones. It only sets the clock: see `pulse`."""
+
+RAMP, HOLD, RELEASE = 190.0, 35.0, 85.0
+LARGEST_INCREMENT, SMALLEST_INCREMENT = 3.5, 1e-6
+"""Times of the dynamic run in periods of the dome; it snaps and rings within a few of them."""
+
+MOMENT_STEPS = 5
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Pressure over time: up to the peak (MPa), a while there, down to zero; a period is in s."""
+
+    peak: float
+    period: float
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times in s at the ends of ramp, hold and release, in the digits that are printed."""
+        ends = np.cumsum([RAMP, HOLD, RELEASE]) * self.period
+        return tuple(float(f"{end:.7g}") for end in ends)
+
+    def pressure(self, time: Array) -> Array:
+        """Pressure in MPa at times in s.
+
+        >>> Pulse(peak=2.0, period=1.0).pressure(np.array([95.0, 200.0, 310.0])).tolist()
+        [1.0, 2.0, 0.0]
+        """
+        return np.interp(time, (0.0, *self.corners), (0.0, self.peak, self.peak, 0.0))
+
+
+def pulse(dome: Dome, peak: float) -> Pulse:
+    """A pulse slow beside the dome's vibrations, whose periods go as a^2/t sqrt(rho/E)."""
+    radius = dome.base_diameter / 2
+    speed = np.sqrt(dome.elastic_modulus / DENSITY)
+    return Pulse(peak, float(radius**2 / (dome.thickness * speed)))
+
+
+def dome_deck(dome: Dome, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) -> str:
+    """The deck of a dome that pressure on its convex side inverts: implicit dynamics.
+
+    `words` become its comments.
+    """
+    nodes = np.column_stack([mesh.nodes, np.zeros(len(mesh.nodes))])
+    shear, bulk = moduli(dome.elastic_modulus, dome.poisson)
+    lines = [
+        *(f"** {line}" for line in words),
+        *_mesh_lines(nodes, mesh.elements, "CAX8R"),
+        *_numbers("*ELSET, ELSET=LOADED", mesh.loaded),
+        *_numbers("*NSET, NSET=FIXED", mesh.fixed),
+        *_numbers("*NSET, NSET=AXIS", mesh.axis),
+        "*MATERIAL, NAME=RUBBER",
+        "*HYPERELASTIC, NEO HOOKE",
+        f"{_number(shear / 2)}, {_number(2 / bulk)}",
+        "*DENSITY",
+        _number(DENSITY),
+        "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER",
+        "*BOUNDARY",
+        "FIXED, 1, 2",
+        "AXIS, 1, 1",
+        "*AMPLITUDE, NAME=PULSE, TIME=TOTAL TIME",
+        *_pulse_lines(loading),
+    ]
+    for duration in np.diff((0.0, *loading.corners)):
+        lines += _dynamic_step(duration, loading.period)
+    return "\n".join(lines) + "\n"
+
+
+def dome_words(dome: Dome) -> tuple[str, ...]:
+    """What a dome's model is, for people."""
+    return (
+        f"Axisymmetric dome: a spherical cap of mid-surface height {dome.height:g} mm over a base "
+        f"of diameter {dome.base_diameter:g} mm,",
+        f"{dome.thickness:g} mm thick, mitered to a flat annulus that is fixed at "
+        f"r = {dome.rim_radius:g} mm.",
+        f"Neo-Hookean, E = {dome.elastic_modulus:g} MPa, nu = {dome.poisson:g} (small strain); "
+        "reduced integration.",
+    )
+
+
+def pulse_words(loading: Pulse) -> tuple[str, ...]:
+    """What a dome's loading is, for people."""
+    ramp, hold, release = np.diff((0.0, *loading.corners))
+    return (
+        "Pressure on the whole convex side, dome and annulus; implicit dynamics, alpha = -0.3, "
+        f"density {DENSITY:g} t/mm^3:",
+        f"{loading.peak:g} MPa within {ramp:.4g} s, held for {hold:.4g} s, "
+        f"down to zero within {release:.4g} s.",
+    )
+
+
+def hinge_deck(
+    chambers: Chambers, mesh: Bricks, largest_moment: float, words: Sequence[str]
+) -> str:
+    """The deck of two chambers that a moment turns against each other: statics.
+
+    `words` become its comments.
+    """
+    forces = largest_moment * couple(chambers, mesh)
+    step = _number(1 / MOMENT_STEPS)
+    lines = [
+        *(f"** {line}" for line in words),
+        *_mesh_lines(mesh.nodes, mesh.elements, "C3D20R"),
+        *_numbers("*NSET, NSET=FIXED", _where(layer_end(chambers, mesh, 0.0))),
+        *_numbers("*NSET, NSET=SYMMETRY", _where(on_plane(mesh, 2, 0.0))),
+        "*MATERIAL, NAME=RUBBER",
+        "*ELASTIC",
+        f"{_number(chambers.elastic_modulus)}, {_number(chambers.poisson)}",
+        "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER",
+        "*BOUNDARY",
+        "FIXED, 1, 3",
+        "SYMMETRY, 3, 3",
+        "*STEP, NLGEOM, INC=1000",
+        "*STATIC",
+        f"{step}, 1, 1e-6, {step}",
+        "*CLOAD",
+        *(f"{node + 1}, 1, {_number(forces[node])}" for node in np.flatnonzero(forces)),
+        *_end_of_step(),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
+    """What a hinge's model is, for people."""
+    return (
+        f"{chambers.count} hollow chambers on a limiting layer, half of them (z = 0 is a plane of "
+        f"symmetry): inner length {chambers.length:g} mm,",
+        f"inner width and height {chambers.width:g} mm, walls {chambers.wall_thickness:g} mm, "
+        f"flat lid {chambers.lid_thickness:g} mm in the dome's place,",
+        f"gap {chambers.separation:g} mm, layer {chambers.layer_thickness:g} mm.",
+        f"St Venant-Kirchhoff, E = {chambers.elastic_modulus:g} MPa, nu = {chambers.poisson:g}; "
+        "reduced integration, large displacements.",
+        "The layer's end is clamped at x = 0; forces that keep their direction bend its other end "
+        f"with a moment of up to {largest_moment:g} N mm.",
+    )
+
+
+def _mesh_lines(nodes: Array, elements: Indices, kind: str) -> Iterator[str]:
+    """Nodes and elements, at most fifteen numbers to a line as CalculiX wants it."""
+    yield "*NODE, NSET=ALL"
+    for number, point in enumerate(nodes, start=1):
+        yield ", ".join([str(number), *map(_number, point)])
+    yield f"*ELEMENT, TYPE={kind}, ELSET=BODY"
+    for number, element in enumerate(elements, start=1):
+        yield from _wrapped((number, *(element + 1)), 15)
+
+
+def _numbers(head: str, indices: Indices) -> Iterator[str]:
+    """A set of nodes or elements."""
+    yield head
+    yield from _wrapped(indices + 1, 15)
+
+
+def _wrapped(numbers: Iterable[int], n_per_line: int) -> Iterator[str]:
+    words = [str(number) for number in numbers]
+    for start in range(0, len(words), n_per_line):
+        more = "," if start + n_per_line < len(words) else ""
+        yield ", ".join(words[start : start + n_per_line]) + more
+
+
+def _pulse_lines(loading: Pulse) -> Iterator[str]:
+    times = (0.0, *loading.corners)
+    for time, pressure in zip(times, loading.pressure(np.array(times)), strict=True):
+        yield f"{_number(time)}, {_number(pressure)}"
+
+
+def _dynamic_step(duration: float, period: float) -> list[str]:
+    largest, smallest = LARGEST_INCREMENT * period, SMALLEST_INCREMENT * period
+    return [
+        "*STEP, NLGEOM, INC=100000",
+        "*DYNAMIC, ALPHA=-0.3",
+        ", ".join(map(_number, (largest, duration, smallest, largest))),
+        "*DLOAD, AMPLITUDE=PULSE",
+        "LOADED, P2, 1",
+        *_end_of_step(),
+    ]
+
+
+def _end_of_step() -> list[str]:
+    return ["*NODE PRINT, NSET=ALL", "U", "*END STEP"]
+
+
+def _where(flags: Flags) -> Indices:
+    return np.flatnonzero(flags)
+
+
+def _number(value: float) -> str:
+    return f"{value:.12g}"

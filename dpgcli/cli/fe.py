@@ -1,0 +1,178 @@
+"""`dpg fe`: decks for the finite-element solver CalculiX, and the curves that it finds."""
+
+import sys
+import time
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dpgcli.cli.options import Quiet, Settings, SpecPath
+from dpgcli.cli.streams import say
+
+if TYPE_CHECKING:
+    from dpgcli.calibration.fe.models import Model
+    from dpgcli.studies.finite_elements import Limits
+
+app = typer.Typer(
+    help="Finite elements of a dome or a hinge: decks for CalculiX, and the curves it finds.",
+    no_args_is_help=True,
+)
+
+DOME_KEYS = ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa")
+HINGE_KEYS = (
+    "chamber_length_mm",
+    "chamber_width_mm",
+    "dome_thickness_mm",
+    "unit_separation_mm",
+    "limiting_layer_thickness_mm",
+    "elastic_modulus_MPa",
+)
+SMALLEST, LARGEST = 1e-12, 1e12
+
+
+class Mesh(StrEnum):
+    """How fine a mesh is."""
+
+    COARSE = "coarse"
+    MEDIUM = "medium"
+    FINE = "fine"
+
+
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder of deck and results")]
+Poisson = Annotated[float, typer.Option("--poisson", help="Poisson's ratio, below 0.5")]
+MeshOption = Annotated[Mesh, typer.Option("--mesh", help="How fine the mesh is")]
+RunOption = Annotated[bool, typer.Option("--run", help="Run ccx, write the curve")]
+TimeLimit = Annotated[
+    float, typer.Option("--time-limit", metavar="SECONDS", help="End ccx after this time")
+]
+Threads = Annotated[int, typer.Option("--threads", min=1, help="Threads of ccx")]
+
+
+def dome(
+    spec: SpecPath,
+    out: Out,
+    settings: Settings = None,
+    base_diameter: Annotated[
+        float, typer.Option("--base-diameter", help="Of the dome's mid-surface, mm")
+    ] = 16.0,
+    rim_radius: Annotated[
+        float, typer.Option("--rim-radius", help="Where the annulus is fixed, mm")
+    ] = 10.0,
+    poisson: Poisson = 0.48,
+    pressure: Annotated[
+        float | None,
+        typer.Option("--pressure", help="Peak, MPa  [default: 1.25 times the expected snap]"),
+    ] = None,
+    mesh: MeshOption = Mesh.MEDIUM,
+    run: RunOption = False,
+    time_limit: TimeLimit = 3600.0,
+    threads: Threads = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Invert a dome by pressure: energy against pole travel."""
+    from dpgcli.calibration.fe import models
+    from dpgcli.calibration.fe.dome import Dome, impossible
+    from dpgcli.errors import UsageError
+
+    _check_positive(
+        {"--base-diameter": base_diameter, "--rim-radius": rim_radius, "--pressure": pressure}
+    )
+    _check_poisson(poisson)
+    height, thickness, modulus = _dimensions(spec, settings, DOME_KEYS, quiet)
+    shape = Dome(height, thickness, modulus, poisson, base_diameter, rim_radius)
+    if reason := impossible(shape):
+        raise UsageError(f"no mesh of this dome: {reason} (--base-diameter, --rim-radius)")
+    peak = models.expected_peak(shape) if pressure is None else pressure
+    model = models.dome_model(shape, mesh.value, peak)
+    _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
+def hinge(
+    spec: SpecPath,
+    out: Out,
+    settings: Settings = None,
+    poisson: Poisson = 0.48,
+    moment: Annotated[float, typer.Option("--moment", help="Largest moment, N mm")] = 5.0,
+    mesh: MeshOption = Mesh.MEDIUM,
+    run: RunOption = False,
+    time_limit: TimeLimit = 3600.0,
+    threads: Threads = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Open the hinge between two chambers by a moment: moment against rotation."""
+    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.models import hinge_model
+
+    _check_positive({"--moment": moment})
+    _check_poisson(poisson)
+    length, width, lid, gap, layer, modulus = _dimensions(spec, settings, HINGE_KEYS, quiet)
+    chambers = Chambers(length, width, lid, gap, layer, modulus, poisson)
+    model = hinge_model(chambers, mesh.value, moment)
+    _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
+def _check_positive(lengths: dict[str, float | None]) -> None:
+    """Options that are neither zero nor negative, nor no number, nor beyond reason."""
+    from dpgcli.errors import UsageError
+
+    for option, value in lengths.items():
+        if value is not None and not SMALLEST <= value <= LARGEST:
+            raise UsageError(
+                f"{option} {value:g}: expected a number > 0, {SMALLEST:g} to {LARGEST:g}"
+            )
+
+
+def _check_poisson(poisson: float) -> None:
+    from dpgcli.errors import UsageError
+
+    if not 0.0 <= poisson < 0.5:
+        hint = "rubber is near 0.5, but 0.5 itself has no finite bulk modulus"
+        raise UsageError(f"--poisson {poisson:g}: expected 0 to below 0.5 ({hint})")
+
+
+def _dimensions(
+    path: Path, settings: list[str] | None, keys: Sequence[str], quiet: bool
+) -> list[float]:
+    """The values of some keys of the spec's geometry, and a word on those of single units."""
+    from dpgcli.files.spec import read_spec
+    from dpgcli.files.spec.dimensions import dimensions, overridden
+
+    spec = read_spec(path, settings or ())
+    values = dimensions(spec, str(path), keys, "dpg fe builds its mesh from it")
+    if not quiet and (units := overridden(spec, keys)):
+        say(f"geometry of the whole finger; units {', '.join(units)} differ: --set their values")
+    return list(values.values())
+
+
+def _limits(run: bool, time_limit: float, threads: int) -> "Limits | None":
+    """The limits of a run, none if none is wanted."""
+    from dpgcli.studies.finite_elements import Limits
+
+    _check_positive({"--time-limit": time_limit})
+    return Limits(time_limit, threads) if run else None
+
+
+def _carry_out(
+    model: "Model", spec: Path, folder: Path, limits: "Limits | None", quiet: bool
+) -> None:
+    """Write the deck, run it if wanted, and name the files on standard output."""
+    from dpgcli.files.output import check_outputs, sole_use
+    from dpgcli.studies import finite_elements as studies
+
+    deck, curve = studies.deck_path(model, folder), studies.curve_path(model, folder)
+    with sole_use(folder):
+        check_outputs((spec,), deck, curve, deck.with_suffix(".log"), deck.with_suffix(".dat"))
+        for path in studies.write_deck(model, folder):
+            say(f"{path}: removed, it came from another deck")
+        print(deck, flush=True)
+        if limits is None:
+            return
+        start = time.monotonic()
+        finding = studies.run(model, folder, limits)
+        print(curve)
+    if not quiet:
+        sys.stdout.flush()
+        say(f"{finding} ({time.monotonic() - start:.3g} s)")

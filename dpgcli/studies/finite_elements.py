@@ -1,0 +1,162 @@
+"""Runs of CalculiX in a folder: the deck, the log, and what comes out, whole or not at all."""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from dpgcli.calibration.fe.curves import csv_text
+from dpgcli.calibration.fe.models import Model
+from dpgcli.calibration.fe.results import displacements, reported_error, version
+from dpgcli.errors import OutputError, SolverError, UsageError
+from dpgcli.files.output import whole_file
+
+SOLVER = "ccx"
+RESULTS = (".dat", ".csv", ".log")
+THREADS = (
+    "OMP_NUM_THREADS",
+    "CCX_NPROC_STIFFNESS",
+    "CCX_NPROC_EQUATION_SOLVER",
+    "CCX_NPROC_RESULTS",
+    "NUMBER_OF_CPUS",
+)
+"""What CalculiX reads the number of its threads from (manual, "How to run CalculiX")."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A limit in seconds, and a number of threads."""
+
+    time_limit: float
+    n_threads: int = 1
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a run printed: displacements, and its log."""
+
+    displacements: str
+    log: str
+
+
+def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
+    """Write a model's deck, and remove results of another one under its name; tells which."""
+    deck = deck_path(model, folder)
+    outdated: tuple[Path, ...] = ()
+    if not deck.exists() or deck.read_bytes() != model.deck.encode():
+        beside = (deck.with_suffix(suffix) for suffix in RESULTS)
+        outdated = tuple(path for path in beside if path.exists())
+    for path in outdated:
+        path.unlink()
+    _write(deck, model.deck)
+    return outdated
+
+
+def run(model: Model, folder: Path, limits: Limits) -> str:
+    """Run CalculiX on the deck in a folder and write the curve; gives what the curve says.
+
+    Raises UsageError where there is no CalculiX, SolverError where it fails or makes no sense.
+    """
+    deck = deck_path(model, folder)
+    if shutil.which(SOLVER) is None:
+        raise UsageError(
+            f"{SOLVER} (CalculiX) is not installed: apt install calculix-ccx; the deck is {deck}"
+        )
+    curve_path(model, folder).unlink(missing_ok=True)
+    output = solve(deck, limits)
+    times, moved = displacements(output.displacements, model.n_nodes)
+    if times[-1] < (1 - 1e-6) * model.end:
+        raise SolverError(f"what ccx wrote ends at time {times[-1]:g} of {model.end:g}")
+    outcome = model.outcome(times, moved)
+    comments = model.comments(version(output.log), outcome.finding)
+    _write(curve_path(model, folder), csv_text(comments, outcome.curve))
+    return outcome.finding
+
+
+def deck_path(model: Model, folder: Path) -> Path:
+    """Where a model's deck stands."""
+    return folder / f"{model.name}.inp"
+
+
+def curve_path(model: Model, folder: Path) -> Path:
+    """Where the curve of a run stands."""
+    return folder / f"{model.name}.csv"
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def solve(deck: Path, limits: Limits) -> Output:
+    """Run CalculiX on a deck; its log and its .dat file come to stand beside the deck.
+
+    Raises SolverError where it fails or takes too long. It works in a folder of its own, which
+    nothing outlives; whatever interrupts it ends it with all its processes.
+    """
+    log, results = deck.with_suffix(".log"), deck.with_suffix(".dat")
+    with _scratch(deck) as scratch:
+        results.unlink(missing_ok=True)
+        with log.open("wb") as stream:
+            code = _ended(deck.stem, scratch, stream, limits, log)
+        said = log.read_text(encoding="utf-8", errors="replace")
+        printed = scratch / results.name
+        if code != 0 or not printed.exists():
+            raise SolverError(_failure(code, said, log))
+        text = printed.read_text(encoding="utf-8", errors="replace")
+        printed.replace(results)
+    return Output(text, said)
+
+
+def _ended(job: str, folder: Path, log: IO[bytes], limits: Limits, log_name: Path) -> int:
+    """The exit code of CalculiX, which does not outlive this function."""
+    environment = {**os.environ, **dict.fromkeys(THREADS, str(limits.n_threads))}
+    try:
+        process = subprocess.Popen(
+            [SOLVER, job],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # a group of its own, to be ended as a whole
+        )
+    except OSError as error:
+        raise SolverError(f"cannot start {SOLVER}: {error.strerror}") from error
+    try:
+        return process.wait(limits.time_limit)
+    except subprocess.TimeoutExpired:
+        limit = f"{limits.time_limit:g} s (--time-limit)"
+        raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
+    finally:
+        if process.returncode is None:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def _failure(code: int, said: str, log: Path) -> str:
+    """Why a run failed, as far as its log says."""
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    reason = reported_error(said) or "it names no error"
+    return f"{SOLVER} failed ({how}): {reason}; its log is {log}"
+
+
+@contextmanager
+def _scratch(deck: Path) -> Iterator[Path]:
+    """A folder beside the deck with a copy of it, gone at the end."""
+    try:
+        scratch = Path(tempfile.mkdtemp(prefix=f".{deck.stem}-", dir=deck.parent))
+        try:
+            shutil.copy(deck, scratch)
+            yield scratch
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {deck.parent}: {error.strerror or error}") from error
