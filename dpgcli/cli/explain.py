@@ -20,6 +20,7 @@ from dpgcli.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from dpgcli.mechanics.scene import Source
     from dpgcli.states.plan import Plan
 
 
@@ -90,6 +91,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
                 "value": spelled(s.value),
                 "origin": s.origin,
                 "rule": s.rule,
+                "standard_error": s.standard_error,
             }
             for s in plan.scene.sources
         ],
@@ -102,7 +104,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         "",
         "Values",
         *(
-            f"  {s.key:<30} {s.value:<10.6g} units {s.units:<6} {s.origin:<13} {s.rule}"
+            f"  {s.key:<30} {s.value:<10.6g} units {s.units:<6} {s.origin:<13} {s.rule}{_error(s)}"
             for s in plan.scene.sources
         ),
         "",
@@ -127,6 +129,10 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  about {plan.expected_seconds:.1f} s on one core and "
         f"{plan.expected_bytes / 2**20:.0f} MiB (rough: a factor of two either way)",
     ]
+
+
+def _error(source: "Source") -> str:
+    return "" if source.standard_error is None else f" (± {source.standard_error:.2g})"
 
 
 def _what(plan: "Plan") -> str:

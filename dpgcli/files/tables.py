@@ -132,7 +132,7 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
         "dpg.formulation": request.formulation,
         "dpg.method": plan.method,
         "dpg.tolerance": repr(request.tolerance),
-        "dpg.law": "published: the spring pushes and pulls",
+        "dpg.law": plan.scene.finger.law.description,
         "dpg.sources": json.dumps(
             [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),

@@ -14,6 +14,7 @@ class Origin(StrEnum):
     GIVEN = "given"
     DERIVED = "derived"
     CALIBRATED = "calibrated"
+    INTERPOLATED = "interpolated"
     SCALED = "scaled"
     EXTRAPOLATED = "extrapolated"
 
@@ -37,8 +38,8 @@ class Source:
 class Uncertainty:
     """What fitted values may be off by.
 
-    `covariance` (step, step) of steps along `directions`: rates of change of the finger's arrays by
-    name, each (1 or unit, 1).
+    `covariance` (step, step) of steps along `directions`, which change the finger's arrays by the
+    values given by name, each (1 or unit, 1).
     """
 
     directions: tuple[Mapping[str, Array], ...]

@@ -22,7 +22,13 @@ from dpgcli.states.rows import Columns
 
 Numbers = NDArray[Any]
 
-GRAVEST_FIRST = (Origin.EXTRAPOLATED, Origin.SCALED, Origin.CALIBRATED, Origin.GIVEN)
+GRAVEST_FIRST = (
+    Origin.EXTRAPOLATED,
+    Origin.SCALED,
+    Origin.INTERPOLATED,
+    Origin.CALIBRATED,
+    Origin.GIVEN,
+)
 
 
 class DesignStatus(StrEnum):

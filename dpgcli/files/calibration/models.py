@@ -3,7 +3,8 @@
 Each description says what is expected: it is what a wrong value is answered with.
 """
 
-from typing import Annotated, Generic, Literal, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Generic, Literal, TypeVar
 
 from pydantic import Field
 
@@ -15,6 +16,9 @@ from dpgcli.files.sections import (
     Positive,
     Section,
 )
+
+if TYPE_CHECKING:
+    from dpgcli.calibration.grid import Law
 
 T = TypeVar("T")
 Numbers = Annotated[list[float], Field(min_length=1)]
@@ -109,6 +113,22 @@ class Grid(Section):
     leave_one_out: dict[str, NotNegative] | None = Field(
         default=None, description="the largest relative error by quantity"
     )
+
+    @cached_property
+    def law(self) -> "Law":
+        """The way between the points; made once for all designs that share the grid."""
+        import numpy as np
+
+        from dpgcli.calibration.choices import Method
+        from dpgcli.calibration.grid import Law, Points
+
+        geometry = np.array([self.points[key] for key in self.over]).T
+        quantities = {k: np.array(v) for k, v in self.points.items() if k not in self.over}
+        return Law(Method(self.method), Points(tuple(self.over), geometry, quantities))
+
+    def has(self, key: str) -> bool:
+        """Whether a quantity is among the points."""
+        return key in self.points and key not in self.over
 
 
 class Quality(Section):

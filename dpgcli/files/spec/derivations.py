@@ -11,7 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dpgcli.files.calibration.models import Calibration, Fitted
+import numpy as np
+
+from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.places import KeyPath
 from dpgcli.files.sections import LARGEST, SMALLEST, Geometry
 from dpgcli.mechanics import geometry
@@ -142,9 +144,11 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
             return _derived_value(derivation, group)
         if not isinstance(calibration, Calibration) or not derivation.is_fitted:
             continue
-        if found := calibration.fitted(derivation.key):
-            value = _from_file(derivation, group, calibration, found)
-            return value if isinstance(value, Issue) else value._replace(file=place)
+        value = _from_file(derivation, group, calibration)
+        if isinstance(value, Value):
+            value = value._replace(file=place)
+        if value is not None:
+            return value
     if derivation.origin is not None:
         return _uncalibrated(derivation, group)
     return _derived_value(derivation, group)
@@ -165,31 +169,70 @@ def _derived_value(derivation: Derivation, group: Group) -> Value | Issue:
 
 
 def _from_file(
-    derivation: Derivation, group: Group, calibration: Calibration, found: Fitted[float]
+    derivation: Derivation, group: Group, calibration: Calibration
+) -> Value | Issue | None:
+    """A calibrated value, brought to the geometry; None if the file has none."""
+    if found := calibration.fitted(derivation.key):
+        base = Value(found.value, Origin.CALIBRATED, found.verb, found.standard_error)
+        return _brought(derivation, group, calibration, base, ())
+    grid = calibration.grid
+    if grid is None or not grid.has(derivation.key):
+        return None
+    if missing := [key for key in grid.over if key not in group.geometry]:
+        why = f"{calibration.file} is over {listed(grid.over)}"
+        return _missing(derivation, group, missing, why)
+    here = np.array([[group.geometry[key] for key in grid.over]])
+    estimate = grid.law.at(derivation.key, here)
+    value, error = float(estimate.value[0]), float(estimate.relative_error[0])
+    is_scaling = grid.method == "scaling"
+    origin = Origin.SCALED if is_scaling else Origin.INTERPOLATED
+    if not estimate.is_inside[0]:
+        origin = Origin.EXTRAPOLATED
+    how = "scaling law over" if is_scaling else "interpolated over"
+    base = Value(
+        value,
+        origin,
+        f"{how} {listed(grid.over)}",
+        value * error if math.isfinite(error) else None,
+    )
+    return _brought(derivation, group, calibration, base, tuple(grid.over))
+
+
+def _brought(
+    derivation: Derivation,
+    group: Group,
+    calibration: Calibration,
+    base: Value,
+    over: tuple[str, ...],
 ) -> Value | Issue:
-    """A calibrated value, scaled by the rule where the geometry is another."""
-    name = f"{found.verb}, {calibration.file}"
-    own = sizes_of(calibration.geometry)
+    """A file's value, scaled by the rule where dimensions that it is not over are others."""
+    name = f"{base.rule}, {calibration.file}"
+    own = sizes_of(calibration.geometry) | {k: group.geometry[k] for k in over}
     here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
-    changed = [need for need, size in here.items() if need in own and not agree(size, own[need])]
     if unknown := [need for need in here if need not in own]:
         rule = f"{name}, which does not state its {listed(unknown)}"
-        return Value(found.value, Origin.EXTRAPOLATED, rule, found.standard_error)
+        return base._replace(origin=Origin.EXTRAPOLATED, rule=rule)
+    changed = [need for need, size in here.items() if not agree(size, own[need])]
     if not changed:
-        return Value(found.value, Origin.CALIBRATED, name, found.standard_error)
+        return base._replace(rule=name)
     if missing := [need for need in derivation.needs if need not in own]:
         rule = f"{name}, which does not state its {listed(missing)} to scale by"
-        return Value(found.value, Origin.EXTRAPOLATED, rule, found.standard_error)
+        return base._replace(origin=Origin.EXTRAPOLATED, rule=rule)
     there = [own[need] for need in derivation.needs]
     factor = derivation.value(*(here.get(need, own[need]) for need in derivation.needs))
     factor /= derivation.value(*there)
     if not SMALLEST <= factor <= LARGEST:
-        return _impossible(derivation, group, found.value * factor)
-    origin = Origin.SCALED
+        return _impossible(derivation, group, base.value * factor)
+    origin = _graver(base.origin, Origin.SCALED)
     if derivation.origin is geometry.dome_origin:
-        origin = max(origin, geometry.dome_origin(*_dome(own | here)), key=list(Origin).index)
-    error = None if found.standard_error is None else found.standard_error * factor
-    return Value(found.value * factor, origin, f"{name}, {derivation.rule}", error)
+        origin = _graver(origin, geometry.dome_origin(*_dome(own | here)))
+    error = None if base.standard_error is None else base.standard_error * factor
+    return Value(base.value * factor, origin, f"{name}, {derivation.rule}", error)
+
+
+def _graver(first: Origin, second: Origin) -> Origin:
+    """The one to trust less."""
+    return max(first, second, key=list(Origin).index)
 
 
 def _dome(sizes: Mapping[str, float]) -> tuple[float, float]:
@@ -255,12 +298,14 @@ def _uncalibrated(derivation: Derivation, group: Group) -> Issue:
     )
 
 
-def _missing(derivation: Derivation, group: Group, missing: list[str]) -> Issue:
+def _missing(
+    derivation: Derivation, group: Group, missing: list[str], why: str | None = None
+) -> Issue:
     return Issue(
         group.path("lattice", derivation.key),
-        f"a value, or geometry with {listed(derivation.needs)}",
+        f"a value, or geometry with {listed(missing if why else derivation.needs)}",
         f"no {listed(missing)}",
-        derivation.rule,
+        why or derivation.rule,
     )
 
 

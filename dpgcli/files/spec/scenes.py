@@ -157,11 +157,16 @@ def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
 
 
 def _shares(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Iterator[Share]:
-    """What comes from calibration files, unit by unit."""
+    """Standard errors of what comes from calibration files, unit by unit."""
     for key, pairs in values.items():
-        for place in {value.file for _, value in pairs if value.file is not None}:
-            of_file = [(g, v if v.file == place else v._replace(value=0.0)) for g, v in pairs]
-            yield Share(place, key, _column(spec.units, of_file))
+        for place in {v.file for _, v in pairs if v.file is not None and v.standard_error}:
+            errors = [
+                (group, value._replace(value=value.standard_error or 0.0))
+                if value.file == place
+                else (group, value._replace(value=0.0))
+                for group, value in pairs
+            ]
+            yield Share(place, key, _column(spec.units, errors))
 
 
 def _base(finger: FingerSpec) -> Group:

@@ -12,11 +12,11 @@ from dpgcli.mechanics.scene import Uncertainty
 
 
 class Share(NamedTuple):
-    """Values by unit, (1 or unit, 1), that come from a file, by its place; 0 in other units."""
+    """Standard errors by unit, (1 or unit, 1), of a file's values; 0 in other units."""
 
     file: int
     key: str
-    values: Array
+    errors: Array
 
 
 def uncertainty_of(
@@ -24,36 +24,24 @@ def uncertainty_of(
 ) -> Uncertainty | None:
     """The covariance of all fitted values behind a finger; None where there are none.
 
-    Calibrated values are scaled to other geometries by factors, and so are their errors.
+    An error of a fitted value is the same error in all units that the value is brought to. Values
+    of one file are correlated as it says, those of a grid and of other files not (assumed).
     """
-    by_place = {(share.file, share.key): share.values for share in shares}
-    directions: list[dict[str, Array]] = []
-    blocks: list[Array] = []
-    for place, calibration in enumerate(calibrations):
-        if not isinstance(calibration, Calibration):
-            continue
-        keys = list(calibration.uncertain)
-        used = [k for k, key in enumerate(keys) if (place, key) in by_place]
-        for key in (keys[k] for k in used):
-            fitted = calibration.fitted(key)
-            assert fitted is not None, "uncertain values are among the given ones"
-            directions.append({KEYS[key]: by_place[place, key] / fitted.value})
-        blocks.append(_covariance(calibration)[np.ix_(used, used)])
-    return Uncertainty(tuple(directions), _diagonal(blocks)) if directions else None
+    every = list(shares)
+    if not every:
+        return None
+    correlation = np.eye(len(every))
+    for row, first in enumerate(every):
+        for column, second in enumerate(every):
+            if first.file == second.file:
+                calibration = calibrations[first.file]
+                assert isinstance(calibration, Calibration), "shares come from files"
+                correlation[row, column] = _correlation(calibration, first.key, second.key)
+    return Uncertainty(tuple({KEYS[s.key]: s.errors} for s in every), correlation)
 
 
-def _covariance(calibration: Calibration) -> Array:
-    errors = np.array(list(calibration.uncertain.values()))
-    correlation = np.array(calibration.correlation or np.eye(len(errors)))
-    return np.asarray(errors[:, None] * correlation.reshape(len(errors), -1) * errors)
-
-
-def _diagonal(blocks: Sequence[Array]) -> Array:
-    """One matrix with the blocks along its diagonal."""
-    size = sum(map(len, blocks))
-    whole, start = np.zeros((size, size)), 0
-    for block in blocks:
-        stop = start + len(block)
-        whole[start:stop, start:stop] = block
-        start = stop
-    return whole
+def _correlation(calibration: Calibration, first: str, second: str) -> float:
+    keys = list(calibration.uncertain)
+    if first == second or calibration.correlation is None or not {first, second} <= set(keys):
+        return float(first == second)
+    return calibration.correlation[keys.index(first)][keys.index(second)]
