@@ -1,5 +1,6 @@
 """A dimensionless energy over a dimensionless travel, twice continuously differentiable."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -40,7 +41,7 @@ class Curve:
         """Value and derivatives at travels of any shape, complex ones too.
 
         >>> parabola = spline((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 4.0, 9.0))
-        >>> [float(part) for part in parabola(np.array(5.0))]  # beyond its end
+        >>> [round(float(part), 9) for part in parabola(np.array(5.0))]  # beyond its end
         [25.0, 10.0, 2.0]
         """
         piece = np.searchsorted(self.knots, np.real(travel), side="right")
@@ -70,6 +71,44 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
     coefficients = np.concatenate((before, cubic.c, after), axis=1)
     return Curve(np.asarray(travel, float), coefficients, _rests(cubic))
+
+
+def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tuple[Array, Array]:
+    """Points with some more in gaps, where the pieces beside a gap go on with their curvature.
+
+    Each piece goes on as far as it is long, at most through a third of the gap, by the parabola of
+    its nearest third (assumed: nothing is known there). Without these points a spline bends over
+    the whole gap, and takes the pieces' ends along.
+
+    >>> travel = np.array([0.0, 1.0, 2.0, 3.0, 9.0, 10.0, 11.0, 12.0])
+    >>> more, value = bridged(travel, travel**2, [(3.0, 9.0)])
+    >>> more[4:7].round(2).tolist(), np.abs(value - more**2).max() < 1e-12
+    ([3.67, 4.33, 5.0], np.True_)
+    """
+    edges = [travel[0], *(end for gap in gaps for end in gap), travel[-1]]
+    travels, values = [travel], [value]
+    for piece in range(0, len(edges), 2):
+        start, stop = edges[piece], edges[piece + 1]
+        own = (travel >= start) & (travel <= stop)
+        for end, gap in ((start, piece // 2 - 1), (stop, piece // 2)):
+            if not 0 <= gap < len(gaps) or own.sum() < FEWEST_POINTS:
+                continue
+            reach = min(stop - start, (gaps[gap][1] - gaps[gap][0]) / 3.0)
+            beyond = (reach if end == stop else -reach) * np.array([1.0, 2.0, 3.0]) / 3.0
+            travels.append(end + beyond)
+            values.append(_continued(travel[own] - end, value[own], beyond))
+    order = np.argsort(np.concatenate(travels))
+    return np.concatenate(travels)[order], np.concatenate(values)[order]
+
+
+def _continued(travel: Array, value: Array, beyond: Array) -> Array:
+    """Values beyond the point at travel 0 of a piece, by the parabola of its nearest third."""
+    nearest = np.argsort(np.abs(travel))[: max(FEWEST_POINTS, len(travel) // 3)]
+    rise = value[nearest] - value[nearest[0]]
+    slope, bend = np.linalg.lstsq(
+        np.stack((travel[nearest], travel[nearest] ** 2), axis=1), rise, rcond=None
+    )[0]
+    return np.asarray(value[nearest[0]] + slope * beyond + bend * beyond**2)
 
 
 def _rests(cubic: "CubicSpline") -> tuple[float, float]:

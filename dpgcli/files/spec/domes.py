@@ -14,7 +14,7 @@ from dpgcli.files.spec.derivations import (
     Issue,
     sizes_of,
 )
-from dpgcli.mechanics.curve import FEWEST_POINTS, spline
+from dpgcli.mechanics.curve import FEWEST_POINTS, bridged, spline
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
 
 WHERE = ("finger", "law")
@@ -87,8 +87,9 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
 
 
 def _points(curve: Curve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
-    """Travels and energies over a travel and an energy, from rest on."""
-    travels, energies = curve.travel_mm, curve.energy_mJ
+    """Travels and energies over a travel and an energy, from rest on, gaps bridged."""
+    travels, energies = np.array(curve.travel_mm), np.array(curve.energy_mJ)
     if travels[0] > 0.0:
-        travels, energies = [0.0, *travels], [0.0, *energies]
-    return tuple(u / travel for u in travels), tuple(e / energy for e in energies)
+        travels, energies = (np.concatenate(([0.0], values)) for values in (travels, energies))
+    travels, energies = bridged(travels, energies, curve.unsampled_mm)
+    return tuple((travels / travel).tolist()), tuple((energies / energy).tolist())
