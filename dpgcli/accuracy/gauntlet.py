@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 
+from dpgcli.accuracy.extended import check_law
 from dpgcli.accuracy.families import (
     FAMILIES,
     PATTERNS,
@@ -56,7 +57,12 @@ def study_finger() -> Finger:
 
 
 def all_cases(finger: Finger | None = None, only: Sequence[str] = ()) -> list[Case]:
-    """The cases of a finger, if there is one, then the built-in ones; `only` names families."""
+    """The cases of a finger, if there is one, then the built-in ones; `only` names families.
+
+    Raises UsageError for a finger of another law than the published one.
+    """
+    if finger is not None:
+        check_law(finger)
     own = [] if finger is None else cases_of(finger, only)
     return [*own, *built_in_cases(only)]
 

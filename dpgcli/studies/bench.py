@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.accuracy.extended import ExtendedStates, extended_states
+from dpgcli.accuracy.extended import ExtendedStates, check_law, extended_states
 from dpgcli.accuracy.families import repeated
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
@@ -90,7 +90,8 @@ class Bench:
         return self.scene.finger
 
     def check(self) -> None:
-        """Raise UsageError for a target that makes no sense, and what cannot be put back."""
+        """Raise UsageError for a law that has no reference, and what makes no sense."""
+        check_law(self.finger)
         check_exactness(DEFAULT_TOLERANCE, self.target_error)
         for name in self.keep:
             check_kept(self.scene, name, self.target_error)

@@ -141,6 +141,7 @@ def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: s
         (("--compare", "three_unit.yaml"), "not JSON"),
         (("--compare", "none.json"), "no record of dpg bench --json"),
         (("--repeats", "0"), "--repeats"),
+        (("-s", "finger.law=push_only"), "the published law only, not the push-only law"),
     ],
 )
 def test_options_that_make_no_sense(call: Any, options: tuple[str, ...], said: str) -> None:

@@ -146,6 +146,11 @@ def test_what_is_missed_by_a_guess_is_shown_and_no_failure(
         (("--only", "patterns"), ExitCode.NOTHING_SELECTED, "none without a spec"),
         (("-s", "finger.units=2"), ExitCode.USAGE, "--set changes a spec: give one"),
         (("missing.yaml",), ExitCode.USAGE, "missing.yaml"),
+        (
+            ("three_unit.yaml", "-s", "finger.law=push_only"),
+            ExitCode.USAGE,
+            "the published law only, not the push-only law",
+        ),
         (("-o", "cases.csv", *QUICK), ExitCode.USAGE, "writes Parquet"),
         (("-o", "no/cases.parquet", *QUICK), ExitCode.USAGE, "cannot write"),
         (("three_unit.yaml", "-o", "three_unit.yaml", *QUICK), ExitCode.USAGE, "is the spec"),
