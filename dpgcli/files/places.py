@@ -27,11 +27,16 @@ def located(place: Place, key: str, expected: str, found: str, hint: str = "") -
 
 
 def in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
-    """Problems by line, each place and key once, those without a line last."""
-    first: dict[tuple[int | None, int | None, str, str], Problem] = {}
-    for problem in problems:
-        first.setdefault((problem.line, problem.column, problem.key, problem.expected), problem)
-    return tuple(sorted(first.values(), key=lambda p: (p.line is None, p.line or 0, p.column or 0)))
+    """Problems by file and line, each place and key once, those without a line last."""
+    first: dict[tuple[str, int | None, int | None, str, str], Problem] = {}
+    for p in problems:
+        first.setdefault((p.file, p.line, p.column, p.key, p.expected), p)
+    files = list(dict.fromkeys(p.file for p in problems))
+
+    def order(p: Problem) -> tuple[bool, int, int, int]:
+        return p.line is None, files.index(p.file), p.line or 0, p.column or 0
+
+    return tuple(sorted(first.values(), key=order))
 
 
 def dotted(path: KeyPath) -> str:

@@ -43,7 +43,8 @@ _LEAKS = (ValueError, LookupError, AttributeError, TypeError, AssertionError, Ov
 class Document:
     """The data of one YAML file, keys as text, with the place of each key and problems so far.
 
-    `files` are others whose content is in the data.
+    `files` are others whose content is in the data; `prefix` is where a section stands in its
+    file.
     """
 
     file: str
@@ -51,6 +52,7 @@ class Document:
     places: dict[KeyPath, Place]
     problems: tuple[Problem, ...] = ()
     files: tuple[Path, ...] = ()
+    prefix: KeyPath = ()
 
     def place(self, path: KeyPath) -> Place:
         """Where the key stands, or the nearest section around it."""
@@ -59,9 +61,16 @@ class Document:
                 return place
         return Place(self.file)
 
+    def section(self, path: KeyPath, data: dict[str, Any]) -> "Document":
+        """A section as a document of its own, whose keys still have their full names."""
+        length = len(path)
+        inner = {p[length:]: place for p, place in self.places.items() if p[:length] == path}
+        places = {(): self.place(path), **inner}
+        return Document(self.file, data, places, prefix=(*self.prefix, *path))
+
     def problem(self, path: KeyPath, expected: str, found: str, hint: str = "") -> Problem:
         """A problem with the value at a key path, which may be missing."""
-        return located(self.place(path), dotted(path), expected, found, hint)
+        return located(self.place(path), dotted((*self.prefix, *path)), expected, found, hint)
 
 
 def read_document(path: str | os.PathLike[str]) -> Document:

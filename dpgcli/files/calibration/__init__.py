@@ -43,6 +43,7 @@ __all__ = [
     "ScalingLaw",
     "TravelToOpening",
     "Values",
+    "calibration_in",
     "geometry_of",
     "made_by",
     "read_calibration",
@@ -51,6 +52,7 @@ __all__ = [
 ]
 
 VERSION = 1
+SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
 
 
@@ -81,7 +83,11 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
 def read_calibration(path: str | Path) -> Calibration:
     """Read and check a calibration. Raises SpecError with every problem and its place."""
-    document = read_document(path)
+    return calibration_in(read_document(path))
+
+
+def calibration_in(document: Document) -> Calibration:
+    """The calibration in a document. Raises SpecError with every problem and its place."""
     try:
         found = Calibration.model_validate(document.data)
     except ValidationError as error:
@@ -197,16 +203,22 @@ def _curve_issues(curve: Curve) -> Iterator[Issue]:
     path: KeyPath = ("curve", "travel_mm")
     if len(curve.travel_mm) != len(curve.energy_mJ):
         yield path, f"{len(curve.energy_mJ)} numbers, as energies", str(len(curve.travel_mm))
-    for index in np.flatnonzero(np.diff(curve.travel_mm) <= 0.0)[:1].tolist():
-        expected = f"more than {curve.travel_mm[index]:g}"
-        yield (*path, index + 1), expected, f"{curve.travel_mm[index + 1]:g}"
+    travels = np.array(curve.travel_mm)
+    least = SMALLEST_STEP * np.ptp(travels)
+    for index in np.flatnonzero(np.diff(travels) <= least)[:1].tolist():
+        expected = f"more than {travels[index]:g}"
+        yield (*path, index + 1), expected, f"{travels[index + 1]:g}"
+    last = min(0.0, travels[0])
     for index, (start, end) in enumerate(curve.unsampled_mm):
+        place: KeyPath = ("curve", "unsampled_mm", index)
+        found = f"{start:g}, {end:g}"
         if not start < end:
-            yield (
-                ("curve", "unsampled_mm", index),
-                "the smaller travel first",
-                f"{start:g}, {end:g}",
-            )
+            yield place, "the smaller travel first", found
+        elif start < last or end > travels[-1]:
+            yield place, f"travels from {last:g} to {travels[-1]:g}, gap after gap", found
+        elif ((travels > start) & (travels < end)).any():
+            yield place, "no travel_mm between the two", found
+        last = max(last, end)
 
 
 def _grid_issues(grid: Grid) -> Iterator[Issue]:

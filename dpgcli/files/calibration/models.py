@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Generic, Literal, TypeVar
 from pydantic import Field
 
 from dpgcli.files.sections import (
+    LARGEST,
     BarStiffness,
     Fraction,
     Geometry,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Numbers = Annotated[list[float], Field(min_length=1)]
+Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positives = Annotated[list[Positive], Field(min_length=1)]
 
 
@@ -69,11 +71,11 @@ Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
 class Curve(Section):
     """The dome's own energy over its travel, by travel."""
 
-    travel_mm: Annotated[list[float], Field(min_length=2)] = Field(
-        description="numbers in mm, each larger than the one before"
+    travel_mm: Annotated[list[Bounded], Field(min_length=2)] = Field(
+        description="numbers in mm up to 1e12, each larger than the one before"
     )
-    energy_mJ: Annotated[list[float], Field(min_length=2)] = Field(
-        description="numbers in mJ, one for each travel"
+    energy_mJ: Annotated[list[Bounded], Field(min_length=2)] = Field(
+        description="numbers in mJ up to 1e12, one for each travel"
     )
     travel_to_opening: TravelToOpening = Field(description="a rule and its factor")
     unsampled_mm: list[Stretch] = Field(

@@ -78,6 +78,8 @@ def starter() -> str:
 def _canonical(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_canonical(item) for item in value]
     return spelled(value) if isinstance(value, float) else value
 
 

@@ -66,7 +66,8 @@ def checked(document: Document) -> Spec:
     found = range_issues(document.data) if spec is None or problems else issues(spec)
     problems += [document.problem(*issue) for issue in found]
     if spec is None or problems:
-        raise SpecError(in_order(problems))
+        own_first = sorted(problems, key=lambda problem: problem.file != document.file)
+        raise SpecError(in_order(own_first))
     return spec
 
 
@@ -114,7 +115,7 @@ def _hint(key: str, error: Any) -> str:
     if isinstance(value, str) and key not in TEXTS:
         return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if is_number and value > 0 and key not in BOUNDED:
+    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS):
         return OUT_OF_RANGE
     return HINTS.get(key, "")
 

@@ -1,12 +1,12 @@
 """Calibration files that a spec names, read and put in the place of their names."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.calibration import Calibration, read_calibration
-from dpgcli.files.places import shown
+from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
+from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
 from dpgcli.files.spec.derivations import PUBLISHED
 from dpgcli.files.spec.settings import SETTING, changed
@@ -26,28 +26,53 @@ def with_calibrations(document: Document, folder: Path) -> Document:
     if said is None or said == PUBLISHED:
         return document
     origin = Path() if document.place(KEY) == SETTING else folder
-    found: list[Any] = []
-    files: list[Path] = []
-    problems: list[Problem] = []
-    for name in said if isinstance(said, list) else [said]:
-        if not isinstance(name, str) or name == PUBLISHED:
-            found.append(name)
-            continue
-        path = origin / name
-        if not path.is_file():
-            problems.append(document.problem(KEY, EXPECTED, f"{shown(name)}: no such file"))
-            continue
-        files.append(path)
-        try:
-            found.append(_named(read_calibration(path), path))
-        except SpecError as error:
-            problems += error.problems
-    if problems:  # what is wrong with the values is said once the files are right
-        found = [PUBLISHED]
-    value = found if isinstance(said, list) else found[0]
+    reader = _Reader(document, origin)
+    if isinstance(said, list):
+        value: Any = [reader.found((*KEY, place), part) for place, part in enumerate(said)]
+        if not said:
+            reader.wrong(KEY, "an empty list")
+    else:
+        value = reader.found(KEY, said)
+    if reader.problems:  # what is wrong with the values is said once the files are right
+        value = PUBLISHED
     embedded = changed(document, {".".join(KEY): value})
-    return replace(embedded, problems=(*document.problems, *problems), files=tuple(files))
+    problems = (*document.problems, *reader.problems)
+    return replace(embedded, problems=problems, files=tuple(reader.files))
 
 
-def _named(calibration: Calibration, path: Path) -> Calibration:
-    return calibration.model_copy(update={"file": path.name})
+@dataclass
+class _Reader:
+    """Reads calibrations by name, or as a table keeps them; what is wrong gathers."""
+
+    document: Document
+    folder: Path
+    problems: list[Problem] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+    def wrong(self, path: KeyPath, found: str) -> None:
+        self.problems.append(self.document.problem(path, EXPECTED, found))
+
+    def found(self, path: KeyPath, said: object) -> object:
+        """The calibration that is said; "published" remains."""
+        try:
+            if isinstance(said, dict):
+                return calibration_in(self.document.section(path, said))
+            if isinstance(said, str) and said != PUBLISHED:
+                return self.named(path, said)
+        except SpecError as error:
+            self.problems += error.problems
+        if not isinstance(said, dict | str):
+            self.wrong(path, shown(said))
+        return said
+
+    def named(self, path: KeyPath, name: str) -> Calibration | None:
+        file = self.folder / name
+        try:
+            is_file = file.is_file()
+        except OSError:  # a name too long, a folder that is closed
+            is_file = False
+        if not is_file:
+            self.wrong(path, f"{shown(name)}: no such file")
+            return None
+        self.files.append(file)
+        return read_calibration(file).model_copy(update={"file": file.name})
