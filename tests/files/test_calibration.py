@@ -166,3 +166,28 @@ def test_a_calibration_says_something(path: Path) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="no such file"):
         read_calibration(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("travel", "gaps", "said"),
+    [
+        ("[0, 1, 14]", "[[2, 13]]", None),
+        ("[0, 1, 14]", "[[0, 1], [1, 14]]", None),
+        ("[0.5, 1, 14]", "[[0, 0.5]]", None),
+        ("[0, 1, 14]", "[[1, 15]]", "unsampled_mm.0: expected travels from 0 to 14, gap after gap"),
+        ("[0, 1, 14]", "[[-1, 0]]", "unsampled_mm.0: expected travels from 0 to 14, gap after gap"),
+        ("[0, 1, 14]", "[[1, 14], [0, 1]]", "unsampled_mm.1: expected travels from 14 to 14"),
+        ("[0, 1, 14]", "[[0, 14]]", "unsampled_mm.0: expected no travel_mm between the two"),
+        ("[0, 1, 1e300]", "[]", "travel_mm.2: expected numbers in mm up to 1e12"),
+        ("[0, 1e-300, 1]", "[]", "travel_mm.1: expected more than 0, found 1e-300"),
+    ],
+)
+def test_gaps_and_points_of_a_curve_fit_together(
+    path: Path, travel: str, gaps: str, said: str | None
+) -> None:
+    text = WHOLE.replace("[0, 1, 14]", travel).replace("[[1, 14]]", gaps)
+    if said is None:
+        read(path, text)
+        return
+    (problem,) = problems(path, text)
+    assert f"curve.{said}" in problem
