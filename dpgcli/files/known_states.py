@@ -34,12 +34,13 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
         problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
     if problems:
         raise SpecError(tuple(problems))
+    _check_numbers(sheet, n_units)
     return KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
         tip=_columns(sheet, TIP),
         angles=_angles(sheet, n_units),
-        openings=_columns(sheet, [f"opening{i}_mm" for i in range(1, n_units + 1)]),
-        pushes=_columns(sheet, [f"push{i}_N" for i in range(1, n_units + 1)]),
+        openings=_columns(sheet, _by_unit("opening{}_mm", n_units)),
+        pushes=_columns(sheet, _by_unit("push{}_N", n_units)),
         seconds=_columns(sheet, [SECONDS])[0],
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
     )
@@ -59,6 +60,16 @@ def _repeated(sheet: Sheet, patterns: Sequence[str]) -> list[Problem]:
         for row, pattern in enumerate(patterns)
         if pattern in patterns[:row]
     ]
+
+
+def _by_unit(name: str, n_units: int) -> list[str]:
+    return [name.format(unit) for unit in range(1, n_units + 1)]
+
+
+def _check_numbers(sheet: Sheet, n_units: int) -> None:
+    """All columns at once, so that one message has what is wrong in any of them."""
+    openings, pushes = (_by_unit(name, n_units) for name in ("opening{}_mm", "push{}_N"))
+    _columns(sheet, [*TIP, TIP_ANGLE, *_angle_names(n_units), *openings, *pushes, SECONDS])
 
 
 def _columns(sheet: Sheet, names: Sequence[str]) -> Array:
@@ -92,7 +103,7 @@ def _read_shapes(path: Path, patterns: Sequence[str], n_units: int) -> tuple[Arr
     problems = _pattern_problems(sheet, n_units)
     points = sheet.numbers(POINT)
     of_row = np.array(sheet.cells("pattern"))
-    for pattern in dict.fromkeys(of_row.tolist()):
+    for pattern in () if problems else dict.fromkeys(of_row.tolist()):
         if pattern not in patterns:
             row = int(np.argmax(of_row == pattern))
             expected = "a pattern of the known states"

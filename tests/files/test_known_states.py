@@ -1,0 +1,218 @@
+"""Known states from CSV: every column, every message, and shapes by their points."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dpgcli.errors import SpecError
+from dpgcli.files.known_states import read_states
+
+WHOLE = """\
+# by finite elements
+push2_N,pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,opening1_mm,opening2_mm,push1_N,seconds
+0,00,27.5,0.1,-0.001,-0.002,0.01,0.02,0,22
+1.1,01,27,-3,-0.002,-0.26,0.03,3.4,0.1,23.5
+0.2,10,26,-6,-0.25,-0.27,3.5,0.04,1.2,
+"""
+SHAPES = """\
+pattern,x_mm,y_mm
+10,0,0
+01,0,0.5
+10,9,-1
+10,20,-5
+01,25,-2
+"""
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def to_file(text, name="states.csv"):
+        path = Path(name)
+        if isinstance(text, bytes):
+            path.write_bytes(text)
+        else:
+            path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+@pytest.fixture
+def problems(write):
+    """The problems of a file of states, and of one of shapes."""
+
+    def of(text, shapes=None, n_units=2):
+        with pytest.raises(SpecError) as caught:
+            read_states(write(text), n_units, shapes and write(shapes, "shapes.csv"))
+        return [str(problem) for problem in caught.value.problems]
+
+    return of
+
+
+def test_every_column_whatever_their_order(write):
+    known = read_states(write(WHOLE), 2)
+    assert known.patterns.tolist() == [[False, False, True], [False, True, False]]
+    assert known.tip.tolist() == [[27.5, 27, 26], [0.1, -3, -6]]
+    assert known.angles.tolist() == [[-0.001, -0.002, -0.25], [-0.002, -0.26, -0.27]]
+    assert known.openings.tolist() == [[0.01, 0.03, 3.5], [0.02, 3.4, 0.04]]
+    assert known.pushes.tolist() == [[0, 0.1, 1.2], [0, 1.1, 0.2]]
+    assert known.seconds[:2].tolist() == [22, 23.5] and np.isnan(known.seconds[2])
+    assert known.shapes == ()
+
+
+def test_what_is_not_there_is_not_known(write):
+    known = read_states(write("pattern,tip_x_mm,tip_y_mm\n10,26,-6\n"), 2)
+    assert known.tip.tolist() == [[26], [-6]]
+    for unknown in (known.angles, known.openings, known.pushes, known.seconds):
+        assert np.isnan(unknown).all()
+    assert known.angles.shape == known.openings.shape == known.pushes.shape == (2, 1)
+
+
+def test_a_gap_in_a_column_is_not_known(write):
+    known = read_states(write("pattern,tip_x_mm,tip_y_mm,push1_N\n10,26,,\n01,,-3,0.5\n"), 2)
+    assert np.isnan(known.tip).tolist() == [[False, True], [True, False]]
+    assert np.isnan(known.pushes).tolist() == [[True, False], [True, True]]
+
+
+@pytest.mark.parametrize("n_units", [1, 2])
+def test_the_tips_angle_is_that_of_the_last_phalanx(write, n_units):
+    pattern = "1" * n_units
+    last = f"chamber{n_units + 1}_angle_rad"
+    alone = read_states(write(f"pattern,tip_angle_rad\n{pattern},-0.5\n"), n_units)
+    assert alone.angles[-1].tolist() == [-0.5]
+    named = read_states(write(f"pattern,{last}\n{pattern},-0.4\n"), n_units)
+    assert named.angles[-1].tolist() == [-0.4]
+    both = f"pattern,{last},tip_angle_rad\n{pattern},-0.4,-0.5\n{'0' * n_units},-0.1,\n"
+    assert read_states(write(both), n_units).angles[-1].tolist() == [-0.5, -0.1]
+
+
+def test_files_as_spreadsheets_write_them(write):
+    text = "\ufeffpattern, tip_x_mm, tip_y_mm\r\n\r\n10, 26, -6\r\n"
+    assert read_states(write(text), 2).tip.tolist() == [[26], [-6]]
+
+
+def test_shapes_are_sorted_to_their_states(write):
+    known = read_states(write(WHOLE), 2, write(SHAPES, "shapes.csv"))
+    assert [shape.tolist() for shape in known.shapes] == [
+        [[], []],
+        [[0, 25], [0.5, -2]],
+        [[0, 9, 20], [0, -1, -5]],
+    ]
+    chosen = known.chosen(np.array([2, 1]))
+    assert [shape.shape for shape in chosen.shapes] == [(2, 3), (2, 2)]
+    assert chosen.tip.tolist() == [[26, 27], [-6, -3]]
+
+
+HEAD = "pattern,tip_x_mm,tip_y_mm\n"
+TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", ["file: expected a header and rows, found nothing"]),
+        ("# nothing\n\n", ["file: expected a header and rows, found nothing"]),
+        (HEAD, ["1: file: expected rows below the header, found none"]),
+        (
+            b"pattern\xff",
+            ["file: expected text in UTF-8, found byte 0xff (save the file as UTF-8)"],
+        ),
+        (
+            "patern,tip_x_mm,tip_y_mm\n10,1,2\n",
+            ["header: expected a column pattern, found patern, tip_x_mm, tip_y_mm (is it patern?)"],
+        ),
+        (
+            "pattern;tip_x_mm;tip_y_mm\n10;1,5;2\n",
+            ["2: row: expected 1 cells, found 2"],
+        ),
+        (
+            "pattern;tip_x_mm;tip_y_mm\n10;1;2\n",
+            [
+                "header: expected a column pattern, found pattern;tip_x_mm;tip_y_mm "
+                "(separate columns with commas, and write decimal points)"
+            ],
+        ),
+        ("pattern\n10\n", [f"header: expected a column {TIPS}, found pattern"]),
+        (
+            "pattern,tip_x_mm\n10,3\n",
+            [f"header: expected a column {TIPS}, found pattern, tip_x_mm"],
+        ),
+        (
+            "pattern,pattern,tip_angle_rad\n10,10,1\n",
+            ['1: header: expected each column once, found "pattern" again'],
+        ),
+        (HEAD + "10,1\n", ["2: row: expected 3 cells, found 2"]),
+        (
+            HEAD + "10,1,2\n10,1,2\n",
+            ["3: pattern: expected each pattern once, found 10 for the second time"],
+        ),
+        (
+            HEAD + "1,1,2\n101,1,2\n12,1,2\n,1,2\n10,1,2\n",
+            [
+                "2: pattern: expected 2 digits 0 and 1, found '1'",
+                "3: pattern: expected 2 digits 0 and 1, found '101'",
+                "4: pattern: expected 2 digits 0 and 1, found '12'",
+                "5: pattern: expected 2 digits 0 and 1, found ''",
+            ],
+        ),
+        (
+            HEAD + "10,left,nan\n01,1e300,inf\n",
+            [
+                '2: tip_x_mm: expected a number, found "left"',
+                '2: tip_y_mm: expected a number, found "nan"',
+                '3: tip_x_mm: expected a number, found "1e300"',
+                '3: tip_y_mm: expected a number, found "inf"',
+            ],
+        ),
+        (
+            WHOLE.replace("22", "fast").replace("3.4", "far").replace("1.2", "1,2"),
+            ["5: row: expected 10 cells, found 11"],
+        ),
+        (
+            WHOLE.replace("22", "fast").replace("3.4", "far").replace("-0.25", "-90°"),
+            [
+                '3: seconds: expected a number, found "fast"',
+                '4: opening2_mm: expected a number, found "far"',
+                '5: chamber2_angle_rad: expected a number, found "-90°"',
+            ],
+        ),
+    ],
+)
+def test_what_is_wrong_with_states(problems, text, said):
+    found = problems(text)
+    assert [problem.removeprefix("states.csv:").strip() for problem in found] == said
+
+
+@pytest.mark.parametrize(
+    ("shapes", "said"),
+    [
+        (
+            "pattern,x_mm\n10,1\n",
+            ["header: expected a column y_mm, found pattern, x_mm (is it x_mm?)"],
+        ),
+        (
+            SHAPES + "11,0,0\n11,1,1\n",
+            ["7: pattern: expected a pattern of the known states, found '11'"],
+        ),
+        (SHAPES + "00,0,0\n", ["7: pattern: expected 2 points or more of it, found one"]),
+        (SHAPES.replace("9,-1", "9,"), ['4: y_mm: expected a number, found ""']),
+        (
+            SHAPES + "1,0,0\n",
+            [
+                "7: pattern: expected 2 digits 0 and 1, found '1'",
+            ],
+        ),
+    ],
+)
+def test_what_is_wrong_with_shapes(problems, shapes, said):
+    found = problems(WHOLE, shapes)
+    assert [problem.removeprefix("shapes.csv:").strip() for problem in found] == said
+
+
+def test_a_file_that_is_not_there_or_no_file(tmp_path):
+    for path, said in ((tmp_path / "no.csv", "no such file"), (tmp_path, "is a directory")):
+        with pytest.raises(SpecError, match=f"expected a readable file, found {said}"):
+            read_states(path, 2)
