@@ -85,9 +85,15 @@ def _calibrated(finger: "Finger", calibration: Path) -> "Finger":
     from dpgcli.errors import UsageError
     from dpgcli.files.calibration import read_calibration
 
-    values = read_calibration(calibration).values
-    if values is None:
+    found = read_calibration(calibration)
+    values = found.values
+    if values is None or not values.given():
         raise UsageError(f"--calibration {calibration}: a grid; name it in a spec instead")
+    if found.curve is not None and finger.contact_travel.any():
+        raise UsageError(
+            f"--calibration {calibration}: a dome's curve, from which the push-only law has its "
+            f"strokes: take -s finger.calibration={calibration} instead"
+        )
     return finger.with_values({key: fitted.value for key, fitted in values.given().items()})
 
 

@@ -1,6 +1,7 @@
 """`dpg compare`: errors, messages and a figure, on the finite-element finger of the examples."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -96,3 +97,195 @@ def test_what_makes_no_sense(
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr
     assert result.stdout == ""
+
+
+PHALANGES = """\
+pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,chamber4_angle_rad,\
+opening1_mm,opening2_mm,opening3_mm,push1_N,push2_N,push3_N
+000,51.99976,-0.00817,-0.000108,-0.000218,-0.000297,0.00106,0.00108,0.00078,0,0,0
+100,50.46532,-10.33568,-0.254171,-0.263880,-0.263758,3.47723,0.07211,-0.00072,1.1384,0,0
+110,47.71870,-16.52155,-0.261822,-0.515066,-0.524182,3.47767,3.47778,0.06827,1.1163,1.1110,0
+"""
+LEVER = """\
+calibration_version: 1
+made_by: hand
+method: none
+values: {segment_height_mm: {value: 12.33}}
+"""
+
+
+@pytest.fixture
+def lever(folder: Path) -> str:
+    (folder / "lever.yaml").write_text(LEVER)
+    return "lever.yaml"
+
+
+@pytest.fixture
+def phalanges(arguments: tuple[str, ...], folder: Path) -> tuple[str, ...]:
+    """The comparison with a file that has angles, openings and pushes, too."""
+    (folder / "phalanges.csv").write_text(PHALANGES)
+    return (*arguments[:2], "phalanges.csv", *arguments[3:])
+
+
+def test_angles_openings_and_pushes_are_held_against_the_lattices(
+    call: Any, phalanges: tuple[str, ...]
+) -> None:
+    """By one unit of the study with a rigid frame: x = 3.2450 mm, turn 0.3030 rad, where the
+    hinge's moment over the lever H cos(turn/2) is the push."""
+    result = call(*phalanges, "--format", "json")
+    found = rows(result.stdout)["100"]
+    assert found["max_opening_error_mm"] == pytest.approx(3.47723 - 3.2450, abs=2e-3)
+    assert found["max_angle_error_rad"] == pytest.approx(0.3030 - 0.254171, abs=1e-3)
+    push = 24.2 * 0.3030 / (10.75 * math.cos(0.1515))
+    assert found["max_push_error_N"] == pytest.approx(1.1384 - push, abs=0.01) or found[
+        "max_push_error_N"
+    ] == pytest.approx(push - 1.1384, abs=0.01)
+    assert "openings " in result.stderr and "pushes " in result.stderr
+    assert "times as long" not in result.stderr, "these data say no times"
+    assert "max_shape_error_mm" not in found
+
+
+def test_data_without_them_have_no_such_columns(call: Any, arguments: tuple[str, ...]) -> None:
+    found = rows(call(*arguments, "--format", "json", "-q").stdout)["100"]
+    assert [name for name in found if "error" in name] == [
+        "error_mm",
+        "error_percent",
+        "angle_error_rad",
+    ]
+
+
+def test_both_errors_with_a_calibration(call: Any, arguments: tuple[str, ...], lever: str) -> None:
+    result = call(*arguments, "--calibration", lever, "--format", "json")
+    found = rows(result.stdout)
+    plain = rows(call(*arguments, "--format", "json", "-q").stdout)
+    other = ("-s", "finger.lattice.segment_height_mm=12.33")
+    better = rows(call(*arguments, *other, "--format", "json", "-q").stdout)
+    for pattern, row in found.items():
+        for name in ("error_mm", "error_percent", "angle_error_rad"):
+            assert row[name] == plain[pattern][name]
+            assert row[f"calibrated_{name}"] == better[pattern][name]
+    assert max(row["calibrated_error_percent"] or 0.0 for row in found.values()) < 8.0
+    assert "(as in the spec, published law, pushing and pulling)" in result.stderr
+    assert "(calibrated, published law, pushing and pulling)" in result.stderr
+
+
+def test_a_spec_that_refers_to_the_file_is_as_good(
+    call: Any, arguments: tuple[str, ...], lever: str
+) -> None:
+    beside = rows(call(*arguments, "--calibration", lever, "--format", "json", "-q").stdout)
+    within = ("-s", f"finger.calibration={lever}", "-s", "finger.lattice.segment_height_mm=null")
+    found = rows(call(*arguments, *within, "--format", "json", "-q").stdout)
+    assert {p: row["error_mm"] for p, row in found.items()} == {
+        p: row["calibrated_error_mm"] for p, row in beside.items()
+    }
+
+
+def test_shapes_are_held_against_the_layer(
+    call: Any, arguments: tuple[str, ...], folder: Path
+) -> None:
+    """The straight finger's layer is 0.75 mm below its stations; its points are off by 0.2 mm."""
+    (folder / "shapes.csv").write_text(
+        "pattern,x_mm,y_mm\n000,0,0\n000,20,0.2\n000,40,-0.2\n000,51,0\n"
+    )
+    result = call(*arguments, "--shapes", "shapes.csv", "--format", "json")
+    found = rows(result.stdout)
+    assert found["000"]["max_shape_error_mm"] == pytest.approx(0.2, abs=1e-9)
+    rms = math.sqrt(2 * 0.2**2 / 4)
+    assert found["000"]["rms_shape_error_mm"] == pytest.approx(rms, abs=1e-9)
+    assert found["110"]["max_shape_error_mm"] is None
+    assert "shapes 0.2 mm at worst" in result.stderr
+
+
+def test_a_figure_of_both(call: Any, arguments: tuple[str, ...], lever: str, folder: Path) -> None:
+    names = ("one.svg", "both.svg", "again.svg")
+    with_file = ("--calibration", lever)
+    for name, options in zip(names, ((), with_file, with_file), strict=True):
+        assert call(*arguments, *options, "--plot", name, "-q").exit_code == ExitCode.DONE
+    one, both, again = ((folder / name).read_bytes() for name in names)
+    assert both == again
+    assert len(both) > len(one)
+    assert b"calibrated" in both and b"calibrated" not in one
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "cal.yaml: file: expected a readable file, found no such file"),
+        ("", "cal.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
+        (LEVER.replace("12.33", "-12"), "cal.yaml:4:30: values.segment_height_mm.value: expected"),
+        (
+            LEVER.split("values")[0]
+            + "grid: {method: interpolation, over: [dome_height_mm], "
+            + "points: {dome_height_mm: [5, 6], stroke_mm: [2, 3]}}\n",
+            "--calibration cal.yaml: a grid; name it in a spec instead",
+        ),
+    ],
+)
+def test_a_calibration_that_cannot_be_used(
+    call: Any, arguments: tuple[str, ...], folder: Path, content: str | None, said: str
+) -> None:
+    if content is not None:
+        (folder / "cal.yaml").write_text(content)
+    result = call(*arguments, "--calibration", "cal.yaml")
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+    assert result.stdout == ""
+
+
+def test_a_domes_curve_is_not_a_stroke_of_domes_that_push(
+    call: Any, arguments: tuple[str, ...], folder: Path
+) -> None:
+    """Its stroke is that of the dome's travel, while the push-only law counts from contact."""
+    travel = [0.1 * place for place in range(150)]
+    energy = [u**2 * (0.02 + (1.0 - u / 13.5) ** 2) for u in travel]
+    dome = {
+        "calibration_version": 1,
+        "made_by": "hand",
+        "method": "none",
+        "values": {
+            "bistable_stiffness_N_per_mm": {"value": 2.0},
+            "stroke_mm": {"value": 13.5},
+        },
+        "geometry": {"dome_height_mm": 6.5, "unit_separation_mm": 3.0},
+        "curve": {
+            "travel_mm": travel,
+            "energy_mJ": energy,
+            "travel_to_opening": {"rule": "equal"},
+        },
+    }
+    (folder / "dome.yaml").write_text(json.dumps(dome))
+    pushing = ["law=push_only", "calibration=dome.yaml", "geometry.dome_height_mm=6.5"]
+    settings = [word for key in pushing for word in ("-s", f"finger.{key}")]
+    assert call(*arguments, *settings).exit_code == ExitCode.DONE
+    result = call(*arguments, *settings, "--calibration", "dome.yaml")
+    assert result.exit_code == ExitCode.USAGE
+    assert "take -s finger.calibration=dome.yaml instead" in result.stderr
+    assert call(*arguments, "--calibration", "dome.yaml").exit_code == ExitCode.DONE
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--tip-offset", "5,nan"), "--tip-offset 5,nan: expected two numbers in mm"),
+        (("--tip-offset", "0,inf"), "--tip-offset 0,inf: expected two numbers in mm"),
+        (("--tip-offset", "1e300,0"), "--tip-offset 1e300,0: expected two numbers in mm"),
+        (("--tip-offset", "1,2,3"), "--tip-offset 1,2,3: expected two numbers in mm"),
+        (("--shapes", "none.csv"), "none.csv: file: expected a readable file"),
+        (("--shapes", "three_gap_finger.csv"), "header: expected a column x_mm, y_mm"),
+        (("-s", "finger.law=tabulated"), "finger.law: expected a calibration with a curve"),
+    ],
+)
+def test_what_else_makes_no_sense(
+    call: Any, arguments: tuple[str, ...], options: tuple[str, ...], said: str
+) -> None:
+    result = call(*arguments, *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize("law", ["published", "push_only"])
+def test_the_law_is_named(call: Any, arguments: tuple[str, ...], law: str) -> None:
+    result = call(*arguments, "-s", f"finger.law={law}")
+    description = {"published": "published law", "push_only": "push-only law"}[law]
+    assert f"errors of the model ({description}" in result.stderr
