@@ -59,10 +59,13 @@ def finger(
     from dpgcli.calibration.finger import FingerFit
     from dpgcli.files.calibration import geometry_of, source_of
     from dpgcli.files.known_states import read_states
-    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.files.spec import read_scene, scene_of
+    from dpgcli.files.spec.problems import checked as checked_spec
 
     check_files((spec, data), output, plot)
-    checked = read_spec(spec, settings or ())
+    document = read_scene(spec, settings or ())
+    check_files(document.files, output, plot)
+    checked = checked_spec(document)
     where = checked.finger.geometry
     where = geometry_of(geometry, where) if geometry else where
     base = scene_of(checked).finger

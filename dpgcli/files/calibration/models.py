@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 Numbers = Annotated[list[float], Field(min_length=1)]
 Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Size = Annotated[float, Field(ge=0)]  # of an error: what data do not tell has a huge one
 Positives = Annotated[list[Positive], Field(min_length=1)]
 
 
@@ -31,7 +32,7 @@ class Fitted(Section, Generic[T]):
     """A value, its standard error if it has one, and its 95 % bootstrap interval if asked for."""
 
     value: T = Field(description="a number in the unit of its key")
-    standard_error: NotNegative | None = Field(default=None, description="a number >= 0")
+    standard_error: Size | None = Field(default=None, description="a number >= 0")
     interval: Annotated[list[float], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="two numbers, the lower one first"
     )
@@ -87,11 +88,11 @@ class ScalingLaw(Section):
     """A product of powers: value at the reference geometry, times (geometry/reference)^exponent."""
 
     at_reference: Positive = Field(description="a number > 0")
-    standard_error: NotNegative | None = Field(
+    standard_error: Size | None = Field(
         default=None, description="a number >= 0, relative to the value"
     )
     exponents: dict[str, float] = Field(description="a number for each key of `over`")
-    standard_errors: dict[str, NotNegative] | None = Field(
+    standard_errors: dict[str, Size] | None = Field(
         default=None, description="a number >= 0 for each key of `over`"
     )
 
@@ -112,7 +113,7 @@ class Grid(Section):
     scaling: dict[str, ScalingLaw] | None = Field(
         default=None, description="a law for each quantity, for method scaling"
     )
-    leave_one_out: dict[str, NotNegative] | None = Field(
+    leave_one_out: dict[str, Size] | None = Field(
         default=None, description="the largest relative error by quantity"
     )
 
@@ -140,7 +141,7 @@ class Quality(Section):
     r_squared: Annotated[float, Field(le=1)] | None = Field(
         default=None, description="a number up to 1"
     )
-    rms_residual: NotNegative | None = Field(default=None, description="a number >= 0")
+    rms_residual: Size | None = Field(default=None, description="a number >= 0")
     residual_unit: str | None = Field(default=None, description="a unit")
 
 
