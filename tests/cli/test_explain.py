@@ -72,3 +72,52 @@ def test_what_predict_refuses_explain_refuses(call: Call) -> None:
     for arguments in (("--columns", "nope"), ("--tolerance", "1"), ("--pattern", "2")):
         asked = ("three_unit.yaml", *arguments)
         assert call("explain", *asked).stderr == call("predict", *asked).stderr
+
+
+FITTED = """\
+calibration_version: 1
+made_by: hand
+method: none
+values: {bistable_stiffness_N_per_mm: {value: 13, standard_error: 0.25}}
+geometry: {dome_height_mm: 6.5, dome_thickness_mm: 0.75, elastic_modulus_MPa: 26}
+"""
+BY_FILE = ("three_unit.yaml", "-s", "finger.calibration=[fitted.yaml, published]")
+
+
+def test_values_of_a_file_have_their_error_and_its_name(call: Call, folder: Path) -> None:
+    (folder / "fitted.yaml").write_text(FITTED)
+    sources = {source["key"]: source for source in facts(call, *BY_FILE)["sources"]}
+    assert sources["bistable_stiffness_N_per_mm"] == {
+        "key": "bistable_stiffness_N_per_mm",
+        "units": "1-3",
+        "value": 13.0,
+        "origin": "calibrated",
+        "rule": "fitted, fitted.yaml",
+        "standard_error": 0.25,
+    }
+    assert sources["force_linearity"]["standard_error"] is None
+    text = call("explain", *BY_FILE).stdout
+    assert "calibrated    fitted, fitted.yaml (± 0.25)" in text
+
+
+def test_uncertainty_is_left_out_until_it_is_asked_for(call: Call, folder: Path) -> None:
+    (folder / "fitted.yaml").write_text(FITTED)
+    plan = facts(call, *BY_FILE)
+    assert not [name for name in plan["columns"] if "uncertainty" in name]
+    assert any("--uncertainty" in part["why"] for part in plan["left_out"])
+    asked = facts(call, *BY_FILE, "--uncertainty")
+    assert asked["columns"][-3:] == [
+        "tip_x_uncertainty_mm",
+        "tip_y_uncertainty_mm",
+        "tip_angle_uncertainty_rad",
+    ]
+    nothing = facts(call, "three_unit.yaml")
+    assert not any("--uncertainty" in part["why"] for part in nothing["left_out"])
+
+
+def test_long_fingers_that_push_only_are_solved_one_by_one(call: Call) -> None:
+    """The springs of a half would depend on its pattern."""
+    long = ("twenty_unit.yaml", "-s", "finger.units=14", "--columns", "tip_x_mm")
+    assert facts(call, *long)["method"] == "pairs of half-fingers"
+    pushing = facts(call, *long, "-s", "finger.law=push_only")
+    assert (pushing["method"], pushing["n_finger_solves"]) == ("direct", 2**14)

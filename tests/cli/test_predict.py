@@ -332,3 +332,160 @@ def test_without_matplotlib_it_says_what_to_install(
     result = call("predict", "three_unit.yaml", "--plot", "states.svg")
     assert (result.exit_code, result.stdout) == (2, "")
     assert "pip install matplotlib" in result.stderr
+
+
+FITTED = """\
+calibration_version: 1
+made_by: hand
+method: none
+values:
+  force_linearity: {value: 0.043, standard_error: 0.002}
+  segment_height_mm: {value: 10.75, standard_error: 0.1}
+geometry: {dome_height_mm: 6.5, dome_thickness_mm: 0.75, elastic_modulus_MPa: 26,
+  unit_cell_mm: 22, limiting_layer_thickness_mm: 1.5}
+"""
+BY_FILE = ("-s", "finger.calibration=[fitted.yaml, published]")
+UNCERTAIN = ["tip_x_uncertainty_mm", "tip_y_uncertainty_mm", "tip_angle_uncertainty_rad"]
+
+
+@pytest.fixture
+def fitted(folder: Path) -> None:
+    (folder / "fitted.yaml").write_text(FITTED)
+
+
+@pytest.mark.usefixtures("fitted")
+def test_uncertainty_comes_on_request_and_last(call: Call, folder: Path) -> None:
+    plain = rows_of(call, "three_unit.yaml", *BY_FILE)
+    found = rows_of(call, "three_unit.yaml", *BY_FILE, "--uncertainty")
+    assert list(found[0]) == [*plain[0], *UNCERTAIN]
+    assert [{n: v for n, v in row.items() if n not in UNCERTAIN} for row in found] == plain
+    alone = rows_of(call, "three_unit.yaml", *BY_FILE, "--columns", "uncertainty")
+    assert list(alone[0]) == ["pattern", "status", *UNCERTAIN]
+    call("predict", "-q", "three_unit.yaml", *BY_FILE, "--uncertainty", "-o", "u.parquet")
+    table = pd.read_parquet(folder / "u.parquet")
+    assert table[UNCERTAIN].to_dict("records") == [{n: r[n] for n in UNCERTAIN} for r in alone]
+    unit = pq.read_schema(folder / "u.parquet").field("tip_angle_uncertainty_rad").metadata
+    assert unit[b"unit"] == b"rad"
+
+
+@pytest.mark.usefixtures("fitted")
+def test_uncertainty_is_that_of_two_values_a_little_off(call: Call) -> None:
+    """By differences of whole predictions: squares of the two errors add."""
+    (found,) = rows_of(call, "three_unit.yaml", *BY_FILE, "--uncertainty", "--pattern", "110")
+    squares = dict.fromkeys(("tip_x_mm", "tip_y_mm", "tip_angle_rad"), 0.0)
+    soft = ("-s", "finger.geometry.unit_cell_mm=null")
+    for key, value, error in (("force_linearity", 0.043, 0.002), ("segment_height_mm", 10.75, 0.1)):
+        ends = []
+        for sign in (-1e-3, 1e-3):
+            setting = f"finger.lattice.{key}={value + sign * error!r}"
+            (row,) = rows_of(
+                call, "three_unit.yaml", *BY_FILE, *soft, "-s", setting, "--pattern", "110"
+            )
+            ends.append(row)
+        for name in squares:
+            squares[name] += ((ends[1][name] - ends[0][name]) / 2e-3) ** 2
+    for name, column in zip(squares, UNCERTAIN, strict=True):
+        assert found[column] == pytest.approx(math.sqrt(squares[name]), rel=1e-5)
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_state_that_does_not_exist_has_no_uncertainty(call: Call) -> None:
+    wells = ("-s", "finger.overrides.2.lattice.force_linearity=0.3")
+    rows = rows_of(call, "three_unit.yaml", *BY_FILE, *wells, "--uncertainty")
+    for row in rows:
+        assert (row["status"] == "stable") == (row["pattern"][1] == "0")
+        assert (row["tip_x_uncertainty_mm"] is not None) == (row["status"] == "stable")
+    straight = rows[0]
+    assert straight["tip_x_uncertainty_mm"] == pytest.approx(0.0, abs=1e-12)
+    assert straight["tip_y_uncertainty_mm"] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_grippers_uncertainty_is_that_of_its_finger(call: Call) -> None:
+    options = (*BY_FILE, "--uncertainty", "--pattern", "11111")
+    (gripper,) = rows_of(call, "gripper.yaml", *options)
+    (finger,) = rows_of(call, "gripper.yaml", *options, "-s", "gripper=null")
+    assert [gripper[name] for name in UNCERTAIN] == [finger[name] for name in UNCERTAIN]
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize("command", ["predict", "explain"])
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ((), "--uncertainty: no value of the spec has a standard error"),
+        ((*BY_FILE, "--formulation", "lattice"), "drop --formulation"),
+        (
+            (
+                *BY_FILE,
+                "-s",
+                "finger.lattice.force_linearity=0.04",
+                "-s",
+                "finger.lattice.segment_height_mm=10.75",
+            ),
+            "--uncertainty: no value of the spec has a standard error",
+        ),
+    ],
+)
+def test_uncertainty_of_what_has_none_is_refused(
+    call: Call, command: str, options: tuple[str, ...], said: str
+) -> None:
+    result = call(command, "three_unit.yaml", "--uncertainty", *options)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert said in result.stderr
+
+
+@pytest.mark.usefixtures("fitted")
+def test_without_the_option_errors_change_no_byte(call: Call, folder: Path) -> None:
+    texts = []
+    for error in ("0.002", "0.2"):
+        (folder / "fitted.yaml").write_text(FITTED.replace("0.002", error))
+        texts.append(call("predict", "-q", "three_unit.yaml", *BY_FILE, "--format", "csv").stdout)
+    assert texts[0] == texts[1]
+
+
+LAWS = {
+    "published": "published law, pushing and pulling",
+    "push_only": "push-only law, published energy of the dome",
+    "tabulated": "tabulated law, pushing and pulling",
+}
+
+
+@pytest.mark.parametrize(("law", "description"), LAWS.items())
+def test_the_law_is_named_wherever_states_are_summed_up(
+    call: Call, folder: Path, law: str, description: str
+) -> None:
+    travel = [0.05 * place for place in range(91)]
+    dome = {
+        "values": {
+            "bistable_stiffness_N_per_mm": {"value": 12.84},
+            "stroke_mm": {"value": 3.5},
+        },
+        "curve": {
+            "travel_mm": travel,
+            "energy_mJ": [6.42 * x**2 * (0.043 + 0.957 * (1 - x / 3.5) ** 2) for x in travel],
+            "travel_to_opening": {"rule": "equal"},
+        },
+    }
+    head = {"calibration_version": 1, "made_by": "hand", "method": "none"}
+    (folder / "dome.yaml").write_text(json.dumps({**head, **dome}))
+    options = ["three_unit.yaml", "-s", f"finger.law={law}"]
+    if law == "tabulated":
+        options += ["-s", "finger.calibration=[dome.yaml, published]"]
+    result = call("predict", *options, "-o", "law.parquet")
+    assert result.stderr.splitlines()[-1].endswith(f"; {description}")
+    assert pq.read_metadata(folder / "law.parquet").metadata[b"dpg.law"] == description.encode()
+    assert f"({description})" in call("explain", *options).stdout
+    (row,) = rows_of(call, *options, "--pattern", "101")
+    assert row["tip_x_mm"] == pytest.approx(38.35981703, abs=1e-4)
+
+
+def test_a_file_of_domes_can_be_predicted_from_its_table(call: Call, folder: Path) -> None:
+    (folder / "fitted.yaml").write_text(FITTED)
+    call("predict", "-q", "three_unit.yaml", *BY_FILE, "-o", "t.parquet")
+    kept = pq.read_metadata(folder / "t.parquet").metadata[b"dpg.spec"]
+    (folder / "kept.json").write_bytes(kept)
+    (folder / "fitted.yaml").unlink()
+    again = rows_of(call, "kept.json", "--uncertainty")
+    (folder / "fitted.yaml").write_text(FITTED)
+    assert again == rows_of(call, "three_unit.yaml", *BY_FILE, "--uncertainty")
