@@ -1,8 +1,12 @@
 """Calibration files: what is written is read back, and every mistake has its place."""
 
 import hashlib
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dpgcli.errors import OutputError, SpecError
@@ -59,6 +63,18 @@ def test_what_is_written_is_read_back(path: Path) -> None:
     again = path.with_name("again.yaml")
     write_calibration(again, found)
     assert read_calibration(again) == found
+
+
+def test_other_processes_can_have_it(path: Path) -> None:
+    found = read(path, WHOLE)
+    assert found.grid is not None
+    assert found.grid.law.points.are_inside(np.array([[5.0], [7.0]])).tolist() == [True, False]
+    script = "import pickle, sys; found = pickle.load(sys.stdin.buffer); print(found.values)"
+    sent = pickle.dumps(found)
+    done = subprocess.run(
+        [sys.executable, "-c", script], input=sent, capture_output=True, check=False
+    )
+    assert done.stdout.decode().strip() == str(found.values), done.stderr.decode()
 
 
 def test_the_same_bytes_every_time(path: Path) -> None:

@@ -43,16 +43,33 @@ class Fitted(Section, Generic[T]):
         return "held" if self.standard_error is None else "fitted"
 
 
+# Classes of their own, since processes know a class by its name, and Fitted[Positive] has none.
+class FittedPositive(Fitted[Positive]):
+    """A fitted length or stiffness."""
+
+
+class FittedNotNegative(Fitted[NotNegative]):
+    """A fitted stiffness that may be zero."""
+
+
+class FittedFraction(Fitted[Fraction]):
+    """A fitted share."""
+
+
+class FittedBars(Fitted[BarStiffness]):
+    """A fitted stiffness of bars, which may be rigid."""
+
+
 class Values(Section):
     """Lattice values; keys as in a spec, and in the order of these fields."""
 
-    bistable_stiffness_N_per_mm: Fitted[Positive] | None = None
-    force_linearity: Fitted[Fraction] | None = None
-    stroke_mm: Fitted[Positive] | None = None
-    hinge_stiffness_N_mm_per_rad: Fitted[NotNegative] | None = None
-    segment_height_mm: Fitted[Positive] | None = None
-    segment_length_mm: Fitted[Positive] | None = None
-    linear_stiffness_N_per_mm: Fitted[BarStiffness] | None = None
+    bistable_stiffness_N_per_mm: FittedPositive | None = None
+    force_linearity: FittedFraction | None = None
+    stroke_mm: FittedPositive | None = None
+    hinge_stiffness_N_mm_per_rad: FittedNotNegative | None = None
+    segment_height_mm: FittedPositive | None = None
+    segment_length_mm: FittedPositive | None = None
+    linear_stiffness_N_per_mm: FittedBars | None = None
 
     def given(self) -> dict[str, Fitted[float]]:
         """The values that there are, by key."""
