@@ -11,9 +11,10 @@ if TYPE_CHECKING:
 
 def write_depfile(path: Path, study: "Study") -> None:
     """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does."""
-    from dpgcli.files.output import whole_file
+    from dpgcli.files.output import check_not_read, whole_file
     from dpgcli.studies.sweep import DESIGNS, STATES
 
+    check_not_read(study.sweep.files, (path,))
     study.folder.mkdir(parents=True, exist_ok=True)
     targets = " ".join(_escaped(study.folder / name) for name in (STATES, DESIGNS))
     sources = [_escaped(source) for source in study.sweep.files if source != Path("-")]

@@ -43,8 +43,13 @@ def check_outputs(sources: Iterable[Path], *paths: Path | None) -> None:
         check_writable(path)
     if len({path.resolve() for path in given}) < len(given):
         raise UsageError(f"{', '.join(map(str, given))}: expected names that differ")
+    check_not_read(sources, given)
+
+
+def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
+    """Raise UsageError for a file to write that is one of those that are read."""
     read = [source for source in sources if source.exists()]
-    for path in given:
+    for path in paths:
         if path.exists() and any(path.samefile(source) for source in read):
             raise UsageError(f"{path} is the spec or data that is read: give another name")
 

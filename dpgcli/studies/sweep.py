@@ -12,7 +12,7 @@ from time import perf_counter
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.files.parts import PartStore
-from dpgcli.files.spec import spelled
+from dpgcli.files.spec import scene_of, spelled
 from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
@@ -87,7 +87,7 @@ class Study:
             **self._exactness,
             "dpg.designs": str(self.sweep.space.size),
             "dpg.schema_version": str(SCHEMA_VERSION),
-            "dpg.law": "published: the spring pushes and pulls",
+            "dpg.law": scene_of(self.sweep.base).finger.law.description,
             "dpg.versions": versions(),
         }
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

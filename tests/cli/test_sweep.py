@@ -21,6 +21,7 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.exploration.executors import Chunk
 from dpgcli.files.output import sole_use
 from dpgcli.files.sweep import read_sweep
+from dpgcli.files.tables import read_metadata
 from dpgcli.studies.sweep import Study
 from dpgcli.studies.work import Work
 
@@ -428,3 +429,181 @@ def test_what_some_units_override_keeps_its_whole_key(call: Any, sweep: Path) ->
     result = call("sweep", "sweep.yaml", *SERIAL, "--require", f"{key} > 5")
     assert result.exit_code == ExitCode.DONE
     assert pd.read_parquet(sweep.parent / "out" / "designs.parquet")[key].tolist() == [6.0, 7.0]
+
+
+THICKNESS = "finger.geometry.dome_thickness_mm"
+DOMES = f"""base: base.yaml
+space:
+  - {{key: {HEIGHT}, values: [5, 6.5, 7.5]}}
+  - {{key: {THICKNESS}, values: [0.6, 0.75]}}
+"""
+
+
+def calibration(linearity: float = 0.04) -> str:
+    """A dome with a curve, and a grid of its stiffness over heights and thicknesses."""
+    travel = [0.25 * place for place in range(61)]
+    energy = [22.0 * u**2 * (0.015 + 0.985 * (1.0 - u / 13.5) ** 2) for u in travel]
+    points = [(h, t) for h in (4.5, 6.0, 7.0) for t in (0.5, 0.7, 1.0)]
+    data = {
+        "calibration_version": 1,
+        "made_by": "hand",
+        "method": "none",
+        "values": {
+            "bistable_stiffness_N_per_mm": {"value": 44.0, "standard_error": 1.0},
+            "force_linearity": {"value": linearity},
+            "stroke_mm": {"value": 13.5},
+        },
+        "geometry": {
+            "dome_height_mm": 6.5,
+            "dome_thickness_mm": 0.75,
+            "unit_separation_mm": 3.0,
+            "elastic_modulus_MPa": 26.0,
+            "channel_width_mm": 10.0,
+            "limiting_layer_thickness_mm": 1.5,
+        },
+        "curve": {
+            "travel_mm": travel,
+            "energy_mJ": energy,
+            "travel_to_opening": {"rule": "equal"},
+        },
+        "grid": {
+            "method": "interpolation",
+            "over": ["dome_height_mm", "dome_thickness_mm"],
+            "points": {
+                "dome_height_mm": [h for h, _ in points],
+                "dome_thickness_mm": [t for _, t in points],
+                "hinge_stiffness_N_mm_per_rad": [20.0 + h * t for h, t in points],
+            },
+        },
+    }
+    return json.dumps(data)
+
+
+@pytest.fixture
+def domes(folder: Path) -> Path:
+    """A sweep whose base has a calibration file and a law."""
+    (folder / "dome.yaml").write_text(calibration())
+    text = (folder / "three_unit.yaml").read_text()
+    law = "calibration: [dome.yaml, published]\n  law: push_only"
+    (folder / "base.yaml").write_text(text.replace("calibration: published", law))
+    (folder / "domes.yaml").write_text(DOMES)
+    return folder
+
+
+def test_calibrated_domes_give_the_same_bytes_from_processes(
+    run: Any, call: Any, domes: Path
+) -> None:
+    assert call("sweep", "domes.yaml", *SERIAL).exit_code == ExitCode.DONE
+    result = run("sweep", "domes.yaml", "-o", "two", "-j", "2", "-q")
+    assert (result.returncode, result.stderr) == (ExitCode.DONE, "")
+    assert contents(domes / "two") == contents(domes / "out")
+
+
+@pytest.mark.parametrize("law", ["published", "tabulated", "push_only"])
+def test_a_design_of_a_sweep_is_that_of_predict(call: Any, domes: Path, law: str) -> None:
+    settings = ("-s", f"finger.law={law}")
+    assert call("sweep", "domes.yaml", *SERIAL, *settings).exit_code == ExitCode.DONE
+    states = pd.read_parquet(domes / "out" / "states.parquet")
+    design = ("-s", f"{HEIGHT}=7.5", "-s", f"{THICKNESS}=0.6")
+    result = call("predict", "base.yaml", *settings, *design, "--format", "json", "-q")
+    rows = json.loads(result.stdout)
+    own = states[(states["dome_height_mm"] == 7.5) & (states["dome_thickness_mm"] == 0.6)]
+    assert own["status"].tolist() == [row["status"] for row in rows]
+    assert own["tip_y_mm"].to_numpy() == pytest.approx(
+        [row["tip_y_mm"] for row in rows], abs=1e-10, nan_ok=True
+    )
+    said = read_metadata(domes / "out" / "states.parquet")["dpg.law"]
+    assert said.startswith({"push_only": "push-only law, tabulated"}.get(law, f"{law} law"))
+
+
+def test_a_depfile_lists_the_calibration(call: Any, domes: Path) -> None:
+    assert call("sweep", "domes.yaml", *SERIAL, "--depfile", "out.d").exit_code == ExitCode.DONE
+    text = (domes / "out.d").read_text()
+    assert text.splitlines()[0] == (
+        "out/states.parquet out/designs.parquet: domes.yaml base.yaml dome.yaml"
+    )
+    assert "\ndome.yaml:\n" in text
+
+
+@pytest.mark.parametrize("name", ["domes.yaml", "base.yaml", "dome.yaml", "out/../dome.yaml"])
+def test_a_depfile_takes_the_place_of_no_file_that_is_read(
+    call: Any, domes: Path, name: str
+) -> None:
+    (domes / "out").mkdir()
+    before = (domes / name).read_bytes()
+    result = call("sweep", "domes.yaml", *SERIAL, "--depfile", name)
+    assert result.exit_code == ExitCode.USAGE
+    assert "is the spec or data that is read: give another name" in result.stderr
+    assert (domes / name).read_bytes() == before
+
+
+def test_a_refused_depfile_leaves_no_empty_folder(call: Any, domes: Path) -> None:
+    assert call("sweep", "domes.yaml", *SERIAL, "--depfile", "base.yaml").exit_code == 2
+    assert not (domes / "out").exists()
+
+
+def test_a_changed_calibration_is_computed_anew(call: Any, domes: Path) -> None:
+    settings = ("-s", "finger.law=published")
+    assert call("sweep", "domes.yaml", *SERIAL, *settings).exit_code == ExitCode.DONE
+    before = contents(domes / "out")
+    again = call("sweep", "domes.yaml", *SERIAL, *settings)
+    assert again.stderr == "out: up to date\n"
+    (domes / "dome.yaml").write_text(calibration(0.05))
+    assert call("sweep", "domes.yaml", *SERIAL, *settings).exit_code == ExitCode.DONE
+    assert contents(domes / "out") != before
+
+
+def test_a_changed_calibration_beside_an_unfinished_sweep_is_refused(
+    call: Any, domes: Path
+) -> None:
+    assert call("sweep", "domes.yaml", *SERIAL, "--shard", "1/2").exit_code == ExitCode.DONE
+    (domes / "dome.yaml").write_text(calibration(0.05))
+    result = call("sweep", "domes.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.USAGE
+    assert (
+        "differs in sweep.base.finger.calibration.0.values.force_linearity.value" in result.stderr
+    )
+
+
+@pytest.mark.parametrize(
+    ("heights", "origins"),
+    [
+        ([5.0, 6.5, 7.0], ["scaled", "scaled", "scaled"]),
+        ([4.4, 6.5, 7.1], ["extrapolated", "scaled", "extrapolated"]),
+    ],
+)
+def test_a_row_says_how_far_to_trust_its_constants(
+    call: Any, domes: Path, heights: list[float], origins: list[str]
+) -> None:
+    """Domes of another thickness are scaled; the hinges' grid ends at heights of 4.5 and 7 mm."""
+    space = f"base: base.yaml\nspace: [{{key: {HEIGHT}, values: {heights}}}]\n"
+    (domes / "domes.yaml").write_text(space)
+    settings = ("-s", f"{THICKNESS}=0.8", "-s", "finger.law=published")
+    assert call("sweep", "domes.yaml", *SERIAL, *settings).exit_code == ExitCode.DONE
+    designs = pd.read_parquet(domes / "out" / "designs.parquet")
+    assert designs["calibration"].tolist() == origins
+
+
+def test_a_grid_interpolates_inside_its_points_and_extrapolates_outside(
+    call: Any, domes: Path
+) -> None:
+    """With all else given, the gravest origin is that of the grid."""
+    space = f"base: base.yaml\nspace: [{{key: {HEIGHT}, values: [4.5, 5.5, 7, 7.01]}}]\n"
+    (domes / "domes.yaml").write_text(space)
+    values = ("bistable_stiffness_N_per_mm=12.84", "force_linearity=0.043")
+    settings = [word for value in values for word in ("-s", f"finger.lattice.{value}")]
+    settings += ["-s", "finger.geometry.unit_separation_mm=3", "-s", "finger.law=published"]
+    grid = json.loads(calibration())
+    del grid["values"]["stroke_mm"], grid["curve"]
+    (domes / "dome.yaml").write_text(json.dumps(grid))
+    assert call("sweep", "domes.yaml", *SERIAL, *settings).exit_code == ExitCode.DONE
+    designs = pd.read_parquet(domes / "out" / "designs.parquet")
+    assert designs["calibration"].tolist() == [*["interpolated"] * 3, "extrapolated"]
+
+
+def test_what_is_wrong_in_a_calibration_has_its_place(call: Any, domes: Path) -> None:
+    (domes / "dome.yaml").write_text("calibration_version: 2\n")
+    result = call("sweep", "domes.yaml", *SERIAL)
+    assert result.exit_code == ExitCode.USAGE
+    assert "dome.yaml:1:1: calibration_version: expected 1" in result.stderr
+    assert not (domes / "out").exists()
