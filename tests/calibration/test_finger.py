@@ -17,7 +17,7 @@ from dpgcli.files.spec import read_spec, scene_of
 from dpgcli.mechanics.finger import Finger
 
 Fingers = Callable[..., Finger]
-EXAMPLES = Path(__file__).parents[2] / "configs" / "benchmarks"
+EXAMPLES = Path(__file__).parents[2] / "configs" / "calibration"
 PATTERNS = np.array([[0, 1, 0, 1, 1], [0, 0, 1, 1, 0], [0, 0, 0, 0, 1]], bool)
 FRAME = Frame((5.375, 0.75), (5.375, -0.75))
 
