@@ -228,7 +228,8 @@ def _disagreement(travel: Array, energy: Array) -> Iterator[str]:
         inside = cell == number
         if inside.sum() > most:
             away = travel[inside] - travel[inside].mean()
-            rest = energy[inside] - np.polyval(np.polyfit(away, energy[inside], 1), away)
+            slope = (away @ energy[inside]) / ((away @ away) or 1.0)
+            rest = energy[inside] - slope * away
             if rest.std() > DISAGREEMENT * np.ptp(energy):
                 most, place = int(inside.sum()), int(number)
     if place >= 0:

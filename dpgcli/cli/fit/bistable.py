@@ -21,6 +21,7 @@ from dpgcli.cli.fit.common import (
     geometry_from,
     known,
     method_of,
+    positive,
     print_fit,
     quality_line,
     tell,
@@ -96,7 +97,7 @@ def bistable(
         area=_area(chosen, area),
         fixed=fixed,
         loss=loss,
-        loss_scale=_positive("--loss-scale", loss_scale),
+        loss_scale=positive("--loss-scale", loss_scale),
         resamples=bootstrap,
         seed=seed,
     )
@@ -187,15 +188,7 @@ def _area(quantity: Quantity, area: float | None) -> float:
         raise UsageError("pressure needs --area MM2, the effective area A in F = p A")
     if quantity is not Quantity.PRESSURE and area is not None:
         raise UsageError(f"--area is for pressure; the fit is to the {quantity}")
-    return _positive("--area", area) or float("nan")
-
-
-def _positive(option: str, value: float | None) -> float | None:
-    from dpgcli.errors import UsageError
-
-    if value is not None and not 0.0 < value < float("inf"):
-        raise UsageError(f"{option} {value:g}: expected a number > 0")
-    return value
+    return positive("--area", area) or float("nan")
 
 
 def _summary(found: "BistableFit", choice: "Choice") -> list[str]:

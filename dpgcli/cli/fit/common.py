@@ -85,6 +85,15 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
     check_outputs([source for source in sources if source is not None], output, plot)
 
 
+def positive(option: str, value: float | None) -> float | None:
+    """An option's number, if there is one, above zero."""
+    from dpgcli.errors import UsageError
+
+    if value is not None and not 0.0 < value < float("inf"):
+        raise UsageError(f"{option} {value:g}: expected a number > 0")
+    return value
+
+
 def geometry_from(values: list[str] | None, spec: Path | None) -> "Geometry | None":
     """The geometry that a fit holds at: that of a spec, with values changed or added."""
     from dpgcli.files.calibration import geometry_of

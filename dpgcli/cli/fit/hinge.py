@@ -19,6 +19,7 @@ from dpgcli.cli.fit.common import (
     check_files,
     geometry_from,
     method_of,
+    positive,
     print_fit,
     quality_line,
     tell,
@@ -62,7 +63,7 @@ def hinge(
         data.moment,
         data.rotation,
         loss=loss,
-        loss_scale=loss_scale,
+        loss_scale=positive("--loss-scale", loss_scale),
         resamples=bootstrap,
         seed=seed,
     )
