@@ -51,7 +51,7 @@ def test_help_of_a_command_loads_no_numerics(loaded: Loaded, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["bistable", "hinge", "grid"])
 def test_help_of_a_fit_loads_no_numerics(loaded: Loaded, name: str) -> None:
-    assert loaded("fit", name, "--help") & AT_START == set()
+    assert loaded("fit", name, "--help") & (AT_START - {"pydantic"}) == set()
 
 
 @pytest.mark.parametrize(

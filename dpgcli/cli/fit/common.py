@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dpgcli.calibration.choices import Loss
 from dpgcli.cli.options import check_plot
 from dpgcli.cli.printing import Format, printer_of
 from dpgcli.cli.streams import say
@@ -29,6 +30,7 @@ Bootstrap = Annotated[
     typer.Option("--bootstrap", metavar="N", min=0, help="95 % intervals from N resampled fits"),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]
+LossOption = Annotated[Loss, typer.Option("--loss", help="How residuals count")]
 LossScale = Annotated[
     float | None,
     typer.Option(
