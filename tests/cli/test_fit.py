@@ -213,6 +213,14 @@ def test_a_grid(fit: Any, folder: Path, method: str) -> None:
         assert law.exponents["dome_height_mm"] == row["exponent_dome_height_mm"]
 
 
+def test_what_all_points_of_a_grid_share(fit: Any, folder: Path) -> None:
+    fit("grid", GRID, "-g", "elastic_modulus_MPa=26", "--spec", "three_unit.yaml", "-o", "g.yaml")
+    found = read_calibration(folder / "g.yaml").geometry
+    assert found is not None
+    assert (found.elastic_modulus_MPa, found.unit_separation_mm) == (26.0, 3.0)
+    assert found.dome_height_mm is None, "the points differ in it"
+
+
 def test_a_grid_for_people(fit: Any) -> None:
     result = fit("grid", GRID)
     line = next(text for text in result.stdout.splitlines() if text.startswith("inverted_energy"))
