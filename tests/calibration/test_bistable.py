@@ -190,6 +190,12 @@ def test_the_curve_of_a_force_is_its_integral() -> None:
     assert found.curve[1] == pytest.approx(law(TRAVEL, TRUE, Quantity.ENERGY), abs=0.02)
 
 
+def test_an_integral_begins_at_rest() -> None:
+    found = fitted(curve(Quantity.FORCE, travel=TRAVEL[2:]), Quantity.FORCE)
+    assert found.curve is not None
+    assert found.curve[1] == pytest.approx(law(TRAVEL[2:], TRUE, Quantity.ENERGY), abs=0.03)
+
+
 def test_no_curve_where_the_force_is_not_known() -> None:
     ends = TRAVEL[(TRAVEL < 0.6) | (TRAVEL > 3.2)]
     found = fitted(curve(Quantity.FORCE, travel=ends), Quantity.FORCE)

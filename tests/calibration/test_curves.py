@@ -172,6 +172,14 @@ def test_a_cleaned_curve_rises_and_follows_the_data() -> None:
     assert energies == pytest.approx(energy(found), abs=0.1)
 
 
+def test_points_that_hardly_differ_are_one() -> None:
+    """Also where the edge of a cell lies between them."""
+    travel = np.append(np.linspace(0.0, 10.0, 11), [5.0 - 1e-9, 5.0 + 1e-9])
+    found, energies = cleaned(travel, travel)
+    assert found == pytest.approx(np.linspace(0.0, 10.0, 11), abs=1e-8)
+    assert energies == pytest.approx(found)
+
+
 def test_a_small_curve_is_kept_as_it_is() -> None:
     found, energies = cleaned(TRAVEL, energy(TRAVEL))
     assert np.array_equal(found, TRAVEL)

@@ -109,8 +109,8 @@ def test_the_hull_of_a_grid(geometry: tuple[float, float], is_inside: bool) -> N
 def test_the_hull_is_not_the_box() -> None:
     """Without the corner (7, 0.5) its neighborhood is outside, within the ranges of both keys."""
     cut = points(GEOMETRY[~((HEIGHT == 7.0) & (THICKNESS == 0.5))])
-    asked = np.array([[6.9, 0.52], [6.4, 0.74], [7.0, 0.75]])
-    assert cut.are_inside(asked).tolist() == [False, True, True]
+    asked = np.array([[6.9, 0.52], [6.6, 0.64], [6.6, 0.66], [7.0, 0.75]])
+    assert cut.are_inside(asked).tolist() == [False, False, True, True]
 
 
 def test_one_key_has_a_range() -> None:

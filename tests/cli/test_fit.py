@@ -4,12 +4,11 @@ import csv
 import io
 import json
 import os
-import signal
-import time
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import pytest
+from ruamel.yaml import YAML
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.files.calibration import read_calibration
@@ -302,10 +301,18 @@ def test_a_reader_that_has_had_enough_gets_its_file(fit: Any, folder: Path, star
     assert read_calibration(folder / "d.yaml").values is not None
 
 
-def test_an_interrupt_writes_nothing(fit: Any, folder: Path, start: Any) -> None:
+def test_an_interrupt_while_writing_leaves_the_old_file(
+    fit: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half(_: YAML, __: Any, stream: TextIO) -> None:
+        stream.write("calibration_version: 1")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(YAML, "dump", half)
+    (folder / "d.yaml").write_text("old")
     before = sorted(path.name for path in folder.iterdir())
-    process = start("fit", "bistable", PATH, *EQUAL, "--bootstrap", "100000", "-o", "d.yaml")
-    time.sleep(2.0)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) == ExitCode.INTERRUPTED
+    result = fit("bistable", PATH, *EQUAL, "-o", "d.yaml")
+    assert result.exit_code == ExitCode.INTERRUPTED
+    assert "nothing half-written is left" in result.stderr
+    assert (folder / "d.yaml").read_text() == "old"
     assert sorted(path.name for path in folder.iterdir()) == before
