@@ -96,6 +96,16 @@ def test_quasi_static_pieces_are_before_the_snap_and_after_the_ringing() -> None
     assert f"dropped {int((~kept).sum())} of 490 points" in said
 
 
+def test_a_long_hold_does_not_make_the_loading_fast() -> None:
+    held = ringing()
+    assert held.time is not None
+    travel = np.append(held.travel, np.full(500, held.travel[-1]))
+    time = np.append(held.time, np.linspace(2.001, 50.0, 500))
+    kept = quasi_static(Curve(travel, time=time)).kept
+    assert kept[time < 0.99].all()
+    assert not kept[(time > 1.002) & (time < 1.05)].any()
+
+
 def test_without_time_everything_is_static() -> None:
     kept, said = quasi_static(CLEAN)
     assert kept.all()
