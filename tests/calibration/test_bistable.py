@@ -250,6 +250,10 @@ def test_its_quasi_static_pieces_are_near_the_static_dome() -> None:
     )
     assert not warned(found, "ringing")
     assert warned(found, "drifting energy"), "what is kept has drifted all the same"
-    assert found.fit.values == pytest.approx([44.12, 0.01566, 13.494], rel=0.1)
+    static = fitted(read_curve(DATA / "dome_path_h6.5_t0.75.csv").curve).fit.values
+    stiffness, linearity, stroke = found.fit.values / static
+    assert stiffness == pytest.approx(1.0, abs=0.03)
+    assert stroke == pytest.approx(1.0, abs=0.01)
+    assert 1.04 < linearity < 1.17, "the inverted energy has drifted by 4 to 17 %"
     assert found.fit.r_squared > 0.998
     assert found.curve is not None
