@@ -57,6 +57,7 @@ def test_noisy_curves_give_no_warning_either(quantity: Quantity) -> None:
     assert fitted(curve(quantity, 0), quantity).warnings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
 def test_standard_errors_are_the_scatter_over_repeated_noise(quantity: Quantity) -> None:
     fits = [fitted(curve(quantity, seed), quantity).fit for seed in range(200)]

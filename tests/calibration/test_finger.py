@@ -53,6 +53,7 @@ def test_values_come_back_from_their_own_states(
     assert found.by_key["bistable_stiffness_N_per_mm"] == 12.84
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_noise_seen_again_and_again(reference_finger: Fingers) -> None:
     """100 fits to tips with normal errors of 0.05 mm."""
     start = reference_finger(3, 1e4)

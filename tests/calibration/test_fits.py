@@ -65,6 +65,7 @@ def test_without_a_jacobian_the_answer_is_the_same() -> None:
     assert found.standard_errors == pytest.approx(fitted(observed).standard_errors, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", list(Loss))
 def test_standard_errors_are_the_scatter_over_repeated_noise(loss: Loss) -> None:
     """300 repetitions know a standard deviation to 4 %; robust errors are rough at 60 points."""
@@ -76,6 +77,7 @@ def test_standard_errors_are_the_scatter_over_repeated_noise(loss: Loss) -> None
     assert (np.abs(errors) < 2.0).mean(axis=0) == pytest.approx([0.9502, 0.9502], abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_bootstrap_agrees_with_the_standard_errors() -> None:
     """Over several data sets: in each, drawing points anew knows no more than its residuals."""
     ratios = []

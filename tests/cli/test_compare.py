@@ -52,7 +52,10 @@ def test_another_lever_is_nearer(call: Any, arguments: tuple[str, ...]) -> None:
         found = rows(call(*arguments, "--format", "json", "-q", *settings).stdout)
         return max(row["angle_error_rad"] for row in found.values())
 
-    assert worst("-s", "finger.geometry=null", "-s", "finger.lattice.segment_height_mm=12.3") < 0.25 * worst()
+    assert (
+        worst("-s", "finger.geometry=null", "-s", "finger.lattice.segment_height_mm=12.3")
+        < 0.25 * worst()
+    )
 
 
 def test_a_table_for_people(call: Any, arguments: tuple[str, ...]) -> None:

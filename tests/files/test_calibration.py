@@ -20,7 +20,6 @@ from dpgcli.files.calibration import (
 from dpgcli.files.calibration.results import (
     correlation_of,
     grid_of,
-    law_of,
     quality_of,
     values_of,
 )
@@ -231,7 +230,7 @@ def test_a_grid_is_written_and_read_back(path: Path, method: Method) -> None:
     asked = np.array([[4.5, 0.7], [7.0, 0.7]])
     for first, second in zip(
         law.at("bistable_stiffness_N_per_mm", asked),
-        law_of(grid).at("bistable_stiffness_N_per_mm", asked),
+        grid.law.at("bistable_stiffness_N_per_mm", asked),
         strict=True,
     ):
         assert np.array_equal(first, second)

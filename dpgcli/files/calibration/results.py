@@ -8,7 +8,7 @@ import numpy as np
 from dpgcli.calibration.bistable import BistableFit
 from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.grid import Law, Points
+from dpgcli.calibration.grid import Law
 from dpgcli.files.calibration.models import (
     Curve,
     Grid,
@@ -81,13 +81,6 @@ def grid_of(law: Law) -> Grid:
         scaling={k: _scaling_of(law, k) for k in points.quantities} if is_scaling else None,
         leave_one_out={k: v for k, v in left_out.items() if math.isfinite(v)} or None,
     )
-
-
-def law_of(grid: Grid) -> Law:
-    """The way between the points of a file; its scaling laws are those of its points."""
-    columns = {key: np.array(values) for key, values in grid.points.items()}
-    geometry = np.stack([columns.pop(key) for key in grid.over], axis=1)
-    return Law(Method(grid.method), Points(tuple(grid.over), geometry, columns))
 
 
 def _scaling_of(law: Law, key: str) -> ScalingLaw:
