@@ -24,7 +24,7 @@ from dpgcli.states.sensitivities import STEP, sensitivities
 from dpgcli.states.solve import Status, reach
 
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
-BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (1.0, 1e12)}
+BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (10.0, 1e12)}
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,12 @@ class FingerFit:
 
     @cached_property
     def _observed(self) -> Array:
-        return self.known.tip if self.target is Target.TIPS else self.known.angles
+        return self.known.tip if self.target == Target.TIPS else self.known.angles
 
     @cached_property
     def _straight(self) -> Array:
         """What the straight finger would have, (…, 1): R² is of the deflections."""
-        if self.target is Target.ANGLES:
+        if self.target == Target.ANGLES:
             return np.zeros((1, 1))
         return self.frame.tips(np.array([reach(self.finger), [0.0], [0.0]]))
 
@@ -129,7 +129,7 @@ class FingerFit:
 
     def _residual(self, values: Array) -> Array:
         states = self._states(values)
-        found = states.tip if self.target is Target.TIPS else states.angles
+        found = states.tip if self.target == Target.TIPS else states.angles
         return np.asarray((found - self._observed)[self._given])
 
     def _jacobian(self, values: Array) -> Array:
@@ -139,7 +139,7 @@ class FingerFit:
         steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
         found = sensitivities(states.batch, steps)
         slopes = found.strut_angles
-        if self.target is Target.TIPS:
+        if self.target == Target.TIPS:
             moved = states.pose[:, None] + 1j * STEP * found.pose
             slopes = self.frame.tips(moved).imag / STEP
         jacobian = np.zeros((int(self._given.sum()), len(self._parameters)))
@@ -161,4 +161,4 @@ class FingerFit:
 
 def _parameter(key: str, start: float, is_free: bool) -> Parameter:
     lower, upper = BOUNDS.get(key, (start / WIDEST, start * WIDEST))
-    return Parameter(key, start, lower, upper, is_free)
+    return Parameter(key, start, min(lower, start), max(upper, start), is_free)

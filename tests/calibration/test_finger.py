@@ -166,3 +166,15 @@ def test_data_without_what_is_to_be_met(reference_finger: Fingers) -> None:
     known = KnownStates.of_tips(PATTERNS, known_of(finger).tip)
     with pytest.raises(FitError, match="no angles to fit to"):
         FingerFit(finger, known, FRAME, ("segment_height_mm",), Target.ANGLES).fit()
+
+
+def test_angles_do_not_tell_the_length_of_segments(reference_finger: Fingers) -> None:
+    finger = reference_finger(3)
+    study = FingerFit(
+        finger, known_of(finger), FRAME, ("segment_height_mm", "segment_length_mm"), Target.ANGLES
+    )
+    with pytest.raises(FitError, match="do not depend on segment_length_mm"):
+        study.fit()
+    flexible, known = finite_elements()  # through its bars they do, but barely
+    found = replace(study, finger=flexible, known=known).fit()
+    assert any("segment_length_mm: its standard error" in text for text in found.warnings)
