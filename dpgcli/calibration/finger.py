@@ -45,8 +45,9 @@ class FingerFit:
     def __post_init__(self) -> None:
         values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
         for key in self.free:
-            if key not in values:
-                raise FitError(f"--free {key}: expected one of {', '.join(values)}")
+            if key not in values or not self._has(key):
+                known = ", ".join(filter(self._has, values))
+                raise FitError(f"--free {key}: expected one of {known}")
             if values[key].size > 1:
                 raise FitError(f"--free {key}: units differ in it, expected one value for all")
             if not np.isfinite(values[key]).all():
@@ -109,8 +110,12 @@ class FingerFit:
         return tuple(
             _parameter(key, float(value[0, 0]), key in self.free)
             for key, value in values.items()
-            if value.size == 1 and np.isfinite(value).all()
+            if value.size == 1 and np.isfinite(value).all() and self._has(key)
         )
+
+    def _has(self, key: str) -> bool:
+        """A law with a curve of its own has no force linearity."""
+        return key != "force_linearity" or self.finger.law.curve is None
 
     def _states(self, values: Array) -> LatticeStates:
         """The states at a trial; those of the last one are kept for its derivatives."""

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from dpgcli.calibration.choices import Target
+from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
 from dpgcli.errors import FitError
@@ -91,11 +92,23 @@ def test_one_lever_brings_the_finite_element_finger_within_some_percent() -> Non
     finger, known = finite_elements()
     study = FingerFit(finger, known, FRAME, ("segment_height_mm",))
     found = study.fit()
-    assert found.by_key["segment_height_mm"] == pytest.approx(12.33, abs=0.01)
+    assert found.by_key["segment_height_mm"] == pytest.approx(13.18, abs=0.01)
     before, after = study.compared(None).relative, study.compared(found).relative
-    assert np.nanmax(before) == pytest.approx(0.152, abs=2e-3)
+    assert before[3:] == pytest.approx([0.234, 0.238], abs=2e-3), "a quarter too far"
     assert after[3:].max() < 0.015, "100 and 110"
     assert np.nanmax(after) < 0.08, "001 and 010, whose chambers tilt before the gap"
+
+
+def test_states_that_no_fit_has_seen_are_predicted_within_four_percent() -> None:
+    """011, 101 and 111 from a fit to the other five; 20 % off and more with the published lever."""
+    finger, known = finite_elements()
+    rest = read_states(EXAMPLES / "three_gap_finger_rest.csv", 3)
+    found = FingerFit(finger, known, FRAME, ("segment_height_mm",)).fit()
+    published = compare(finger, rest, FRAME).relative
+    calibrated = compare(finger.with_values(found.by_key), rest, FRAME).relative
+    assert (published > 0.18).all()
+    assert (calibrated < 0.04).all()
+    assert (calibrated[1:] < 0.02).all(), "101 and 111"
 
 
 def test_each_state_from_the_others() -> None:
@@ -175,6 +188,3 @@ def test_angles_do_not_tell_the_length_of_segments(reference_finger: Fingers) ->
     )
     with pytest.raises(FitError, match="do not depend on segment_length_mm"):
         study.fit()
-    flexible, known = finite_elements()  # through its bars they do, but barely
-    found = replace(study, finger=flexible, known=known).fit()
-    assert any("segment_length_mm: its standard error" in text for text in found.warnings)

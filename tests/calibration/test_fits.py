@@ -238,3 +238,17 @@ def test_a_model_without_a_value_is_said() -> None:
 def test_a_start_outside_its_bounds_is_misuse() -> None:
     with pytest.raises(ValueError, match="outside its bounds"):
         fitted(noisy(1), (Parameter("size", -1.0, 0.0, 1.0), PARAMETERS[1]))
+
+
+def test_a_value_that_drowns_in_noise_is_said() -> None:
+    x = np.linspace(0.0, 1.0, 30)
+    y = 2.0 * x + np.random.default_rng(5).normal(0.0, 0.1, 30)
+    terms = np.stack((x, 1e-4 * x**2), axis=1)
+    found = fit(
+        [Parameter("slope", 1.0), Parameter("bend", 1.0)],
+        lambda values: terms @ values - y,
+        lambda values: terms,
+        observed=y,
+    )
+    (said,) = found.warnings
+    assert said.startswith("bend: its standard error")
