@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.models import OptionInfo
 from typer.testing import CliRunner
 
 from dpgcli.accuracy.families import FAMILIES, PATTERNS
@@ -19,6 +20,7 @@ from dpgcli.cli import (
     check,
     compare,
     explain,
+    fe,
     init,
     merge,
     predict,
@@ -29,6 +31,10 @@ from dpgcli.cli import (
     validate,
 )
 from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.fit.bistable import bistable
+from dpgcli.cli.fit.finger import finger
+from dpgcli.cli.fit.grid import grid
+from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
 from dpgcli.files.spec import json_schema, read_spec
 from dpgcli.files.sweep import read_sweep
@@ -41,20 +47,31 @@ from dpgcli.studies.kept import KEEPABLE
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = (
-    predict.predict,
-    explain.explain,
-    sweep.sweep,
-    bench.bench,
-    compare.compare,
-    stress.stress,
-    merge.merge,
-    check.check,
-    report.report,
-    validate.validate,
-    init.init,
-    schema.schema,
-)
+COMMANDS = {
+    **{
+        module.__name__.rpartition(".")[2]: getattr(module, module.__name__.rpartition(".")[2])
+        for module in (
+            predict,
+            explain,
+            sweep,
+            bench,
+            compare,
+            stress,
+            merge,
+            check,
+            report,
+            validate,
+            init,
+            schema,
+        )
+    },
+    "fit bistable": bistable,
+    "fit hinge": hinge,
+    "fit finger": finger,
+    "fit grid": grid,
+    "fe dome": fe.dome,
+    "fe hinge": fe.hinge,
+}
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
 
 
@@ -125,14 +142,16 @@ def test_the_examples_of_reading_tables_run(
     assert "tip_y_mm" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.__name__)
-def test_every_command_and_option_is_named(command: object) -> None:
-    name = getattr(command, "__name__", "")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_and_option_is_named(name: str) -> None:
     assert f"`dpg {name}" in README
     options = set()
-    for parameter in inspect.signature(command).parameters.values():  # type: ignore[arg-type]
+    for parameter in inspect.signature(COMMANDS[name]).parameters.values():
         for metadata in getattr(parameter.annotation, "__metadata__", ()):
-            options |= {o for o in getattr(metadata, "param_decls", ()) or () if o[:2] == "--"}
+            if isinstance(metadata, OptionInfo):
+                said = (metadata.default, *(metadata.param_decls or ()))
+                named = {text for text in said if isinstance(text, str) and text[:1] == "-"}
+                options |= named or {f"--{parameter.name.replace('_', '-')}"}
     assert not {option for option in options if option not in README}
 
 

@@ -18,7 +18,8 @@ from dpgcli.errors import FitError
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
 BEYOND_REST = 0.4  # of the largest travel: where an inverted well may be
-FAST = 10.0  # times the speed that three quarters of the time stay below
+FAST = 10.0  # times the speed that three quarters of the moving time stay below
+RESTING = 0.01  # of the mean speed, range over duration: slower is not moving
 SHORTEST_PIECE = 0.01  # of the record's duration: slower for less than that is a turning point
 SMALLEST_SWING = 0.02  # of the range of travels: smaller ones do not count as a reversal
 CELLS = 100
@@ -145,9 +146,13 @@ def inverted_well(curve: Curve) -> float | None:
 def speeds(curve: Curve) -> tuple[Array, float]:
     """Speed between points (point − 1,), and the limit above which the dome snaps or rings."""
     assert curve.time is not None, "speed needs time"
-    lasting = np.diff(curve.time)
-    speed = np.abs(np.diff(curve.travel)) / np.maximum(lasting, np.finfo(float).tiny)
-    ascending = np.argsort(speed, kind="stable")
+    duration = float(np.ptp(curve.time)) or 1.0
+    lasting = np.maximum(np.diff(curve.time), np.finfo(float).eps * duration)
+    speed = np.abs(np.diff(curve.travel)) / lasting
+    moving = speed > RESTING * np.ptp(curve.travel) / duration
+    if not moving.any():
+        return speed, np.inf
+    ascending = np.flatnonzero(moving)[np.argsort(speed[moving], kind="stable")]
     elapsed = np.cumsum(lasting[ascending])
     usual = speed[ascending][np.searchsorted(elapsed, 0.75 * elapsed[-1])]
     return speed, FAST * float(usual)
@@ -163,8 +168,8 @@ class Pieces(NamedTuple):
 def quasi_static(curve: Curve) -> Pieces:
     """The slow pieces of a record: before a snap, and after its ringing has died.
 
-    Slow is at most ten times the speed that three quarters of the time stay below, for at least
-    a hundredth of the record. Raises FitError if nothing is left.
+    Slow is at most ten times the speed that three quarters of the moving time stay below, for at
+    least a hundredth of the record. Raises FitError if nothing is left.
     """
     if curve.time is None:
         return Pieces(np.ones(len(curve.travel), bool), "no time: all points are taken as static")
@@ -228,7 +233,8 @@ def _disagreement(travel: Array, energy: Array) -> Iterator[str]:
         inside = cell == number
         if inside.sum() > most:
             away = travel[inside] - travel[inside].mean()
-            rest = energy[inside] - np.polyval(np.polyfit(away, energy[inside], 1), away)
+            slope = (away @ energy[inside]) / ((away @ away) or 1.0)
+            rest = energy[inside] - slope * away
             if rest.std() > DISAGREEMENT * np.ptp(energy):
                 most, place = int(inside.sum()), int(number)
     if place >= 0:

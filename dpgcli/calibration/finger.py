@@ -24,7 +24,7 @@ from dpgcli.states.sensitivities import STEP, sensitivities
 from dpgcli.states.solve import Status, reach
 
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
-BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (1.0, 1e12)}
+BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (10.0, 1e12)}
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,9 @@ class FingerFit:
     def __post_init__(self) -> None:
         values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
         for key in self.free:
-            if key not in values:
-                raise FitError(f"--free {key}: expected one of {', '.join(values)}")
+            if key not in values or not self._has(key):
+                known = ", ".join(filter(self._has, values))
+                raise FitError(f"--free {key}: expected one of {known}")
             if values[key].size > 1:
                 raise FitError(f"--free {key}: units differ in it, expected one value for all")
             if not np.isfinite(values[key]).all():
@@ -89,12 +90,12 @@ class FingerFit:
 
     @cached_property
     def _observed(self) -> Array:
-        return self.known.tip if self.target is Target.TIPS else self.known.angles
+        return self.known.tip if self.target == Target.TIPS else self.known.angles
 
     @cached_property
     def _straight(self) -> Array:
         """What the straight finger would have, (…, 1): R² is of the deflections."""
-        if self.target is Target.ANGLES:
+        if self.target == Target.ANGLES:
             return np.zeros((1, 1))
         return self.frame.tips(np.array([reach(self.finger), [0.0], [0.0]]))
 
@@ -109,8 +110,12 @@ class FingerFit:
         return tuple(
             _parameter(key, float(value[0, 0]), key in self.free)
             for key, value in values.items()
-            if value.size == 1 and np.isfinite(value).all()
+            if value.size == 1 and np.isfinite(value).all() and self._has(key)
         )
+
+    def _has(self, key: str) -> bool:
+        """A law with a curve of its own has no force linearity."""
+        return key != "force_linearity" or self.finger.law.curve is None
 
     def _states(self, values: Array) -> LatticeStates:
         """The states at a trial; those of the last one are kept for its derivatives."""
@@ -129,7 +134,7 @@ class FingerFit:
 
     def _residual(self, values: Array) -> Array:
         states = self._states(values)
-        found = states.tip if self.target is Target.TIPS else states.angles
+        found = states.tip if self.target == Target.TIPS else states.angles
         return np.asarray((found - self._observed)[self._given])
 
     def _jacobian(self, values: Array) -> Array:
@@ -139,7 +144,7 @@ class FingerFit:
         steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
         found = sensitivities(states.batch, steps)
         slopes = found.strut_angles
-        if self.target is Target.TIPS:
+        if self.target == Target.TIPS:
             moved = states.pose[:, None] + 1j * STEP * found.pose
             slopes = self.frame.tips(moved).imag / STEP
         jacobian = np.zeros((int(self._given.sum()), len(self._parameters)))
@@ -161,4 +166,4 @@ class FingerFit:
 
 def _parameter(key: str, start: float, is_free: bool) -> Parameter:
     lower, upper = BOUNDS.get(key, (start / WIDEST, start * WIDEST))
-    return Parameter(key, start, lower, upper, is_free)
+    return Parameter(key, start, min(lower, start), max(upper, start), is_free)

@@ -187,6 +187,11 @@ def _warnings(search: Search, found: Fit, free: Flags) -> tuple[str, ...]:
             )
         elif is_free and np.isnan(error) and found.n_points > free.sum():
             said.append(f"{parameter.key}: too many outliers for a standard error")
+        elif is_free and error > abs(value):
+            said.append(
+                f"{parameter.key}: its standard error, {error:.2g}, is larger than the value: "
+                "the data hardly determine it"
+            )
     if found.n_points == free.sum():
         points = "1 point" if found.n_points == 1 else f"{found.n_points} points"
         said.append(f"{points} for as many free values: no error estimate")

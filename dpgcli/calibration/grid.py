@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
@@ -25,8 +25,7 @@ SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its cor
 CONSTANT = "ln(value at reference)"
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """Values, their relative standard errors, and whether they lie inside the hull; (design,).
 
     Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an

@@ -13,6 +13,7 @@ from dpgcli.errors import FitError
 
 NEAR_BOUND = 1e-3  # of a parameter's size: closer than this, the bound itself is tried
 ALIKE = 1e-9  # smallest singular value of the Jacobian's unit columns that tells them apart
+IDLE = 1e-12  # of the largest effect that a parameter has: below it there is but rounding
 TOLERANCE = 1e-14
 MOST_STEPS = 500
 NORMAL_DEVIATION = 1.4826  # of normal errors, over their median absolute value
@@ -123,7 +124,9 @@ class Search:
         """Raise FitError for parameters that the data leave undetermined."""
         slopes = self.jacobian(values)[np.ix_(self.rows, free)]
         length = np.sqrt((slopes**2).sum(axis=0))
-        columns = slopes / np.where(length > 0.0, length, 1.0)
+        effect = length * np.array([p.size for p in self.parameters])[free]
+        length = np.where(effect > IDLE * effect.max(initial=0.0), length, 0.0)
+        columns = slopes / np.where(length > 0.0, length, np.inf)
         _, singular, directions = np.linalg.svd(columns)
         if len(singular) == len(length) and singular[-1] > ALIKE:
             return

@@ -74,7 +74,7 @@ def compare(
     if plot is not None:
         from dpgcli.report.comparison import draw_comparison
 
-        draw_comparison(known, found, calibrated, str(data), plot)
+        draw_comparison(known, found, calibrated, data.name, plot)
     if not quiet:
         sys.stdout.flush()
         say("\n".join(_summary(finger, known, found, calibrated)))

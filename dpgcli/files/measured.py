@@ -76,10 +76,13 @@ def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measu
     Raises SpecError with every problem at once.
     """
     sheet = read_sheet(path)
-    travel = _one_of(sheet, TRAVELS)
-    known = {travel: "travel", **QUANTITIES, **OTHERS}
+    headless = list(_one_of(sheet, TRAVELS))
     if not set(QUANTITIES) & set(sheet.names):
-        raise SpecError((sheet.missing(" or ".join(QUANTITIES)),))
+        headless.append(sheet.missing(*QUANTITIES))
+    if headless:
+        raise SpecError(tuple(headless))
+    travel = next(name for name in TRAVELS if name in sheet.names)
+    known = {travel: "travel", **QUANTITIES, **OTHERS}
     columns = sheet.numbers([name for name in sheet.names if name in known])
     arrays = {known[name]: values for name, values in columns.items()}
     problems = [*_signs(sheet, travel, arrays["travel"]), *_scales(sheet, columns, known, geometry)]
@@ -94,8 +97,12 @@ def read_moments(path: Path, where: str | None = None) -> Moments:
     Raises SpecError with every problem at once.
     """
     sheet = read_sheet(path)
-    rotation = _one_of(sheet, ROTATIONS)
-    sheet.check_names([MOMENT])
+    headless = list(_one_of(sheet, ROTATIONS))
+    if MOMENT not in sheet.names:
+        headless.append(sheet.missing(MOMENT))
+    if headless:
+        raise SpecError(tuple(headless))
+    rotation = next(name for name in ROTATIONS if name in sheet.names)
     if where is not None:
         sheet = _chosen(sheet, where)
     known = {MOMENT: "moment", rotation: "rotation"}
@@ -141,15 +148,13 @@ def read_table(path: Path) -> Table:
     )
 
 
-def _one_of(sheet: Sheet, names: tuple[str, ...]) -> str:
+def _one_of(sheet: Sheet, names: tuple[str, ...]) -> Iterator[Problem]:
+    """The problem that there is none of these columns, or more than one."""
     found = [name for name in names if name in sheet.names]
     if len(found) > 1:
-        raise SpecError(
-            (sheet.problem(None, "header", f"one of {', '.join(names)}", " and ".join(found)),)
-        )
-    if not found:
-        raise SpecError((sheet.missing(" or ".join(names)),))
-    return found[0]
+        yield sheet.problem(None, "header", f"one of {', '.join(names)}", " and ".join(found))
+    elif not found:
+        yield sheet.missing(*names)
 
 
 def _unused(sheet: Sheet, known: Mapping[str, str]) -> tuple[str, ...]:

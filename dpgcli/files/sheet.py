@@ -60,18 +60,17 @@ class Sheet:
 
     def check_names(self, needed: Sequence[str]) -> None:
         """Raise SpecError for columns that are missing."""
-        missing = [name for name in needed if name not in self.names]
-        if missing:
-            raise SpecError((self.missing(", ".join(missing)),))
+        if problems := [self.missing(name) for name in needed if name not in self.names]:
+            raise SpecError(tuple(problems))
 
-    def missing(self, wanted: str) -> Problem:
-        """The problem that there is no such column."""
-        close = get_close_matches(wanted, self.names, n=1)
+    def missing(self, *wanted: str) -> Problem:
+        """The problem that there is no column of any of these names."""
+        close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else ""
         if len(self.names) == 1 and (";" in self.names[0] or "\t" in self.names[0]):
             hint = "separate columns with commas, and write decimal points"
-        found = ", ".join(self.names)
-        return located(Place(self.file), "header", f"a column {wanted}", found, hint)
+        expected, found = f"a column {' or '.join(wanted)}", ", ".join(self.names)
+        return located(Place(self.file), "header", expected, found, hint)
 
 
 def read_sheet(path: Path) -> Sheet:

@@ -150,7 +150,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         raise UsageError(too_many(n, "the finger has"))
     formulation = FORMULATIONS[request.formulation](finger)
     terms = tuple(term.kind for term in formulation.terms)
-    is_fitted = scene.uncertainty is not None
+    is_fitted = scene.uncertainty is not None and request.formulation == "chain"
     available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
     dropped = rung is not None and rung.drops_bars
     columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)

@@ -65,6 +65,7 @@ def test_without_a_jacobian_the_answer_is_the_same() -> None:
     assert found.standard_errors == pytest.approx(fitted(observed).standard_errors, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", list(Loss))
 def test_standard_errors_are_the_scatter_over_repeated_noise(loss: Loss) -> None:
     """300 repetitions know a standard deviation to 4 %; robust errors are rough at 60 points."""
@@ -76,6 +77,7 @@ def test_standard_errors_are_the_scatter_over_repeated_noise(loss: Loss) -> None
     assert (np.abs(errors) < 2.0).mean(axis=0) == pytest.approx([0.9502, 0.9502], abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_bootstrap_agrees_with_the_standard_errors() -> None:
     """Over several data sets: in each, drawing points anew knows no more than its residuals."""
     ratios = []
@@ -236,3 +238,17 @@ def test_a_model_without_a_value_is_said() -> None:
 def test_a_start_outside_its_bounds_is_misuse() -> None:
     with pytest.raises(ValueError, match="outside its bounds"):
         fitted(noisy(1), (Parameter("size", -1.0, 0.0, 1.0), PARAMETERS[1]))
+
+
+def test_a_value_that_drowns_in_noise_is_said() -> None:
+    x = np.linspace(0.0, 1.0, 30)
+    y = 2.0 * x + np.random.default_rng(5).normal(0.0, 0.1, 30)
+    terms = np.stack((x, 1e-4 * x**2), axis=1)
+    found = fit(
+        [Parameter("slope", 1.0), Parameter("bend", 1.0)],
+        lambda values: terms @ values - y,
+        lambda values: terms,
+        observed=y,
+    )
+    (said,) = found.warnings
+    assert said.startswith("bend: its standard error")

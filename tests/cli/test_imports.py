@@ -49,6 +49,11 @@ def test_help_of_a_command_loads_no_numerics(loaded: Loaded, name: str) -> None:
     assert loaded(name, "--help") & (AT_START - {"pydantic"}) == set()
 
 
+@pytest.mark.parametrize("name", ["bistable", "hinge", "grid"])
+def test_help_of_a_fit_loads_no_numerics(loaded: Loaded, name: str) -> None:
+    assert loaded("fit", name, "--help") & (AT_START - {"pydantic"}) == set()
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

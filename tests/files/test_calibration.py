@@ -9,8 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dpgcli.calibration.choices import Method
+from dpgcli.calibration.fits import Parameter, fit_linear
+from dpgcli.calibration.grid import Law, Points
 from dpgcli.errors import OutputError, SpecError
-from dpgcli.files.calibration import Calibration, read_calibration, source_of, write_calibration
+from dpgcli.files.calibration import (
+    Calibration,
+    made_by,
+    read_calibration,
+    source_of,
+    write_calibration,
+)
+from dpgcli.files.calibration.results import (
+    correlation_of,
+    grid_of,
+    quality_of,
+    values_of,
+)
 
 WHOLE = """\
 calibration_version: 1
@@ -207,3 +222,55 @@ def test_gaps_and_points_of_a_curve_fit_together(
         return
     (problem,) = problems(path, text)
     assert f"curve.{said}" in problem
+
+
+def test_a_correlation_needs_the_order_of_its_values(path: Path) -> None:
+    (first,) = (f"{line}\n" for line in WHOLE.splitlines() if line.startswith("  bistable"))
+    turned = WHOLE.replace(first, "").replace("  stroke_mm: {value: 3.5}\n", first)
+    (said,) = problems(path, turned)
+    assert said.startswith("4:1: values: expected the order bistable_stiffness_N_per_mm, force_lin")
+
+
+def test_a_fit_is_written_and_read_back(path: Path) -> None:
+    """A value that was held has no error; the correlation is that of the others."""
+    keys = ("bistable_stiffness_N_per_mm", "force_linearity", "stroke_mm")
+    design = np.random.default_rng(0).normal(size=(20, 3))
+    free = [Parameter(key, 0.5, is_free=key != "force_linearity") for key in keys]
+    observed = design @ np.array([2.0, 0.5, 1.0]) + np.random.default_rng(1).normal(size=20) / 10
+    found = fit_linear(free, design, observed, resamples=20)
+    values = values_of(found)
+    correlation = correlation_of(found)
+    head = {"calibration_version": 1, "made_by": made_by(), "method": "test"}
+    content = {
+        **head,
+        "values": values,
+        "correlation": correlation,
+        "quality": quality_of(found, "N"),
+    }
+    write_calibration(path, Calibration.model_validate(content))
+    again = read_calibration(path)
+    assert again.values == values
+    assert list(again.uncertain) == [keys[0], keys[2]]
+    assert again.correlation == correlation
+    assert correlation is not None
+    assert correlation[0][1] == pytest.approx(found.correlation[0, 2])
+    assert values.force_linearity is not None
+    assert values.force_linearity.interval is None
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_a_grid_is_written_and_read_back(path: Path, method: Method) -> None:
+    geometry = np.array([[4.0, 0.5], [5.0, 0.5], [4.0, 1.0], [6.0, 1.0], [5.0, 0.8]])
+    quantities = {"bistable_stiffness_N_per_mm": np.array([5.0, 4.8, 35.0, 31.0, 18.0])}
+    law = Law(method, Points(("dome_height_mm", "dome_thickness_mm"), geometry, quantities))
+    head = {"calibration_version": 1, "made_by": made_by(), "method": "test"}
+    write_calibration(path, Calibration.model_validate({**head, "grid": grid_of(law)}))
+    grid = read_calibration(path).grid
+    assert grid is not None
+    asked = np.array([[4.5, 0.7], [7.0, 0.7]])
+    for first, second in zip(
+        law.at("bistable_stiffness_N_per_mm", asked),
+        grid.law.at("bistable_stiffness_N_per_mm", asked),
+        strict=True,
+    ):
+        assert np.array_equal(first, second)

@@ -1,5 +1,6 @@
 """The examples of a pipeline run: the Makefile with make, the workflow's steps with bash."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -7,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 
@@ -30,7 +33,7 @@ def checkout(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def shell(command: str, checkout: Path, folder: Path, **env: str) -> Done:
+def shell(command: str, checkout: Path, folder: Path, timeout: float = 120, **env: str) -> Done:
     path = f"{checkout / 'bin'}:{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-euo", "pipefail", "-c", command],
@@ -39,7 +42,7 @@ def shell(command: str, checkout: Path, folder: Path, **env: str) -> Done:
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=timeout,
     )
 
 
@@ -90,3 +93,24 @@ def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
             result = shell(step, checkout, checkout, **env)
             assert result.returncode == 0, (step, result.stderr)
     assert "|" in summary.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="needs CalculiX")
+def test_from_geometry_by_finite_elements_to_all_states(checkout: Path) -> None:
+    """A coarse mesh: dome and hinge in minutes, springs from both, eight certified states."""
+    folder = checkout / "configs" / "pipeline"
+    done = shell("make -j2 -f calibration.mk", checkout, folder, timeout=900)
+    assert done.returncode == 0, done.stderr
+    states = pd.read_parquet(folder / "calibrated" / "states.parquet")
+    assert (states["status"] == "stable").all()
+    assert len(states) == 8
+    bent = states["pattern"] != "000"
+    assert (states["tip_angle_uncertainty_rad"][bent] > 0.0).all()
+    metadata = pq.read_metadata(folder / "calibrated" / "states.parquet").metadata
+    sources = json.loads(metadata[b"dpg.sources"])
+    origins = {key: (origin, rule) for key, _, _, origin, rule in sources}
+    assert origins["bistable_stiffness_N_per_mm"] == ("calibrated", "fitted, dome.yaml")
+    assert origins["hinge_stiffness_N_mm_per_rad"] == ("calibrated", "fitted, hinge.yaml")
+    again = shell("make -f calibration.mk", checkout, folder)
+    assert "dpg" not in again.stdout

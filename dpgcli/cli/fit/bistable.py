@@ -12,6 +12,7 @@ from dpgcli.cli.fit.common import (
     Bootstrap,
     GeometrySpec,
     GeometryValues,
+    LossOption,
     LossScale,
     Output,
     Plot,
@@ -21,6 +22,7 @@ from dpgcli.cli.fit.common import (
     geometry_from,
     known,
     method_of,
+    positive,
     print_fit,
     quality_line,
     tell,
@@ -43,36 +45,48 @@ written, are not the same, and no curve tells how they relate. One of:
                        for example the dome height less the unit separation, as published"""
 
 
+CurvePath = Annotated[
+    Path, typer.Argument(metavar="CURVE", help="CSV: travel with energy, force or pressure")
+]
+OpeningRule = Annotated[
+    str | None,
+    typer.Option(
+        "--travel-to-opening",
+        metavar="RULE",
+        help="equal, proportional:FACTOR or stroke:MM; needed",
+    ),
+]
+QuantityName = Annotated[
+    Quantity | None,
+    typer.Option("--quantity", help="What to fit  [default: energy, else force, else pressure]"),
+]
+Area = Annotated[
+    float | None, typer.Option("--area", metavar="MM2", help="Effective area, for pressure")
+]
+BranchNames = Annotated[
+    Branches, typer.Option("--branches", help="All points, or slow stable pieces only")
+]
+Fix = Annotated[
+    list[str] | None, typer.Option("--fix", metavar="KEY=VALUE", help="Hold a value; repeatable")
+]
+Free = Annotated[
+    list[str] | None,
+    typer.Option("--free", metavar="KEY", help="Fit only this; repeatable  [default: all]"),
+]
+
+
 def bistable(
-    curve: Annotated[
-        Path, typer.Argument(metavar="CURVE", help="CSV: travel with energy, force or pressure")
-    ],
+    curve: CurvePath,
     output: Output = None,
-    travel_to_opening: Annotated[
-        str | None,
-        typer.Option(metavar="RULE", help="equal, proportional:FACTOR or stroke:MM; needed"),
-    ] = None,
-    quantity: Annotated[
-        Quantity | None,
-        typer.Option(help="What to fit  [default: energy, else force, else pressure]"),
-    ] = None,
-    area: Annotated[
-        float | None, typer.Option("--area", metavar="MM2", help="Effective area, for pressure")
-    ] = None,
-    branches: Annotated[
-        Branches, typer.Option(help="All points, or slow stable pieces only")
-    ] = Branches.ALL,
-    fix: Annotated[
-        list[str] | None,
-        typer.Option("--fix", metavar="KEY=VALUE", help="Hold a value; repeatable"),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option("--free", metavar="KEY", help="Fit only this; repeatable  [default: all]"),
-    ] = None,
+    travel_to_opening: OpeningRule = None,
+    quantity: QuantityName = None,
+    area: Area = None,
+    branches: BranchNames = Branches.ALL,
+    fix: Fix = None,
+    free: Free = None,
     geometry: GeometryValues = None,
     spec: GeometrySpec = None,
-    loss: Annotated[Loss, typer.Option(help="How residuals count")] = Loss.LINEAR,
+    loss: LossOption = Loss.LINEAR,
     loss_scale: LossScale = None,
     bootstrap: Bootstrap = 0,
     seed: Seed = 0,
@@ -96,7 +110,7 @@ def bistable(
         area=_area(chosen, area),
         fixed=fixed,
         loss=loss,
-        loss_scale=_positive("--loss-scale", loss_scale),
+        loss_scale=positive("--loss-scale", loss_scale),
         resamples=bootstrap,
         seed=seed,
     )
@@ -187,15 +201,7 @@ def _area(quantity: Quantity, area: float | None) -> float:
         raise UsageError("pressure needs --area MM2, the effective area A in F = p A")
     if quantity is not Quantity.PRESSURE and area is not None:
         raise UsageError(f"--area is for pressure; the fit is to the {quantity}")
-    return _positive("--area", area) or float("nan")
-
-
-def _positive(option: str, value: float | None) -> float | None:
-    from dpgcli.errors import UsageError
-
-    if value is not None and not 0.0 < value < float("inf"):
-        raise UsageError(f"{option} {value:g}: expected a number > 0")
-    return value
+    return positive("--area", area) or float("nan")
 
 
 def _summary(found: "BistableFit", choice: "Choice") -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dpgcli.calibration.choices import Loss
 from dpgcli.cli.options import check_plot
 from dpgcli.cli.printing import Format, printer_of
 from dpgcli.cli.streams import say
@@ -29,6 +30,7 @@ Bootstrap = Annotated[
     typer.Option("--bootstrap", metavar="N", min=0, help="95 % intervals from N resampled fits"),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]
+LossOption = Annotated[Loss, typer.Option("--loss", help="How residuals count")]
 LossScale = Annotated[
     float | None,
     typer.Option(
@@ -83,6 +85,15 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
     if plot is not None:
         check_plot(plot)
     check_outputs([source for source in sources if source is not None], output, plot)
+
+
+def positive(option: str, value: float | None) -> float | None:
+    """An option's number, if there is one, above zero."""
+    from dpgcli.errors import UsageError
+
+    if value is not None and not 0.0 < value < float("inf"):
+        raise UsageError(f"{option} {value:g}: expected a number > 0")
+    return value
 
 
 def geometry_from(values: list[str] | None, spec: Path | None) -> "Geometry | None":

@@ -7,9 +7,13 @@ import typer
 
 from dpgcli.calibration.choices import Method
 from dpgcli.cli.fit.common import (
+    GeometrySpec,
+    GeometryValues,
     Output,
     Printed,
     check_files,
+    geometry_from,
+    known,
     print_rows,
     tell,
     write,
@@ -29,8 +33,10 @@ def grid(
     ],
     output: Output = None,
     method: Annotated[
-        Method, typer.Option(help="Products of powers, or an interpolation")
+        Method, typer.Option("--method", help="Products of powers, or an interpolation")
     ] = Method.SCALING,
+    geometry: GeometryValues = None,
+    spec: GeometrySpec = None,
     printed_as: Printed = Format.TABLE,
     quiet: Quiet = False,
 ) -> None:
@@ -38,12 +44,14 @@ def grid(
     from dpgcli.calibration.grid import Law, Points
     from dpgcli.files.measured import read_table
 
-    check_files((table,), output, None)
+    check_files((table, spec), output, None)
+    shared = known(geometry_from(geometry, spec))
     read = read_table(table)
     law = Law(method, Points(read.over, read.geometry, read.quantities))
     columns, rows = _rows(law)
     warnings = list(_warnings(law, read))
-    _write(output, table, law, read, warnings)
+    elsewhere = {key: value for key, value in shared.items() if key not in read.over}
+    _write(output, table, law, {**elsewhere, **read.constant}, warnings)
     print_rows(columns, rows, printed_as)
     if not quiet:
         tell(_summary(law, read), warnings, output)
@@ -102,15 +110,19 @@ def _warnings(law: "Law", table: "Table") -> list[str]:
 
 
 def _write(
-    output: Path | None, path: Path, law: "Law", table: "Table", warnings: list[str]
+    output: Path | None,
+    path: Path,
+    law: "Law",
+    geometry: dict[str, float],
+    warnings: list[str],
 ) -> None:
-    from dpgcli.files.calibration import geometry_of, source_of
+    """`geometry` is what all points share."""
+    from dpgcli.files.calibration import source_of
     from dpgcli.files.calibration.results import grid_of
 
-    constant = [f"{key}={value!r}" for key, value in table.constant.items()]
     content = {
         "method": f"{law.method} over {', '.join(law.points.over)}",
-        "geometry": geometry_of(constant) if constant else None,
+        "geometry": geometry or None,
         "grid": grid_of(law),
         "warnings": warnings,
         "sources": [source_of(path, len(law.points.geometry))],

@@ -1,0 +1,33 @@
+# From a finger's geometry to all of its states: finite elements of its dome and its hinge, springs
+# fitted to them, every stable state with its uncertainty. Needs CalculiX (ccx) for what is out of
+# date: make -f calibration.mk
+DPG ?= dpg
+OUT ?= calibrated
+SPEC ?= ../three_unit.yaml
+MESH ?= coarse
+# How far a unit opens where its dome rests inverted, mm (assumed: dome height - unit separation).
+STROKE ?= 3.5
+
+.DELETE_ON_ERROR:
+.PHONY: all clean
+all: $(OUT)/states.parquet
+
+$(OUT)/dome/dome.csv: $(SPEC)
+	$(DPG) fe dome $(SPEC) --out $(@D) --mesh $(MESH) --run
+
+$(OUT)/hinge/hinge.csv: $(SPEC)
+	$(DPG) fe hinge $(SPEC) --out $(@D) --mesh $(MESH) --run
+
+$(OUT)/dome.yaml: $(OUT)/dome/dome.csv
+	$(DPG) fit bistable $< --spec $(SPEC) --travel-to-opening stroke:$(STROKE) \
+	  --branches quasi-static --output $@
+
+$(OUT)/hinge.yaml: $(OUT)/hinge/hinge.csv
+	$(DPG) fit hinge $< --spec $(SPEC) --output $@
+
+$(OUT)/states.parquet: $(SPEC) $(OUT)/dome.yaml $(OUT)/hinge.yaml
+	$(DPG) predict $(SPEC) --set 'finger.calibration=[$(OUT)/dome.yaml, $(OUT)/hinge.yaml]' \
+	  --uncertainty --output $@
+
+clean:
+	rm -rf $(OUT)

@@ -1,0 +1,220 @@
+"""Curves and tables from CSV: what is read, and the message of every mistake."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dpgcli.errors import SpecError
+from dpgcli.files.measured import read_curve, read_moments, read_table
+
+DOME = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "elastic_modulus_MPa": 26.0}
+GOOD = "travel_mm,energy_mJ\n0,0\n1,20\n13,68\n"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "c.csv"
+
+
+def problems(error: pytest.ExceptionInfo[SpecError]) -> list[str]:
+    return [str(problem).rpartition("c.csv")[2].lstrip(":") for problem in error.value.problems]
+
+
+def test_columns_in_any_order_with_comments_marks_and_spaces(path: Path) -> None:
+    head = "# from a test\n\n note , energy_mJ, pole_travel_mm ,time_s\n"
+    text = head + "  # more\na,0,0,1\nb, 2e1,1,2\n"
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    found = read_curve(path)
+    assert found.curve.travel.tolist() == [0.0, 1.0]
+    assert found.curve.energy is not None
+    assert found.curve.energy.tolist() == [0.0, 20.0]
+    assert found.curve.time is not None
+    assert found.curve.force is None
+    assert found.ignored == ("note",)
+    assert found.n_rows == 2
+
+
+def test_windows_line_ends(path: Path) -> None:
+    path.write_bytes(GOOD.replace("\n", "\r\n").encode())
+    assert read_curve(path).curve.travel.tolist() == [0.0, 1.0, 13.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "file: expected a header and rows, found nothing"),
+        ("# only a comment\n", "file: expected a header and rows, found nothing"),
+        ("# c\ntravel_mm,energy_mJ\n", "2: file: expected rows below the header, found none"),
+        (
+            "energy_mJ\n1\n",
+            "header: expected a column pole_travel_mm or travel_mm, found energy_mJ",
+        ),
+        (
+            "travel_m,energy_mJ\n0,1\n",
+            "header: expected a column pole_travel_mm or travel_mm, found travel_m, energy_mJ "
+            "(is it travel_m?)",
+        ),
+        (
+            "travel_mm,energy_J\n0,1\n",
+            "header: expected a column energy_mJ or force_N or pressure_MPa, "
+            "found travel_mm, energy_J (is it energy_J?)",
+        ),
+        (
+            "travel_mm,pole_travel_mm,force_N\n0,0,0\n",
+            "header: expected one of pole_travel_mm, travel_mm, found pole_travel_mm and travel_mm",
+        ),
+        (
+            "travel_mm;energy_mJ\n0;1\n",
+            "header: expected a column pole_travel_mm or travel_mm, found travel_mm;energy_mJ "
+            "(separate columns with commas, and write decimal points)",
+        ),
+        (
+            "travel_mm,energy_mJ,energy_mJ\n0,1,1\n",
+            '1: header: expected each column once, found "energy_mJ" again',
+        ),
+        (GOOD + "14\n", "5: row: expected 2 cells, found 1"),
+        (GOOD + "14,70,\n", "5: row: expected 2 cells, found 3"),
+        (GOOD + "14,\n", '5: energy_mJ: expected a number, found ""'),
+        (GOOD + "14,nan\n", '5: energy_mJ: expected a number, found "nan"'),
+        (GOOD + "inf,70\n", '5: travel_mm: expected a number, found "inf"'),
+        (GOOD + "14,70 mJ\n", '5: energy_mJ: expected a number, found "70 mJ"'),
+        (GOOD + "1e300,1\n", '5: travel_mm: expected a number, found "1e300"'),
+        (
+            "travel_mm,energy_mJ\n0,0\n-1,20\n-13,68\n",
+            "travel_mm: expected travels that are positive towards inversion, found -13 to 0",
+        ),
+    ],
+)
+def test_a_mistake_in_a_curve(path: Path, text: str, said: str) -> None:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_curve(path)
+    found = problems(error)
+    assert said in [text.strip() for text in found], found
+
+
+def test_every_mistake_is_said_at_once(path: Path) -> None:
+    path.write_text("travel_mm,energy_mJ\n0,x\n1,nan\ny,2\n", encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_curve(path)
+    assert [text.split(":")[0] for text in problems(error)] == ["2", "3", "4"]
+    path.write_text("speed,temperature\n0,1\n", encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_curve(path)
+    assert len(problems(error)) == 2
+
+
+def test_not_utf8_and_not_there(path: Path) -> None:
+    path.write_bytes(b"\xfftravel")
+    with pytest.raises(SpecError, match="expected text in UTF-8, found byte 0xff"):
+        read_curve(path)
+    with pytest.raises(SpecError, match="expected a readable file, found no such file"):
+        read_curve(path.with_name("none.csv"))
+    with pytest.raises(SpecError, match="expected a readable file, found is a directory"):
+        read_curve(path.parent)
+
+
+@pytest.mark.parametrize(
+    ("column", "largest", "geometry", "said"),
+    [
+        ("travel_mm", 0.0135, {}, "(meters? if it is right, say how large the dome is"),
+        (
+            "travel_mm",
+            0.0135,
+            DOME,
+            "expected a largest value of 0.325 to 130, found 0.0135 (meters?)",
+        ),
+        ("travel_mm", 13500.0, {}, "(micrometers?"),
+        ("energy_mJ", 0.068, {}, "(joules?"),
+        ("energy_mJ", 0.068, DOME, "found 0.068 (joules?)"),
+        ("energy_mJ", 68000.0, DOME, "found 6.8e+04 (microjoules?)"),
+        ("pressure_MPa", 150.0, {}, "(kPa or Pa?"),
+        ("pressure_MPa", 150000.0, DOME, "(kPa or Pa?)"),
+        ("force_N", 40000.0, {}, "(millinewtons?"),
+    ],
+)
+def test_another_unit_is_suspected(
+    path: Path, column: str, largest: float, geometry: dict[str, float], said: str
+) -> None:
+    other = "energy_mJ" if column == "travel_mm" else "travel_mm"
+    path.write_text(f"{column},{other}\n0,0\n{largest},14\n", encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_curve(path, geometry)
+    assert said in problems(error)[0]
+
+
+def test_a_small_dome_is_no_mistake_where_the_geometry_says_so(path: Path) -> None:
+    path.write_text("travel_mm,force_N\n0,0\n0.06,1\n", encoding="utf-8")
+    assert read_curve(path, {"dome_height_mm": 0.03}).n_rows == 2
+
+
+MOMENTS = 'variant,moment_N_mm,rotation_rad,note\n"a, b",2.5,0.1,1\n"a, b",5,0.2,2\nc,5,0.3,3\n'
+
+
+def test_moments_of_one_variant(path: Path) -> None:
+    path.write_text(MOMENTS, encoding="utf-8")
+    found = read_moments(path, "variant=a, b")
+    assert found.moment.tolist() == [2.5, 5.0]
+    assert found.texts == {"variant": ("a, b", "a, b")}
+    assert found.ignored == ("note",)
+    assert len(read_moments(path).moment) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "said"),
+    [
+        (MOMENTS, "variant=d", "--where: expected a text of variant, found 'd' (a, b; c)"),
+        (MOMENTS, "varian=c", "header: expected a column varian, found variant, moment_N_mm"),
+        (MOMENTS, "variant", "--where: expected COLUMN=TEXT, found 'variant'"),
+        ("moment_N_m,rotation_rad\n1,1\n", None, "expected a column moment_N_mm"),
+        ("moment_N_mm,angle\n1,1\n", None, "expected a column rotation_rad or rotation_mid"),
+        ("moment_N_mm,rotation_rad\n5,10.3\n", None, "found 10.3 (degrees?)"),
+        ("moment_N_mm,rotation_rad\n0.005,0.2\n", None, "found 0.005 (N m?)"),
+        ("moment_N_mm,rotation_rad\n5,\n", None, '2: rotation_rad: expected a number, found ""'),
+    ],
+)
+def test_a_mistake_in_moments(path: Path, text: str, where: str | None, said: str) -> None:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_moments(path, where)
+    assert said in problems(error)[0]
+
+
+def test_a_table_over_geometries(path: Path) -> None:
+    path.write_text(
+        "name,elastic_modulus_MPa,stroke_mm,dome_height_mm,limit_pressure_MPa\n"
+        "a,26,3.5,6.5,0.15\nb,26,4.5,7.5,0.18\n",
+        encoding="utf-8",
+    )
+    found = read_table(path)
+    assert found.over == ("dome_height_mm",)
+    assert np.array_equal(found.geometry, [[6.5], [7.5]])
+    assert {key: values.tolist() for key, values in found.quantities.items()} == {
+        "stroke_mm": [3.5, 4.5],
+        "limit_pressure_MPa": [0.15, 0.18],
+    }
+    assert found.constant == {"elastic_modulus_MPa": 26.0}
+    assert found.ignored == ("name",)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("height,stroke_mm\n1,1\n", "expected a column of the geometry, such as dome_height_mm"),
+        ("dome_height_mm,name\n1,a\n", "expected a column of a quantity, such as bistable_stiff"),
+        ("dome_height_mm,stroke_mm\n1,0\n2,1\n", "2: stroke_mm: expected a number > 0, since log"),
+        ("dome_height_mm,stroke_mm\n-1,1\n2,1\n", "2: dome_height_mm: expected a number > 0"),
+        (
+            "dome_height_mm,stroke_mm\n1,1\n2,2\n1,1\n",
+            "4: geometry: expected each geometry once, found that of line 2 again",
+        ),
+        ("dome_height_mm,stroke_mm\n1,1\n2,x\n", '3: stroke_mm: expected a number, found "x"'),
+        ("dome_height_mm,stroke_mm\n1,1\n", "file: expected geometries that differ, found one"),
+    ],
+)
+def test_a_mistake_in_a_table(path: Path, text: str, said: str) -> None:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        read_table(path)
+    assert said in problems(error)[0]
