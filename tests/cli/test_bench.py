@@ -96,7 +96,7 @@ def test_the_models_own_error(call: Any, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("pattern,tip_x_mm\n111,3\n", "a column tip_y_mm, found pattern, tip_x_mm"),
+        ("pattern,tip_x_mm\n111,3\n", "a column tip_x_mm and tip_y_mm, or tip_angle_rad, found"),
         ("pattern,tip_x_mm,tip_y_mm\n", "expected rows below the header, found none"),
         (
             "pattern,tip_x_mm,tip_y_mm\n11,1,2\n",

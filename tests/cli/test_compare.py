@@ -102,6 +102,26 @@ def test_what_makes_no_sense(
     assert result.stdout == ""
 
 
+PUBLISHED = """\
+finger:
+  units: 3
+  linear_stiffness_N_per_mm: 1.0e4
+  lattice:
+    segment_length_mm: 13.75
+    segment_height_mm: 10.75
+    stroke_mm: 3.5
+    bistable_stiffness_N_per_mm: 12.84
+    force_linearity: 0.043
+    hinge_stiffness_N_mm_per_rad: 24.2
+"""
+TIPS = """\
+pattern,tip_x_mm,tip_y_mm,tip_angle_rad,seconds
+000,51.99976,-0.00817,-0.000297,22.5
+001,51.36669,-3.44429,-0.266250,22.5
+010,50.85420,-7.16644,-0.274989,22.5
+100,50.46532,-10.33568,-0.263758,22.5
+110,47.71870,-16.52155,-0.524182,22.5
+"""
 PHALANGES = """\
 pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,chamber4_angle_rad,\
 opening1_mm,opening2_mm,opening3_mm,push1_N,push2_N,push3_N
@@ -118,16 +138,24 @@ values: {segment_height_mm: {value: 12.33}}
 
 
 @pytest.fixture
+def published(folder: Path) -> tuple[str, ...]:
+    """The same finger with the study's springs, of which tips are known."""
+    (folder / "study.yaml").write_text(PUBLISHED)
+    (folder / "tips.csv").write_text(TIPS)
+    return ("compare", "study.yaml", "tips.csv", *FRAME)
+
+
+@pytest.fixture
 def lever(folder: Path) -> str:
     (folder / "lever.yaml").write_text(LEVER)
     return "lever.yaml"
 
 
 @pytest.fixture
-def phalanges(arguments: tuple[str, ...], folder: Path) -> tuple[str, ...]:
+def phalanges(published: tuple[str, ...], folder: Path) -> tuple[str, ...]:
     """The comparison with a file that has angles, openings and pushes, too."""
     (folder / "phalanges.csv").write_text(PHALANGES)
-    return (*arguments[:2], "phalanges.csv", *arguments[3:])
+    return (*published[:2], "phalanges.csv", *published[3:])
 
 
 def test_angles_openings_and_pushes_are_held_against_the_lattices(
@@ -148,8 +176,8 @@ def test_angles_openings_and_pushes_are_held_against_the_lattices(
     assert "max_shape_error_mm" not in found
 
 
-def test_data_without_them_have_no_such_columns(call: Any, arguments: tuple[str, ...]) -> None:
-    found = rows(call(*arguments, "--format", "json", "-q").stdout)["100"]
+def test_data_without_them_have_no_such_columns(call: Any, published: tuple[str, ...]) -> None:
+    found = rows(call(*published, "--format", "json", "-q").stdout)["100"]
     assert [name for name in found if "error" in name] == [
         "error_mm",
         "error_percent",
@@ -157,12 +185,12 @@ def test_data_without_them_have_no_such_columns(call: Any, arguments: tuple[str,
     ]
 
 
-def test_both_errors_with_a_calibration(call: Any, arguments: tuple[str, ...], lever: str) -> None:
-    result = call(*arguments, "--calibration", lever, "--format", "json")
+def test_both_errors_with_a_calibration(call: Any, published: tuple[str, ...], lever: str) -> None:
+    result = call(*published, "--calibration", lever, "--format", "json")
     found = rows(result.stdout)
-    plain = rows(call(*arguments, "--format", "json", "-q").stdout)
+    plain = rows(call(*published, "--format", "json", "-q").stdout)
     other = ("-s", "finger.lattice.segment_height_mm=12.33")
-    better = rows(call(*arguments, *other, "--format", "json", "-q").stdout)
+    better = rows(call(*published, *other, "--format", "json", "-q").stdout)
     for pattern, row in found.items():
         for name in ("error_mm", "error_percent", "angle_error_rad"):
             assert row[name] == plain[pattern][name]
@@ -173,24 +201,24 @@ def test_both_errors_with_a_calibration(call: Any, arguments: tuple[str, ...], l
 
 
 def test_a_spec_that_refers_to_the_file_is_as_good(
-    call: Any, arguments: tuple[str, ...], lever: str
+    call: Any, published: tuple[str, ...], lever: str
 ) -> None:
-    beside = rows(call(*arguments, "--calibration", lever, "--format", "json", "-q").stdout)
+    beside = rows(call(*published, "--calibration", lever, "--format", "json", "-q").stdout)
     within = ("-s", f"finger.calibration={lever}", "-s", "finger.lattice.segment_height_mm=null")
-    found = rows(call(*arguments, *within, "--format", "json", "-q").stdout)
+    found = rows(call(*published, *within, "--format", "json", "-q").stdout)
     assert {p: row["error_mm"] for p, row in found.items()} == {
         p: row["calibrated_error_mm"] for p, row in beside.items()
     }
 
 
 def test_shapes_are_held_against_the_layer(
-    call: Any, arguments: tuple[str, ...], folder: Path
+    call: Any, published: tuple[str, ...], folder: Path
 ) -> None:
     """The straight finger's layer is 0.75 mm below its stations; its points are off by 0.2 mm."""
     (folder / "shapes.csv").write_text(
         "pattern,x_mm,y_mm\n000,0,0\n000,20,0.2\n000,40,-0.2\n000,51,0\n"
     )
-    result = call(*arguments, "--shapes", "shapes.csv", "--format", "json")
+    result = call(*published, "--shapes", "shapes.csv", "--format", "json")
     found = rows(result.stdout)
     assert found["000"]["max_shape_error_mm"] == pytest.approx(0.2, abs=1e-9)
     rms = math.sqrt(2 * 0.2**2 / 4)
@@ -199,11 +227,11 @@ def test_shapes_are_held_against_the_layer(
     assert "shapes 0.2 mm at worst" in result.stderr
 
 
-def test_a_figure_of_both(call: Any, arguments: tuple[str, ...], lever: str, folder: Path) -> None:
+def test_a_figure_of_both(call: Any, published: tuple[str, ...], lever: str, folder: Path) -> None:
     names = ("one.svg", "both.svg", "again.svg")
     with_file = ("--calibration", lever)
     for name, options in zip(names, ((), with_file, with_file), strict=True):
-        assert call(*arguments, *options, "--plot", name, "-q").exit_code == ExitCode.DONE
+        assert call(*published, *options, "--plot", name, "-q").exit_code == ExitCode.DONE
     one, both, again = ((folder / name).read_bytes() for name in names)
     assert both == again
     assert len(both) > len(one)
@@ -225,18 +253,18 @@ def test_a_figure_of_both(call: Any, arguments: tuple[str, ...], lever: str, fol
     ],
 )
 def test_a_calibration_that_cannot_be_used(
-    call: Any, arguments: tuple[str, ...], folder: Path, content: str | None, said: str
+    call: Any, published: tuple[str, ...], folder: Path, content: str | None, said: str
 ) -> None:
     if content is not None:
         (folder / "cal.yaml").write_text(content)
-    result = call(*arguments, "--calibration", "cal.yaml")
+    result = call(*published, "--calibration", "cal.yaml")
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr
     assert result.stdout == ""
 
 
 def test_a_domes_curve_is_not_a_stroke_of_domes_that_push(
-    call: Any, arguments: tuple[str, ...], folder: Path
+    call: Any, published: tuple[str, ...], folder: Path
 ) -> None:
     """Its stroke is that of the dome's travel, while the push-only law counts from contact."""
     travel = [0.1 * place for place in range(150)]
@@ -259,11 +287,11 @@ def test_a_domes_curve_is_not_a_stroke_of_domes_that_push(
     (folder / "dome.yaml").write_text(json.dumps(dome))
     pushing = ["law=push_only", "calibration=dome.yaml", "geometry.dome_height_mm=6.5"]
     settings = [word for key in pushing for word in ("-s", f"finger.{key}")]
-    assert call(*arguments, *settings).exit_code == ExitCode.DONE
-    result = call(*arguments, *settings, "--calibration", "dome.yaml")
+    assert call(*published, *settings).exit_code == ExitCode.DONE
+    result = call(*published, *settings, "--calibration", "dome.yaml")
     assert result.exit_code == ExitCode.USAGE
     assert "take -s finger.calibration=dome.yaml instead" in result.stderr
-    assert call(*arguments, "--calibration", "dome.yaml").exit_code == ExitCode.DONE
+    assert call(*published, "--calibration", "dome.yaml").exit_code == ExitCode.DONE
 
 
 @pytest.mark.parametrize(
@@ -274,21 +302,21 @@ def test_a_domes_curve_is_not_a_stroke_of_domes_that_push(
         (("--tip-offset", "1e300,0"), "--tip-offset 1e300,0: expected two numbers in mm"),
         (("--tip-offset", "1,2,3"), "--tip-offset 1,2,3: expected two numbers in mm"),
         (("--shapes", "none.csv"), "none.csv: file: expected a readable file"),
-        (("--shapes", "three_gap_finger.csv"), "header: expected a column x_mm, y_mm"),
+        (("--shapes", "tips.csv"), "header: expected a column x_mm"),
         (("-s", "finger.law=tabulated"), "finger.law: expected a calibration with a curve"),
     ],
 )
 def test_what_else_makes_no_sense(
-    call: Any, arguments: tuple[str, ...], options: tuple[str, ...], said: str
+    call: Any, published: tuple[str, ...], options: tuple[str, ...], said: str
 ) -> None:
-    result = call(*arguments, *options)
+    result = call(*published, *options)
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr
     assert result.stdout == ""
 
 
 @pytest.mark.parametrize("law", ["published", "push_only"])
-def test_the_law_is_named(call: Any, arguments: tuple[str, ...], law: str) -> None:
-    result = call(*arguments, "-s", f"finger.law={law}")
+def test_the_law_is_named(call: Any, published: tuple[str, ...], law: str) -> None:
+    result = call(*published, "-s", f"finger.law={law}")
     description = {"published": "published law", "push_only": "push-only law"}[law]
     assert f"errors of the model ({description}" in result.stderr

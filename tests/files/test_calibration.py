@@ -80,6 +80,11 @@ def test_what_is_written_is_read_back(path: Path) -> None:
     assert read_calibration(again) == found
 
 
+def test_what_data_do_not_tell_may_have_a_huge_error(path: Path) -> None:
+    found = read(path, WHOLE.replace("standard_error: 0.31", "standard_error: 1.0e+23"))
+    assert found.uncertain["bistable_stiffness_N_per_mm"] == 1e23
+
+
 def test_other_processes_can_have_it(path: Path) -> None:
     found = read(path, WHOLE)
     assert found.grid is not None
