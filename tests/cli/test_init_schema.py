@@ -59,9 +59,11 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str
         schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
     if "anyOf" in schema:
         found = [faults(value, option, root) for option in schema["anyOf"]]
-        return [] if [] in found else found[0]
+        if [] not in found:
+            return found[0]
     kinds: dict[str, Any] = {
         "object": dict,
+        "array": list,
         "integer": int,
         "number": (int, float),
         "string": str,

@@ -6,7 +6,7 @@ A section or value that is null counts as absent.
 import re
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, JsonValue
 from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.files.calibration.models import Calibration
@@ -20,6 +20,7 @@ from dpgcli.files.sections import (
     UnitLattice,
 )
 
+BARS: list[JsonValue] = [{"required": ["linear_stiffness_N_per_mm"]}, {"required": ["calibration"]}]
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
 MAX_UNITS = 64
 UNIT_RANGE = re.compile(r"([0-9]{1,4})(?: *- *([0-9]{1,4}))?")
@@ -34,6 +35,8 @@ class UnitOverride(Section):
 
 class FingerSpec(Section):
     """One finger."""
+
+    model_config = ConfigDict(json_schema_extra={"anyOf": BARS})
 
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."

@@ -16,7 +16,7 @@ from dpgcli.files.spec.models import (
     Spec,
     UnitOverride,
 )
-from dpgcli.files.spec.scenes import issues, range_issues, unit_range
+from dpgcli.files.spec.scenes import early_issues, issues, unit_range
 
 SECTIONS: dict[KeyPath, type[Section]] = {
     (): Spec,
@@ -63,7 +63,7 @@ def checked(document: Document) -> Spec:
     """
     spec, problems = _validated(document)
     problems = [*document.problems, *problems]
-    found = range_issues(document.data) if spec is None or problems else issues(spec)
+    found = early_issues(document.data) if spec is None or problems else issues(spec)
     problems += [document.problem(*issue) for issue in found]
     if spec is None or problems:
         own_first = sorted(problems, key=lambda problem: problem.file != document.file)

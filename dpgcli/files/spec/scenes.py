@@ -15,6 +15,7 @@ from dpgcli.files.places import KeyPath, Place, dotted, located
 from dpgcli.files.spec.derivations import (
     DERIVATIONS,
     LINEAR_STIFFNESS,
+    PUBLISHED,
     SEGMENT_HEIGHT,
     STROKE,
     Group,
@@ -34,7 +35,12 @@ from dpgcli.mechanics.laws import PUBLISHED as PUBLISHED_LAW
 from dpgcli.mechanics.scene import Gripper, Origin, Scene, Source
 
 SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
-BARS_HINT = "the study calls the bars nearly rigid: 1.0e4; .inf is rigid"
+NO_BARS = Issue(
+    ("finger", LINEAR_STIFFNESS),
+    "a stiffness > 0 in N/mm, or .inf",
+    "nothing",
+    "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+)
 
 
 @dataclass
@@ -73,6 +79,17 @@ def _gripper(spec: Spec) -> Gripper | None:
         return None
     angle = math.radians(spec.gripper.mounting_angle_deg)
     return Gripper(spec.gripper.base_spacing_mm, angle)
+
+
+def early_issues(data: Any) -> list[Issue]:
+    """What can be said of data whose keys are not all right by themselves."""
+    finger = data.get("finger") if isinstance(data, dict) else None
+    is_bare = (
+        isinstance(finger, dict)
+        and finger.get(LINEAR_STIFFNESS) is None
+        and finger.get("calibration") in (None, PUBLISHED)
+    )
+    return [*range_issues(data), *([NO_BARS] if is_bare else [])]
 
 
 def range_issues(data: Any) -> list[Issue]:
@@ -152,8 +169,7 @@ def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
         if isinstance(calibration, Calibration) and (found := calibration.fitted(LINEAR_STIFFNESS)):
             rule = f"{found.verb}, {calibration.file}"
             return Value(found.value, Origin.CALIBRATED, rule, found.standard_error, place)
-    path: KeyPath = ("finger", LINEAR_STIFFNESS)
-    return Issue(path, "a stiffness > 0 in N/mm, or .inf", "nothing", BARS_HINT)
+    return NO_BARS
 
 
 def _shares(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Iterator[Share]:
