@@ -137,10 +137,10 @@ def _dimensions(
     path: Path, settings: list[str] | None, keys: Sequence[str], quiet: bool
 ) -> list[float]:
     """The values of some keys of the spec's geometry, and a word on those of single units."""
-    from dpgcli.files.spec import read_spec
+    from dpgcli.files.spec import read_keys
     from dpgcli.files.spec.dimensions import dimensions, overridden
 
-    spec = read_spec(path, settings or ())
+    spec = read_keys(path, settings or ())
     values = dimensions(spec, str(path), keys, "dpg fe builds its mesh from it")
     if not quiet and (units := overridden(spec, keys)):
         say(f"geometry of the whole finger; units {', '.join(units)} differ: --set their values")

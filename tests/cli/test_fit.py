@@ -316,3 +316,17 @@ def test_an_interrupt_while_writing_leaves_the_old_file(
     assert "nothing half-written is left" in result.stderr
     assert (folder / "d.yaml").read_text() == "old"
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_the_geometry_of_a_spec_whose_calibration_is_yet_to_be_made(
+    call: Any, fit: Any, folder: Path
+) -> None:
+    """From finite elements to a fit to a spec that names it: nothing waits for itself."""
+    text = (folder / "three_unit.yaml").read_text()
+    named = text.replace("calibration: published", "calibration: [dome.yaml, published]")
+    (folder / "new.yaml").write_text(named)
+    assert call("predict", "new.yaml").exit_code == ExitCode.USAGE
+    assert call("fe", "hinge", "new.yaml", "--out", "deck", "-q").exit_code == ExitCode.DONE
+    options = ("--travel-to-opening", "stroke:3.5", "--spec", "new.yaml", "-o", "dome.yaml", "-q")
+    assert fit("bistable", PATH, *options).exit_code == ExitCode.DONE
+    assert call("predict", "new.yaml", "-q").exit_code == ExitCode.DONE

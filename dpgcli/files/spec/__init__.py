@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec.models import Spec
-from dpgcli.files.spec.problems import checked
+from dpgcli.files.spec.problems import checked, checked_keys
 from dpgcli.files.spec.references import with_calibrations
 from dpgcli.files.spec.scenes import scene_of
 from dpgcli.files.spec.settings import changed, with_settings
@@ -21,6 +21,7 @@ __all__ = [
     "Spec",
     "canonical_json",
     "json_schema",
+    "read_keys",
     "read_scene",
     "read_spec",
     "scene_of",
@@ -37,6 +38,14 @@ def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
     Raises SpecError with all problems at once, those of content after those of form are mended.
     """
     return checked(read_scene(path, settings))
+
+
+def read_keys(path: str | Path, settings: Sequence[str] = ()) -> Spec:
+    """Read a spec key by key: rules between keys wait, and calibrations need not exist yet.
+
+    For what comes before them in the making: finite elements, fits. Raises SpecError.
+    """
+    return checked_keys(with_settings(read_document(path), settings))
 
 
 def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:

@@ -71,6 +71,14 @@ def checked(document: Document) -> Spec:
     return spec
 
 
+def checked_keys(document: Document) -> Spec:
+    """The spec in a document, each of whose keys is right by itself; raises SpecError."""
+    spec, problems = _validated(document)
+    if spec is None or document.problems:
+        raise SpecError(in_order([*document.problems, *problems]))
+    return spec
+
+
 def _validated(document: Document) -> tuple[Spec | None, list[Problem]]:
     """The spec if each key is right; what the reader reported already is not reported again."""
     try:
