@@ -54,13 +54,15 @@ def compare(
 ) -> None:
     """Hold predictions against finite elements or measurements."""
     from dpgcli.calibration.comparison import columns, compare, rows
-    from dpgcli.files.known_states import read_states
+    from dpgcli.files.known_states import check_scale, read_states
     from dpgcli.files.output import check_outputs
     from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.states.solve import reach
 
     scene = scene_of(read_spec(spec, settings or ()))
     finger, frame = scene.finger, frame_of(first_station, tip_offset)
     known = read_states(data, finger.n_units, shapes)
+    check_scale(data, known, float(reach(finger)[0]))
     better = None if calibration is None else _calibrated(finger, calibration)
     if plot is not None:
         check_plot(plot)
@@ -113,6 +115,8 @@ def _summary(
         yield from _errors(calibrated, f"calibrated, {finger.law.description}")
     if np.isfinite(known.seconds).any():
         yield _times(finger, known)
+    if known.unused:
+        yield f"columns not used: {', '.join(known.unused)}"
 
 
 def _errors(found: "Comparison", what: str) -> Iterator[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.places import Place, located
 from dpgcli.files.sheet import Sheet, read_sheet
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -16,6 +17,7 @@ TIP_ANGLE = "tip_angle_rad"
 SECONDS = "seconds"
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
+FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
 def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownStates:
@@ -43,7 +45,31 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
         pushes=_columns(sheet, _by_unit("push{}_N", n_units)),
         seconds=_columns(sheet, [SECONDS])[0],
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
+        unused=_unused(sheet, n_units),
     )
+
+
+def check_scale(file: Path, known: KnownStates, length: float) -> None:
+    """Raise SpecError for tips and angles that cannot be those of a finger this long (mm)."""
+    place, problems = Place(str(file)), []
+    reach = np.max(np.hypot(*known.tip), initial=0.0, where=np.isfinite(known.tip).all(axis=0))
+    if reach > 0.0 and not length / FARTHEST < reach < length * FARTHEST:
+        hint = "meters?" if reach < length else "micrometers?"
+        expected = f"tips of a finger {length:.4g} mm long, in mm"
+        found = f"the farthest at {reach:.3g} from the origin"
+        problems.append(located(place, "tip_x_mm", expected, found, hint))
+    turn = np.max(np.abs(known.angles), initial=0.0, where=np.isfinite(known.angles))
+    if turn > np.pi * len(known.patterns):  # a unit has two corners of less than 90 degrees
+        expected = f"angles of {len(known.patterns)} units in rad"
+        problems.append(located(place, TIP_ANGLE, expected, f"{turn:.3g}", "degrees?"))
+    if problems:
+        raise SpecError(tuple(problems))
+
+
+def _unused(sheet: Sheet, n_units: int) -> tuple[str, ...]:
+    used = {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units)}
+    used |= {*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units)}
+    return tuple(name for name in sheet.names if name not in used)
 
 
 def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:

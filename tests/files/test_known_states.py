@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import SpecError
-from dpgcli.files.known_states import read_states
+from dpgcli.files.known_states import check_scale, read_states
 
 WHOLE = """\
 # by finite elements
@@ -216,3 +216,29 @@ def test_a_file_that_is_not_there_or_no_file(tmp_path):
     for path, said in ((tmp_path / "no.csv", "no such file"), (tmp_path, "is a directory")):
         with pytest.raises(SpecError, match=f"expected a readable file, found {said}"):
             read_states(path, 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("pattern,tip_x_mm,tip_y_mm\n11,0.026,-0.006\n", "the farthest at 0.0267"),
+        ("pattern,tip_x_mm,tip_y_mm\n11,0.026,-0.006\n", "(meters?)"),
+        ("pattern,tip_x_mm,tip_y_mm\n11,26000,-6000\n", "(micrometers?)"),
+        ("pattern,tip_angle_rad\n11,-34.7\n", "units in rad, found 34.7 (degrees?)"),
+    ],
+)
+def test_other_units_are_recognized(write, text, said):
+    path = write(text)
+    with pytest.raises(SpecError) as error:
+        check_scale(path, read_states(path, 2), 27.0)
+    assert said in str(error.value)
+
+
+def test_tips_of_a_finger_pass_in_any_frame(write):
+    path = write("pattern,tip_x_mm,tip_y_mm,tip_angle_rad\n11,126,-6,-0.6\n00,,,\n")
+    check_scale(path, read_states(path, 2), 27.0)
+
+
+def test_columns_that_are_not_used_are_named(write):
+    text = "pattern,tip_x_mm,openning1_mm,tip_y_mm,opening3_mm\n11,26,3,-6,3\n"
+    assert read_states(write(text), 2).unused == ("openning1_mm", "opening3_mm")

@@ -58,9 +58,10 @@ def finger(
     """Fit lattice values to tips or angles of known states."""
     from dpgcli.calibration.finger import FingerFit
     from dpgcli.files.calibration import geometry_of, source_of
-    from dpgcli.files.known_states import read_states
+    from dpgcli.files.known_states import check_scale, read_states
     from dpgcli.files.spec import read_scene, scene_of
     from dpgcli.files.spec.problems import checked as checked_spec
+    from dpgcli.states.solve import reach
 
     check_files((spec, data), output, plot)
     document = read_scene(spec, settings or ())
@@ -70,10 +71,13 @@ def finger(
     where = geometry_of(geometry, where) if geometry else where
     base = scene_of(checked).finger
     known = read_states(data, base.n_units)
+    check_scale(data, known, float(reach(base)[0]))
     frame = frame_of(first_station, tip_offset)
     study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss)
     found = study.fit(bootstrap, seed)
     warnings = [*found.warnings, *([] if where else [NO_GEOMETRY.replace("--spec", "in the spec")])]
+    if known.unused:
+        warnings.append(f"columns not used: {', '.join(known.unused)}")
     content = {
         "method": _method(study, found, bootstrap, seed),
         **_fitted(found, UNITS[target], source_of(data, known.patterns.shape[1])),
