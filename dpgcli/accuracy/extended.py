@@ -22,9 +22,7 @@ from dpgcli.accuracy.extended_energy import (
 )
 from dpgcli.accuracy.extended_units import Unit, Well, extended_units, inverted_well
 from dpgcli.arrays import Array, Flags
-from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.laws import Published
 
 if TYPE_CHECKING:
     from mpmath import mpf
@@ -60,15 +58,6 @@ class ExtendedStates:
     condition: Array
     is_minimum: Flags
     in_pattern: Flags
-
-
-def check_law(finger: Finger) -> None:
-    """Raise UsageError for domes of another law than the energy in extended precision has."""
-    if not isinstance(finger.law, Published):
-        raise UsageError(
-            f"the reference in extended precision has the published law only, not the "
-            f"{finger.law.description}: take -s finger.law=published"
-        )
 
 
 def extended_states(

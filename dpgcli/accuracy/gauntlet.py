@@ -10,7 +10,6 @@ from itertools import product
 
 import numpy as np
 
-from dpgcli.accuracy.extended import check_law
 from dpgcli.accuracy.families import (
     FAMILIES,
     PATTERNS,
@@ -22,9 +21,19 @@ from dpgcli.accuracy.families import (
 from dpgcli.arrays import Flags
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.mechanics.laws import Published
 from dpgcli.states.plan import FORMULATIONS
 
 BUILT_IN, GIVEN = "built-in", "spec"
+
+
+def check_law(finger: Finger) -> None:
+    """Raise UsageError for domes of another law than the energy in extended precision has."""
+    if not isinstance(finger.law, Published):
+        raise UsageError(
+            f"the reference in extended precision has the published law only, not the "
+            f"{finger.law.description}: take -s finger.law=published"
+        )
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.accuracy.extended import ExtendedStates, check_law, extended_states
+from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.families import repeated
+from dpgcli.accuracy.gauntlet import check_law
 from dpgcli.accuracy.ladder import Found, Way, other_ways, ways
 from dpgcli.accuracy.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.arrays import Array, Flags, keep_freed_memory
