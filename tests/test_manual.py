@@ -79,30 +79,32 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 
 
-def sessions() -> list[tuple[str, str]]:
-    """Commands of the console blocks with their output."""
-    found = []
-    for block in blocks("console"):
-        for part in block.split("$ ")[1:]:
-            command, _, output = part.partition("\n")
-            found.append((command, output))
-    return found
+def sessions() -> list[list[tuple[str, str]]]:
+    """Commands of each console block with their output."""
+    return [
+        [part.partition("\n")[::2] for part in block.split("$ ")[1:]] for block in blocks("console")
+    ]
 
 
-@pytest.mark.parametrize(("command", "expected"), sessions(), ids=lambda text: text[:60])
-def test_a_session_prints_what_the_manual_shows(command: str, expected: str) -> None:
-    program, *arguments = shlex.split(command)
-    assert program == "dpg"
+@pytest.mark.parametrize("session", sessions(), ids=lambda session: session[0][0][:60])
+def test_a_session_prints_what_the_manual_shows(
+    session: list[tuple[str, str]], tmp_path: Path
+) -> None:
+    """Its commands one after the other, in a folder of its own beside the examples."""
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
     run = "from dpgcli.cli.main import main; main()"
-    result = subprocess.run(
-        [sys.executable, "-c", run, *arguments],
-        cwd=ROOT,
-        env={**os.environ, "NO_COLOR": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert LAST_DIGITS.sub("#", result.stdout) == LAST_DIGITS.sub("#", expected)
+    for command, expected in session:
+        program, *arguments = shlex.split(command)
+        assert program == "dpg"
+        result = subprocess.run(
+            [sys.executable, "-c", run, *arguments],
+            cwd=tmp_path,
+            env={**os.environ, "NO_COLOR": "1"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert LAST_DIGITS.sub("#", result.stdout) == LAST_DIGITS.sub("#", expected)
 
 
 def test_the_spec_shown_is_valid(tmp_path: Path) -> None:

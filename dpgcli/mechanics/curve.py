@@ -29,8 +29,8 @@ class Curve:
 
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
     Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
-    the well, where the slope vanishes: the last minimum and the maximum before it, NaN where
-    there is none.
+    the well, where the slope vanishes: the highest maximum that a minimum follows, and the lowest
+    minimum after it; NaN where there is none.
     """
 
     knots: Array
@@ -112,9 +112,11 @@ def _continued(travel: Array, value: Array, beyond: Array) -> Array:
 
 
 def _rests(cubic: "CubicSpline") -> tuple[float, float]:
-    roots = [float(root) for root in cubic.derivative().roots(extrapolate=False)]
-    wells = [root for root in roots if root > 0.0 and cubic(root, 2) > 0.0]
-    if not wells:
+    """The highest top that a minimum follows, and the lowest minimum after it: ripples pass."""
+    roots = [float(root) for root in cubic.derivative().roots(extrapolate=False) if root > 0.0]
+    wells = [root for root in roots if cubic(root, 2) > 0.0]
+    tops = [root for root in roots if cubic(root, 2) < 0.0 and root < max(wells, default=0.0)]
+    if not tops:
         return np.nan, np.nan
-    tops = [root for root in roots if 0.0 < root < wells[-1] and cubic(root, 2) < 0.0]
-    return (tops[-1], wells[-1]) if tops else (np.nan, np.nan)
+    top = max(tops, key=cubic)
+    return top, min((well for well in wells if well > top), key=cubic)

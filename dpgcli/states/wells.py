@@ -78,7 +78,7 @@ def inverted_wells(finger: Finger) -> Wells:
 
 
 def _searched_wells(finger: Finger) -> Wells:
-    """The outermost well of any law: sign changes of de/dx on a grid, then bisection."""
+    """The inverted well of any law: sign changes of de/dx on a grid, then bisection."""
     lever = 2.0 * finger.segment_height
     whole = finger.stroke + finger.contact_travel
     widest = np.minimum(1.5 * whole - finger.contact_travel, (1.0 - 1e-9) * lever)
@@ -87,12 +87,17 @@ def _searched_wells(finger: Finger) -> Wells:
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
     grid = lowest + (widest - lowest) * shares
     pulls = _rigid_slope(finger, grid) >= 0.0
+    energy = _rigid_energy(finger, grid)[:-1]
     places = np.arange(SEARCHED - 1)[:, None, None]
-    # the last place where a push gives way to a pull, and the last where it began before that
-    wells = np.where(~pulls[:-1] & pulls[1:], places, -1).max(axis=0)
-    tops = np.where(pulls[:-1] & ~pulls[1:] & (places < wells), places, -1).max(axis=0)
-    exists = wells >= 0
-    well = _bisected(finger, grid, np.maximum(wells, 0), rises=True)
+    is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
+    last = np.where(is_well, places, -1).max(axis=0)
+    # the highest top that a well follows, and the lowest well after it: ripples do not count
+    is_top &= places < last
+    tops = np.where(is_top.any(axis=0), np.where(is_top, energy, -np.inf).argmax(axis=0), -1)
+    is_well &= places > tops
+    wells = np.where(is_well, energy, np.inf).argmin(axis=0)
+    exists = is_well.any(axis=0) & np.isfinite(finger.law.rests(finger.domes).well)
+    well = _bisected(finger, grid, wells, rises=True)
     top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     extension = np.where(exists, well, np.minimum(stroke, widest))

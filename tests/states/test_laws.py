@@ -157,3 +157,20 @@ def test_dropping_the_bars_stays_within_its_bound(graded_finger: Fingers, law: L
             found["tip_x_mm"] - exact["tip_x_mm"], found["tip_y_mm"] - exact["tip_y_mm"]
         )
         assert moved[stable].max() <= bound
+
+
+def test_ripples_at_the_end_of_a_curve_are_no_wells(reference_finger: Fingers) -> None:
+    """A record that ends with noise keeps the well that it has."""
+    travel = np.linspace(0.0, 1.3, 60)
+    energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
+    noisy = energy.copy()
+    noisy[-3:] += [0.0, -0.02, 0.0]
+    assert spline(tuple(travel), tuple(noisy)).rests[1] == pytest.approx(0.95, abs=5e-3)
+    clean, rippled = (
+        inverted_wells(
+            replace(reference_finger(1), law=Tabulated(spline(tuple(travel), tuple(values))))
+        )
+        for values in (energy, noisy)
+    )
+    assert rippled.extension == pytest.approx(clean.extension, abs=1e-3)
+    assert rippled.barrier == pytest.approx(clean.barrier, abs=1e-6)

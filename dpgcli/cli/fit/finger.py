@@ -7,7 +7,6 @@ import typer
 
 from dpgcli.calibration.choices import Loss, Target
 from dpgcli.cli.fit.common import (
-    NO_GEOMETRY,
     Bootstrap,
     GeometryValues,
     Output,
@@ -30,6 +29,14 @@ if TYPE_CHECKING:
     from dpgcli.files.calibration import DataFile
 
 LEVER = "segment_height_mm"
+STILL_OFF = 0.3  # of the deflection
+STILL_OFF_WARNING = (
+    "tips are still off by more than 30 % of the deflection: look at --first-station, "
+    "--tip-offset, units, and the sign of y (inverted units curl towards -y)"
+)
+NO_GEOMETRY = (
+    "no geometry given (--geometry or in the spec): specs will treat the values as extrapolated"
+)
 UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad"}
 
 
@@ -75,9 +82,7 @@ def finger(
     frame = frame_of(first_station, tip_offset)
     study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss)
     found = study.fit(bootstrap, seed)
-    warnings = [*found.warnings, *([] if where else [NO_GEOMETRY.replace("--spec", "in the spec")])]
-    if known.unused:
-        warnings.append(f"columns not used: {', '.join(known.unused)}")
+    warnings = [*_warnings(study, found), *([] if where else [NO_GEOMETRY])]
     content = {
         "method": _method(study, found, bootstrap, seed),
         **_fitted(found, UNITS[target], source_of(data, known.patterns.shape[1])),
@@ -92,14 +97,26 @@ def finger(
         tell(_summary(study, found), warnings, output, plot)
 
 
+def _warnings(study: "FingerFit", found: "Fit") -> list[str]:
+    import numpy as np
+
+    warnings = list(found.warnings)
+    if np.nanmax(study.compared(found).relative, initial=0.0) > STILL_OFF:
+        warnings.append(STILL_OFF_WARNING)
+    if study.known.unused:
+        warnings.append(f"columns not used: {', '.join(study.known.unused)}")
+    return warnings
+
+
 def _method(study: "FingerFit", found: "Fit", resamples: int, seed: int) -> str:
     """The method in one line, with the frame that was assumed."""
     frame = study.frame
     station, tip = ("{:g},{:g}".format(*point) for point in (frame.first_station, frame.tip))
     what = f"{study.target} through the equilibrium"
+    held = ", ".join(f"{p.key} {p.start:g}" for p in found.parameters if not p.is_free)
     return (
         f"{method_of(what, found, resamples, seed)}, first station {station} mm, "
-        f"tip offset {tip} mm, {study.finger.law.description}"
+        f"tip offset {tip} mm, {study.finger.law.description}; held: {held}"
     )
 
 
@@ -107,7 +124,7 @@ def _fitted(found: "Fit", unit: str, source: "DataFile") -> dict[str, object]:
     from dpgcli.files.calibration.results import correlation_of, quality_of, values_of
 
     return {
-        "values": values_of(found),
+        "values": values_of(found, only_free=True),
         "correlation": correlation_of(found),
         "quality": quality_of(found, unit),
         "sources": [source],

@@ -200,6 +200,9 @@ def _order_issues(calibration: Calibration, document: Document) -> Iterator[Issu
 
 
 def _curve_issues(curve: Curve) -> Iterator[Issue]:
+    rule = curve.travel_to_opening
+    if rule.rule == "proportional" and "factor" not in rule.model_fields_set:
+        yield ("curve", "travel_to_opening"), "a factor beside rule: proportional", "none"
     path: KeyPath = ("curve", "travel_mm")
     if len(curve.travel_mm) != len(curve.energy_mJ):
         yield path, f"{len(curve.energy_mJ)} numbers, as energies", str(len(curve.travel_mm))

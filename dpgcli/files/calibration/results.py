@@ -19,10 +19,12 @@ from dpgcli.files.calibration.models import (
 )
 
 
-def values_of(fit: Fit) -> Values:
+def values_of(fit: Fit, *, only_free: bool = False) -> Values:
     """Values, errors and intervals of a fit whose parameters are lattice keys."""
     said: dict[str, Any] = {}
     for place, parameter in enumerate(fit.parameters):
+        if only_free and not parameter.is_free:
+            continue
         entry: dict[str, Any] = {"value": float(fit.values[place])}
         if math.isfinite(error := float(fit.standard_errors[place])):
             entry["standard_error"] = error

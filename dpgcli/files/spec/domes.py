@@ -59,20 +59,29 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
         expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
         return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
     if law == "tabulated":
-        return _tabulated(calibration.curve, stiffness.value, stroke.value)
+        return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
     return _pushing(calibration, calibration.curve, stiffness.value)
 
 
-def _tabulated(curve: Curve, stiffness: float, stroke: float) -> Domes:
+def _no_well(calibration: Calibration) -> Issue:
+    return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+
+
+def _tabulated(
+    calibration: Calibration, curve: Curve, stiffness: float, stroke: float
+) -> Domes | Issue:
     factor = curve.travel_to_opening.factor
-    law = Tabulated(spline(*_points(curve, stroke / factor, stiffness * stroke**2)))
-    return Domes(law, tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY))
+    shape = spline(*_points(curve, stroke / factor, stiffness * stroke**2))
+    if not np.isfinite(shape.rests[1]):
+        return _no_well(calibration)
+    rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return Domes(Tabulated(shape), rules)
 
 
 def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes | Issue:
     travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
     if not np.isfinite(travel):
-        return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+        return _no_well(calibration)
     height = sizes_of(calibration.geometry).get("dome_height_mm")
     shape = spline(*_points(curve, travel, stiffness * travel**2))
     domes = Domes(PushOnly(Tabulated(shape)), (), travel, height)

@@ -311,13 +311,8 @@ def test_what_is_no_law(problem, law):
     assert not said.endswith("linear stiffness)")
 
 
-def test_a_table_without_a_second_well_is_a_row_that_says_so(scene):
-    found = scene("tabulated", dome=calibration(energy=(TRAVEL**2).tolist()))
-    rows = predict(found, Request()).arrays()
-    assert rows["status"].tolist() == ["stable", *["not_bistable"] * 7]
-
-
-def test_a_table_that_falls_has_no_ground_state(scene):
-    found = scene("tabulated", dome=calibration(energy=(-TRAVEL).tolist()))
-    rows = predict(found, Request(("000",))).arrays()
-    assert rows["status"].tolist() != ["stable"]
+@pytest.mark.parametrize("energy", [TRAVEL**2, -TRAVEL, TRAVEL**3 - 1e-3 * TRAVEL], ids=str)
+@pytest.mark.parametrize("law", ["tabulated", "push_only"])
+def test_a_table_without_a_second_well_is_refused(scene, law, energy):
+    with pytest.raises(SpecError, match="expected a curve with an inverted well"):
+        scene(law, dome=calibration(energy=energy.tolist()))
