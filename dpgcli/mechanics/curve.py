@@ -29,8 +29,8 @@ class Curve:
 
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
     Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
-    the well, where the slope vanishes: the highest maximum that a minimum follows, and the lowest
-    minimum after it; NaN where there is none.
+    the well, where the slope vanishes: the minimum that lies deepest below what is on both its
+    sides, and the highest maximum before it; NaN where there is none.
     """
 
     knots: Array
@@ -112,11 +112,19 @@ def _continued(travel: Array, value: Array, beyond: Array) -> Array:
 
 
 def _rests(cubic: "CubicSpline") -> tuple[float, float]:
-    """The highest top that a minimum follows, and the lowest minimum after it: ripples pass."""
-    roots = [float(root) for root in cubic.derivative().roots(extrapolate=False) if root > 0.0]
-    wells = [root for root in roots if cubic(root, 2) > 0.0]
-    tops = [root for root in roots if cubic(root, 2) < 0.0 and root < max(wells, default=0.0)]
-    if not tops:
+    """The deepest well, by how much it lies below both sides, and the highest top before it."""
+    slope, bend = cubic.derivative(), cubic.derivative(2)
+    roots = np.array([root for root in slope.roots(extrapolate=False) if root > 0.0])
+    tops, wells = (roots[sign * bend(roots) > 0.0] for sign in (-1.0, 1.0))
+    wells = wells[wells > np.min(tops, initial=np.inf)]
+    if not len(wells):
         return np.nan, np.nan
-    top = max(tops, key=cubic)
-    return top, min((well for well in wells if well > top), key=cubic)
+    last = float(cubic(cubic.x[-1]))
+    depths = [
+        min(cubic(tops[tops < well]).max(), np.max(cubic(tops[tops > well]), initial=last))
+        - cubic(well)
+        for well in wells
+    ]
+    well = float(wells[np.argmax(depths)])
+    before = tops[tops < well]
+    return float(before[np.argmax(cubic(before))]), well

@@ -90,12 +90,12 @@ def _searched_wells(finger: Finger) -> Wells:
     energy = _rigid_energy(finger, grid)[:-1]
     places = np.arange(SEARCHED - 1)[:, None, None]
     is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
-    last = np.where(is_well, places, -1).max(axis=0)
-    # the highest top that a well follows, and the lowest well after it: ripples do not count
-    is_top &= places < last
+    # the well that lies deepest below both sides, and the highest top before it: ripples pass
+    left, right = (np.maximum.accumulate(e, axis=0) for e in (energy, energy[::-1]))
+    depth = np.minimum(left, right[::-1]) - energy
+    wells = np.where(is_well, depth, -np.inf).argmax(axis=0)
+    is_top &= places < wells
     tops = np.where(is_top.any(axis=0), np.where(is_top, energy, -np.inf).argmax(axis=0), -1)
-    is_well &= places > tops
-    wells = np.where(is_well, energy, np.inf).argmin(axis=0)
     exists = is_well.any(axis=0) & np.isfinite(finger.law.rests(finger.domes).well)
     well = _bisected(finger, grid, wells, rises=True)
     top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
