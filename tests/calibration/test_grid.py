@@ -68,6 +68,7 @@ def test_the_order_of_the_points_does_not_matter() -> None:
         assert first == pytest.approx(second, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_stated_errors_are_the_scatter_of_one_more_point() -> None:
     """300 noisy grids, each asked for a further noisy point."""
     truth, noise = np.log(power(BETWEEN)), 0.05

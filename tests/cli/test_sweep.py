@@ -64,6 +64,7 @@ def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> Non
     assert len(states) == 5 * 8
 
 
+@pytest.mark.slow
 def test_the_same_bytes_from_processes(run: Any, call: Any, sweep: Path) -> None:
     assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
     result = run("sweep", "sweep.yaml", "-o", "two", "-j", "2", "-q")

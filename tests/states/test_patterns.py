@@ -30,12 +30,14 @@ def test_what_is_no_glob_is_refused(glob: str) -> None:
         select([glob], 3)
 
 
+@pytest.mark.slow
 def test_too_many_matches_are_refused() -> None:
     with pytest.raises(UsageError, match="67,108,864"):
         select(["*"], 64)
     assert len(select(["1*" + 43 * "0"], 64)) == 2**20
 
 
+@pytest.mark.slow
 @given(pattern=st.text(alphabet="01", min_size=64, max_size=64))
 def test_a_pattern_of_64_units_keeps_its_bits(pattern: str) -> None:
     (code,) = select([pattern], 64)
