@@ -77,9 +77,8 @@ def _curvature(moment: Array, rotation: Array, secants: tuple[float, float]) -> 
     """What speaks against M = k θ."""
     reach = float(np.abs(rotation).max())
     powers = rotation / reach
-    for name, power in (("quadratic", 2), ("cubic", 3)):
-        if len(np.unique(np.abs(powers[powers != 0.0]))) < 3 or len(rotation) < 4:
-            return
+    is_known = len(np.unique(np.abs(powers[powers != 0.0]))) >= 3 and len(rotation) >= 4
+    for name, power in (("quadratic", 2), ("cubic", 3)) if is_known else ():
         shape = np.stack((powers, powers**power), axis=1)
         terms = (Parameter("linear", secants[0] * reach), Parameter(name, 0.0))
         found = fit_linear(terms, shape, moment)

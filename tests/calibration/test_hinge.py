@@ -58,3 +58,8 @@ def test_one_point_gives_a_value_without_error() -> None:
 def test_hinges_that_are_none(moment: list[float], rotation: list[float], said: str) -> None:
     with pytest.raises(FitError, match=said):
         fit_hinge(np.array(moment), np.array(rotation))
+
+
+def test_three_points_that_stiffen_are_not_linear() -> None:
+    found = fit_hinge(np.array([1.0, 5.0, 9.0]), np.array([0.2, 0.3, 0.4]))
+    assert any("changes from 5 to 20" in text for text in found.fit.warnings), found.fit.warnings
