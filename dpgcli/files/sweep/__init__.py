@@ -42,6 +42,7 @@ from dpgcli.files.sweep.models import (
 __all__ = ["Sweep", "read_sweep"]
 
 UNITS = "finger.units"
+TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
 
 
 @dataclass(frozen=True)
@@ -115,8 +116,8 @@ def _validated(document: Document) -> tuple[SweepSpec | None, list[Problem]]:
 
 
 def _problem(document: Document, error: Any) -> Problem:
-    """One finding of the models as a problem with a place."""
-    path: KeyPath = error["loc"]
+    """One finding of the models as a problem with a place, for all types that a value may have."""
+    path: KeyPath = tuple(part for part in error["loc"] if part not in TYPES)
     section, field = _model_at(path)
     if error["type"] == "extra_forbidden":
         known = [f.alias or name for name, f in section.model_fields.items()]

@@ -333,3 +333,8 @@ def test_ranges_beyond_every_key_are_refused_and_all_others_are_finite(read: Rea
     ranges = f"{{{HEIGHT}: {{from: -1.0e+18, to: 1.0e+18}}}}"
     sweep = read(f"sample: {{method: sobol, count: 4, ranges: {ranges}}}")
     assert np.isfinite(designs(sweep)[HEIGHT]).all()
+
+
+def test_a_text_among_numbers_is_one_problem(read: Read) -> None:
+    (said,) = problems(read, f"{{key: {HEIGHT}, values: [6, tall]}}")
+    assert "space.0.values.1: expected a list of numbers" in said
