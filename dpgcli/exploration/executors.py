@@ -33,6 +33,7 @@ P = ParamSpec("P")
 Arguments = Callable[["Chunk"], tuple[Any, ...]]
 
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
+TRIALS = 3  # workers that must fail to do nothing before none is believed to start
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
 CLUSTER_PATIENCE = 10  # s
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -155,11 +156,17 @@ class Runner(Generic[T]):
             yield Result(chunk, value)
 
     def _check_that_a_worker_starts(self) -> None:
-        try:
-            with self._open(1) as executor:
-                executor.submit(os.getpid).result()
-        except self.workplace.broken as error:
-            raise WorkplaceError(f"{self.workplace.name}: workers do not start. {GO_ON}") from error
+        """Try a few times: what killed a worker before may hit the one that tries, too."""
+        for is_last in (*(False,) * (TRIALS - 1), True):
+            try:
+                with self._open(1) as executor:
+                    executor.submit(os.getpid).result()
+            except self.workplace.broken as error:
+                if is_last:
+                    said = f"{self.workplace.name}: workers do not start. {GO_ON}"
+                    raise WorkplaceError(said) from error
+            else:
+                return
 
     @contextmanager
     def _open(self, n_workers: int) -> Iterator[Executor]:

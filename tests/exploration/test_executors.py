@@ -89,6 +89,21 @@ def test_a_few_cases_that_all_kill_are_failures(deadly: Any, tmp_path: Path) -> 
     assert results(runner, chunked([(0, 3)], 2)) == dict.fromkeys(range(3))
 
 
+def test_a_worker_that_dies_as_it_is_tried_is_tried_again(deadly: Any, tmp_path: Path) -> None:
+    """Whatever kills workers from outside may hit that one, too."""
+    opened = []
+
+    def fragile(n_workers: int) -> ProcessPoolExecutor:
+        opened.append(n_workers)
+        doomed = deadly.dies if len(opened) in (2, 3) else None
+        return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=doomed)
+
+    workplace = Workplace("the pool", fragile, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path, once=[4]))
+    assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}
+    assert opened[:4] == [2, 1, 1, 1]
+
+
 def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
     def broken(n_workers: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=deadly.dies)
