@@ -121,9 +121,11 @@ def _code_of(app: Callable[..., object]) -> int:
         return ExitCode.DONE
     except OSError as error:
         return _no_output(error)
-    except Terminated:
+    except Terminated:  # before a command has begun, or after it is done
+        say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
     except (KeyboardInterrupt, typer.Abort):
+        say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
     return code if isinstance(code, int) else ExitCode.DONE
 
