@@ -86,6 +86,7 @@ def sweep(
         _start_fork_server_early()
     from dpgcli.errors import UsageError
     from dpgcli.files.output import check_appendable, sole_use
+    from dpgcli.studies.sweep import drop_parts
 
     part = _shard(shard)
     _check_executor(executor, scheduler)
@@ -103,8 +104,11 @@ def sweep(
             _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)
-        elif not quiet:
-            say(f"{output}: up to date")
+        else:
+            if part is None and study.owns_all_parts:  # what a run left that was stopped at its end
+                drop_parts(study.folder)
+            if not quiet:
+                say(f"{output}: up to date")
         if part is None:
             n_failed, is_met = _judge(study, rules, summary_file, is_new, quiet)
         else:

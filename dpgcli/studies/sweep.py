@@ -134,6 +134,11 @@ class Study:
         )
 
     @property
+    def owns_all_parts(self) -> bool:
+        """Whether no other sweep has unfinished parts in the folder."""
+        return all(store.folder == self.store.folder for store in stores(self.folder))
+
+    @property
     def n_failed(self) -> int:
         """How many designs of the parts that are there have failed."""
         batches = (batch for part in self.store.parts() for batch in part.batches(1))
