@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, located
-from dpgcli.files.spec.derivations import sizes_of
 from dpgcli.files.spec.models import Spec
+from dpgcli.files.spec.rules import sizes_of
 
 
 def dimensions(spec: Spec, file: str, keys: Sequence[str], purpose: str) -> dict[str, float]:

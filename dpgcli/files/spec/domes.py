@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.files.calibration.models import Calibration, Curve
-from dpgcli.files.spec.derivations import (
+from dpgcli.files.spec.rules import (
     BISTABLE_STIFFNESS,
     DERIVATIONS,
     FORCE_LINEARITY,

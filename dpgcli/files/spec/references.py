@@ -8,7 +8,7 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
-from dpgcli.files.spec.derivations import PUBLISHED
+from dpgcli.files.spec.rules import PUBLISHED
 from dpgcli.files.spec.settings import SETTING, changed
 
 EXPECTED = '"published" or the name of a calibration file'

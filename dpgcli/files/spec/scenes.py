@@ -12,7 +12,10 @@ from dpgcli.arrays import Array
 from dpgcli.errors import SpecError
 from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.places import KeyPath, Place, dotted, located
-from dpgcli.files.spec.derivations import (
+from dpgcli.files.spec.derivations import value_of
+from dpgcli.files.spec.domes import Domes, domes_of
+from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
+from dpgcli.files.spec.rules import (
     DERIVATIONS,
     LINEAR_STIFFNESS,
     PUBLISHED,
@@ -24,10 +27,7 @@ from dpgcli.files.spec.derivations import (
     agree,
     number,
     sizes_of,
-    value_of,
 )
-from dpgcli.files.spec.domes import Domes, domes_of
-from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
 from dpgcli.files.spec.uncertainty import Share, uncertainty_of
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.finger import Finger
