@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.choices import Loss, Quantity, Rule
-from dpgcli.calibration.curves import (
-    Curve,
+from dpgcli.calibration.choices import LINEARITY, STIFFNESS, STROKE, Loss, Quantity, Rule
+from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.calibration.record import (
+    Record,
     alikeness,
     cleaned,
     dirt,
@@ -23,15 +24,9 @@ from dpgcli.calibration.curves import (
     unsampled,
     work,
 )
-from dpgcli.calibration.fits import Fit, Parameter, fit
 from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 
-STIFFNESS, LINEARITY, STROKE = KEYS = (
-    "bistable_stiffness_N_per_mm",
-    "force_linearity",
-    "stroke_mm",
-)
 LIMIT = 1.0 / 9.0  # of the linearity: from here on there is one well only
 HARDLY = 0.9  # of the limit: from here on the hinge may cost the second well
 LOW = 0.95  # R² below this is said
@@ -115,24 +110,18 @@ def slopes(opening: Array, values: Array, quantity: Quantity) -> Array:
     return np.stack((by_stiffness, by_linearity, by_stroke), axis=1)
 
 
-def turning_points(values: Array) -> tuple[float, float] | None:
-    """Openings (mm) of the barrier and of the inverted well, u = [3β ± √(9β² − 8β)]/(4β).
+def rests(values: Array) -> laws.Rests:
+    """Openings (mm) of the barrier and of the inverted well of the law; NaN if it has none.
 
-    None for a law without a second well.
-
-    >>> turning_points(np.array([1.0, 0.0, 2.0]))  # symmetric wells
+    >>> top, well = rests(np.array([1.0, 0.0, 2.0]))  # symmetric wells
+    >>> float(top), float(well)
     (1.0, 2.0)
     """
-    beta = 1.0 - float(values[1])
-    if not beta > 8.0 / 9.0:
-        return None
-    root = np.sqrt(9.0 * beta**2 - 8.0 * beta)
-    stroke = float(values[2])
-    barrier, well = ((3.0 * beta + sign * root) / (4.0 * beta) for sign in (-1.0, 1.0))
-    return float(stroke * barrier), float(stroke * well)
+    stiffness, linearity, stroke = values
+    return laws.PUBLISHED.rests(laws.Dome(stiffness, linearity, stroke, contact=np.zeros(())))
 
 
-def fit_bistable(record: Curve, choice: Choice) -> BistableFit:
+def fit_bistable(record: Record, choice: Choice) -> BistableFit:
     """Fit the published law to a record of a dome.
 
     Raises FitError if the record lacks what is asked for, or the fit fails.
@@ -156,7 +145,7 @@ def fit_bistable(record: Curve, choice: Choice) -> BistableFit:
     return replace(result, curve=energies, warnings=every)
 
 
-def _observed(record: Curve, choice: Choice) -> Array:
+def _observed(record: Record, choice: Choice) -> Array:
     """What the law is held against: energies in mJ, or forces along the travel in N."""
     if choice.quantity is Quantity.WORK:
         return work(record)
@@ -224,7 +213,7 @@ def _stroke(start: float, reach: float, *, is_free: bool) -> Parameter:
 
 
 def _energies(
-    curve: Curve,
+    curve: Record,
     observed: Array,
     choice: Choice,
     gaps: list[tuple[float, float]],
@@ -267,20 +256,16 @@ def _judgments(found: BistableFit) -> Iterator[str]:
 
 
 def _unsampled_points(found: BistableFit) -> Iterator[str]:
-    turning = turning_points(found.fit.values)
+    at_rest = rests(found.fit.values)
+    top, well = (float(opening) / found.factor for opening in at_rest)
     reach = float(found.travel.max())
     if found.well is None:
-        where = (
-            "" if turning is None else f"; the fitted one, at {turning[1] / found.factor:.4g} mm, "
-        )
-        yield (
-            f"the inverted well is not sampled (travel up to {reach:.4g} mm)"
-            + (f"{where}is an extrapolation" if where else "")
-        )
-    if turning is None:
+        said = f"the inverted well is not sampled (travel up to {reach:.4g} mm)"
+        where = f"; the fitted one, at {well:.4g} mm, is an extrapolation"
+        yield said if np.isnan(well) else said + where
+    if np.isnan(top):
         return
-    top = turning[0] / found.factor
-    height = float(law(np.array(turning[:1]), found.fit.values, Quantity.ENERGY)[0])
+    height = float(law(at_rest.top, found.fit.values, Quantity.ENERGY))
     barrier = f"the fitted barrier, {height:.4g} mJ at {top:.4g} mm, is an extrapolation"
     for start, end in found.gaps:
         if start < top < end:

@@ -2,6 +2,12 @@
 
 from enum import StrEnum
 
+STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
+    "bistable_stiffness_N_per_mm",
+    "force_linearity",
+    "stroke_mm",
+)
+
 
 class Loss(StrEnum):
     """How a residual counts: linear is plain least squares, the others limit outliers."""

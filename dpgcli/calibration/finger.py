@@ -41,6 +41,7 @@ class FingerFit:
     free: tuple[str, ...]
     target: Target = Target.TIPS
     loss: Loss = Loss.LINEAR
+    loss_scale: float | None = None
 
     def __post_init__(self) -> None:
         values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
@@ -66,6 +67,7 @@ class FingerFit:
             self._jacobian,
             observed=(self._observed - self._straight)[self._given],
             loss=self.loss,
+            loss_scale=self.loss_scale,
             resamples=resamples,
             seed=seed,
         )

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.curves import Curve
+from dpgcli.calibration.choices import LINEARITY
+from dpgcli.calibration.record import Record
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order
-from dpgcli.files.sections import Geometry
+from dpgcli.files.sections import EXPECTED, Geometry, unit_of
 from dpgcli.files.sheet import Sheet, read_sheet
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
@@ -34,6 +35,10 @@ GUESSES = {  # the unit behind values that are too small, and too large
     "moment": ("N m?", "N um?"),
     "rotation": ("", "degrees?"),
 }
+USUAL = {  # largest values of a geometry, by the unit of its key, and what others may be in
+    "mm": (0.05, 200.0, "meters?", "micrometers?"),
+    "MPa": (1e-3, 1e4, "gigapascals?", "kPa or Pa?"),
+}
 MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit is 1000 off
 
 
@@ -41,7 +46,7 @@ MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit
 class Measured:
     """A curve, the columns that were not used, and how many rows there are."""
 
-    curve: Curve
+    curve: Record
     ignored: tuple[str, ...]
     n_rows: int
 
@@ -60,7 +65,8 @@ class Moments:
 class Table:
     """Geometries (point, key) by `over`, and positive quantities (point,) by key.
 
-    `constant` holds geometry that is the same in all points.
+    `constant` holds geometry that is the same in all points. `doubts` are what no soft finger has,
+    in words: nothing else here tells whether the unit is wrong or the finger unusual.
     """
 
     over: tuple[str, ...]
@@ -68,6 +74,7 @@ class Table:
     quantities: dict[str, Array]
     constant: dict[str, float]
     ignored: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
 def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measured:
@@ -88,7 +95,7 @@ def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measu
     problems = [*_signs(sheet, travel, arrays["travel"]), *_scales(sheet, columns, known, geometry)]
     if problems:
         raise SpecError(in_order(problems))
-    return Measured(Curve(**arrays), _unused(sheet, known), len(sheet.rows))
+    return Measured(Record(**arrays), _unused(sheet, known), len(sheet.rows))
 
 
 def read_moments(path: Path, where: str | None = None) -> Moments:
@@ -133,6 +140,10 @@ def read_table(path: Path) -> Table:
         for name, values in columns.items()
         for row in np.flatnonzero(values <= 0.0).tolist()
     ]
+    problems += [
+        sheet.problem(row, LINEARITY, EXPECTED[LINEARITY], f"{columns[LINEARITY][row]:g}")
+        for row in np.flatnonzero(columns.get(LINEARITY, np.zeros(0)) > 1.0).tolist()
+    ]
     problems += _repeated(sheet, np.stack([columns[key] for key in keys], axis=1))
     over = tuple(key for key in keys if np.ptp(columns[key]) > 0.0)
     if not over and not problems:
@@ -145,7 +156,16 @@ def read_table(path: Path) -> Table:
         {name: columns[name] for name in others},
         {key: float(columns[key][0]) for key in keys if key not in over},
         tuple(name for name in sheet.names if name not in columns),
+        tuple(_doubts({key: columns[key] for key in keys})),
     )
+
+
+def _doubts(geometry: Mapping[str, Array]) -> Iterator[str]:
+    for key, values in geometry.items():
+        low, high, small, large = USUAL[unit_of(key)]
+        if not low <= values.max() <= high:
+            guess = large if values.max() > high else small
+            yield f"{key} is {values.max():.4g} at most: {guess}"
 
 
 def _one_of(sheet: Sheet, names: tuple[str, ...]) -> Iterator[Problem]:

@@ -12,11 +12,11 @@ from dpgcli.calibration.bistable import (
     Opening,
     fit_bistable,
     law,
+    rests,
     slopes,
-    turning_points,
 )
 from dpgcli.calibration.choices import Quantity, Rule
-from dpgcli.calibration.curves import Curve
+from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 from dpgcli.files.measured import read_curve
 
@@ -27,14 +27,14 @@ EQUAL = Opening(Rule.EQUAL)
 NOISE = {Quantity.ENERGY: 0.1, Quantity.FORCE: 0.3}
 
 
-def curve(quantity: Quantity, seed: int | None = None, travel: Array = TRAVEL) -> Curve:
+def curve(quantity: Quantity, seed: int | None = None, travel: Array = TRAVEL) -> Record:
     exact = law(travel, TRUE, quantity)
     if seed is not None:
         exact = exact + np.random.default_rng(seed).normal(0.0, NOISE[quantity], len(travel))
-    return Curve(travel, **{quantity.value: exact})
+    return Record(travel, **{quantity.value: exact})
 
 
-def fitted(data: Curve, quantity: Quantity = Quantity.ENERGY, **options: object) -> BistableFit:
+def fitted(data: Record, quantity: Quantity = Quantity.ENERGY, **options: object) -> BistableFit:
     opening = options.pop("opening", EQUAL)
     return fit_bistable(data, Choice(opening, quantity, **options))  # type: ignore[arg-type]
 
@@ -49,7 +49,7 @@ def test_exact_curves_give_the_law_back_without_a_warning(quantity: Quantity) ->
     assert found.fit.values == pytest.approx(TRUE, rel=1e-9)
     assert found.warnings == ()
     assert found.gaps == []
-    assert found.well == pytest.approx(turning_points(TRUE)[1], abs=0.01)  # type: ignore[index]
+    assert found.well == pytest.approx(float(rests(TRUE).well), abs=0.01)
 
 
 @pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
@@ -91,14 +91,14 @@ def test_slopes_are_central_differences(quantity: Quantity, values: Array) -> No
 
 
 def test_the_turning_points_carry_no_force() -> None:
-    barrier, well = turning_points(TRUE)  # type: ignore[misc]
-    assert law(np.array([barrier, well]), TRUE, Quantity.FORCE) == pytest.approx([0, 0], abs=1e-12)
-    assert turning_points(np.array([1.0, 0.112, 1.0])) is None
-    assert turning_points(np.array([1.0, 0.111, 1.0])) is not None
+    found = np.array(rests(TRUE))
+    assert law(found, TRUE, Quantity.FORCE) == pytest.approx([0, 0], abs=1e-12)
+    assert np.isnan(rests(np.array([1.0, 0.112, 1.0]))).all()
+    assert np.isfinite(rests(np.array([1.0, 0.111, 1.0]))).all()
 
 
 def test_a_pressure_is_a_force_over_its_area() -> None:
-    pressure = Curve(TRAVEL, pressure=law(TRAVEL, TRUE, Quantity.FORCE) / 31.6)
+    pressure = Record(TRAVEL, pressure=law(TRAVEL, TRUE, Quantity.FORCE) / 31.6)
     assert fitted(pressure, Quantity.PRESSURE, area=31.6).fit.values == pytest.approx(TRUE)
 
 
@@ -119,9 +119,7 @@ def test_the_mapping_stretches_the_law(quantity: Quantity) -> None:
 
 def test_a_stroke_puts_the_inverted_well_there() -> None:
     found = fitted(curve(Quantity.ENERGY), opening=Opening(Rule.STROKE, 1.75))
-    well = turning_points(found.fit.values)
-    assert well is not None
-    assert well[1] == pytest.approx(1.75, rel=2e-3)
+    assert float(rests(found.fit.values).well) == pytest.approx(1.75, rel=2e-3)
 
 
 def test_fixed_values_stay() -> None:
@@ -159,7 +157,7 @@ def test_a_curve_before_its_barrier_says_so() -> None:
 )
 def test_a_law_without_second_well_is_said(linearity: float, said: str) -> None:
     energies = law(TRAVEL, np.array([12.84, linearity, 3.5]), Quantity.ENERGY)
-    found = fitted(Curve(TRAVEL, energy=energies))
+    found = fitted(Record(TRAVEL, energy=energies))
     bistable = [text for text in found.warnings if "bistable" in text]
     assert bool(bistable) == bool(said)
     assert all(text.startswith(said) and "the hinge takes" in text for text in bistable)
@@ -167,13 +165,13 @@ def test_a_law_without_second_well_is_said(linearity: float, said: str) -> None:
 
 def test_a_value_at_its_bound_is_said() -> None:
     energies = law(TRAVEL, np.array([12.84, -0.05, 3.5]), Quantity.ENERGY)
-    found = fitted(Curve(TRAVEL, energy=energies))
+    found = fitted(Record(TRAVEL, energy=energies))
     assert warned(found, "force_linearity ended at its bound 0")
     assert found.fit.values[1] == 0.0
 
 
 def test_another_shape_is_said() -> None:
-    found = fitted(Curve(TRAVEL, energy=np.sin(3.0 * TRAVEL) ** 2 + 0.1 * TRAVEL))
+    found = fitted(Record(TRAVEL, energy=np.sin(3.0 * TRAVEL) ** 2 + 0.1 * TRAVEL))
     assert warned(found, "the law does not follow the curve: R^2 = ")
     assert warned(found, "neighboring residuals are alike")
 
@@ -209,8 +207,8 @@ def test_no_curve_where_the_force_is_not_known() -> None:
     [
         (curve(Quantity.ENERGY), Quantity.FORCE, EQUAL, "no force in the curve"),
         (curve(Quantity.ENERGY), Quantity.WORK, EQUAL, "no work without"),
-        (Curve(TRAVEL[:2], energy=TRAVEL[:2]), Quantity.ENERGY, EQUAL, "2 points for 3 free"),
-        (Curve(TRAVEL, energy=-TRAVEL), Quantity.ENERGY, EQUAL, "is its sign the other way"),
+        (Record(TRAVEL[:2], energy=TRAVEL[:2]), Quantity.ENERGY, EQUAL, "2 points for 3 free"),
+        (Record(TRAVEL, energy=-TRAVEL), Quantity.ENERGY, EQUAL, "is its sign the other way"),
         (
             curve(Quantity.ENERGY, travel=TRAVEL[:20]),
             Quantity.ENERGY,
@@ -219,7 +217,7 @@ def test_no_curve_where_the_force_is_not_known() -> None:
         ),
     ],
 )
-def test_fits_that_cannot_be(data: Curve, quantity: Quantity, opening: Opening, said: str) -> None:
+def test_fits_that_cannot_be(data: Record, quantity: Quantity, opening: Opening, said: str) -> None:
     with pytest.raises(FitError, match=said):
         fitted(data, quantity, opening=opening)
 

@@ -196,6 +196,24 @@ def test_a_table_over_geometries(path: Path) -> None:
     }
     assert found.constant == {"elastic_modulus_MPa": 26.0}
     assert found.ignored == ("name",)
+    assert found.doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "doubt"),
+    [
+        ("dome_height_mm", ("0.004", "0.0065"), "dome_height_mm is 0.0065 at most: meters?"),
+        ("dome_height_mm", ("4000", "6500"), "dome_height_mm is 6500 at most: micrometers?"),
+        ("elastic_modulus_MPa", ("1e6", "26e6"), "elastic_modulus_MPa is 2.6e+07 at most: kPa or"),
+        ("elastic_modulus_MPa", ("1e-4", "2e-4"), "elastic_modulus_MPa is 0.0002 at most: gigap"),
+    ],
+)
+def test_a_geometry_that_no_soft_finger_has(
+    path: Path, head: str, rows: tuple[str, str], doubt: str
+) -> None:
+    path.write_text(f"{head},stroke_mm\n{rows[0]},1\n{rows[1]},2\n", encoding="utf-8")
+    (said,) = read_table(path).doubts
+    assert said.startswith(doubt)
 
 
 @pytest.mark.parametrize(
@@ -210,6 +228,10 @@ def test_a_table_over_geometries(path: Path) -> None:
             "4: geometry: expected each geometry once, found that of line 2 again",
         ),
         ("dome_height_mm,stroke_mm\n1,1\n2,x\n", '3: stroke_mm: expected a number, found "x"'),
+        (
+            "dome_height_mm,force_linearity\n1,0.04\n2,1.5\n",
+            "3: force_linearity: expected a number from 0 to 1, found 1.5",
+        ),
         ("dome_height_mm,stroke_mm\n1,1\n", "file: expected geometries that differ, found one"),
     ],
 )

@@ -1,12 +1,13 @@
 """`dpg fit bistable`: the bistable law from a dome's curve."""
 
+import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.calibration.choices import Branches, Loss, Quantity, Rule
+from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity, Rule
 from dpgcli.cli.fit.common import (
     NO_GEOMETRY,
     Bootstrap,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from dpgcli.calibration.bistable import BistableFit, Choice, Opening
     from dpgcli.files.measured import Measured
 
-KEYS = ("bistable_stiffness_N_per_mm", "force_linearity", "stroke_mm")
 WHY_OPENING = """\
 --travel-to-opening is needed: a dome's travel u and the opening x of a unit, in which the law is
 written, are not the same, and no curve tells how they relate. One of:
@@ -163,18 +163,18 @@ def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
     fixed: dict[str, float] = {}
     for text in fix:
         key, _, value = (part.strip() for part in text.partition("="))
-        number = 0.0 if key == KEYS[1] and value in ("0", "0.0") else _number(value)
-        if key in KEYS and (number is None or (key == KEYS[1] and number > 1.0)):
-            bound = "from 0 to 1" if key == KEYS[1] else "> 0"
+        number = 0.0 if key == LINEARITY and value in ("0", "0.0") else _number(value)
+        if key in LAW_KEYS and (number is None or (key == LINEARITY and number > 1.0)):
+            bound = "from 0 to 1" if key == LINEARITY else "> 0"
             raise UsageError(f"--fix {text}: expected a number {bound}")
         fixed[key] = number or 0.0
     for option, keys in (("--fix", list(fixed)), ("--free", free or [])):
         for key in keys:
-            if key not in KEYS:
-                nearest = get_close_matches(key, KEYS, n=1)
-                hint = f"did you mean {nearest[0]}?" if nearest else f"one of {', '.join(KEYS)}"
+            if key not in LAW_KEYS:
+                nearest = get_close_matches(key, LAW_KEYS, n=1)
+                hint = f"did you mean {nearest[0]}?" if nearest else f"one of {', '.join(LAW_KEYS)}"
                 raise UsageError(f"{option} {key}: no value of the law ({hint})")
-    for key in KEYS:
+    for key in LAW_KEYS:
         if free is not None and key in free and key in fixed:
             raise UsageError(f"{key} is both in --fix and in --free")
         if free is not None and key not in free and key not in fixed:
@@ -206,14 +206,14 @@ def _area(quantity: Quantity, area: float | None) -> float:
 
 def _summary(found: "BistableFit", choice: "Choice") -> list[str]:
     """Quality, the assumed mapping, and the inverted wells of law and data."""
-    from dpgcli.calibration.bistable import UNITS, turning_points
+    from dpgcli.calibration.bistable import UNITS, rests
 
     how = "as given"
     if choice.opening.rule is Rule.STROKE:
         how = f"so that the inverted well opens {choice.opening.amount:g} mm"
     wells = [f"{found.well:.4g} mm in the data"] if found.well is not None else []
-    turning = turning_points(found.fit.values)
-    wells += [f"{turning[1] / found.factor:.4g} mm in the law"] if turning else []
+    well = float(rests(found.fit.values).well)
+    wells += [] if math.isnan(well) else [f"{well / found.factor:.4g} mm in the law"]
     return [
         quality_line(found.fit, UNITS[choice.quantity]),
         f"opening = {found.factor:.5g} travel, {how} (assumed, not fitted)",
@@ -231,20 +231,17 @@ def _write(
 ) -> None:
     from dpgcli.calibration.bistable import UNITS
     from dpgcli.files.calibration import source_of
-    from dpgcli.files.calibration.results import correlation_of, curve_of, quality_of, values_of
+    from dpgcli.files.calibration.results import curve_of, fitted
 
     method = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
     if choice.quantity is Quantity.PRESSURE:
         method += f", area {choice.area:g} mm2"
     content = {
+        **fitted(found.fit, UNITS[choice.quantity], source_of(curve, found.fit.n_points)),
         "method": method + (", quasi-static pieces" if choice.is_quasi_static else ""),
-        "values": values_of(found.fit),
-        "correlation": correlation_of(found.fit),
         "geometry": geometry,
         "curve": curve_of(found),
-        "quality": quality_of(found.fit, UNITS[choice.quantity]),
         "warnings": warnings,
-        "sources": [source_of(curve, found.fit.n_points)],
     }
     write(output, content)
 

@@ -96,7 +96,7 @@ def _warnings(law: "Law", table: "Table") -> list[str]:
 
     from dpgcli.files.calibration import Values
 
-    said = []
+    said = list(table.doubts)
     if table.ignored:
         said.append(f"columns not used, since they hold text: {', '.join(table.ignored)}")
     unused = [key for key in table.quantities if key not in Values.model_fields]

@@ -28,7 +28,7 @@ MOST_POINTS = 200
 
 
 @dataclass(frozen=True)
-class Curve:
+class Record:
     """Arrays (point,), or None where not known; see the module for units."""
 
     travel: Array
@@ -38,8 +38,8 @@ class Curve:
     volume: Array | None = None
     time: Array | None = None
 
-    def points(self, index: Indices | Flags) -> "Curve":
-        """The curve at some of its points."""
+    def points(self, index: Indices | Flags) -> "Record":
+        """The record at some of its points."""
         chosen: dict[str, Any] = {k: v if v is None else v[index] for k, v in vars(self).items()}
         return replace(self, **chosen)
 
@@ -49,25 +49,25 @@ class Curve:
         return float(self.travel.max())
 
 
-def in_order(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
+def in_order(record: Record) -> tuple[Record, tuple[str, ...]]:
     """The curve by time, else by travel, without repeated points; and what had to be done.
 
-    >>> curve, said = in_order(Curve(np.array([1.0, 0.0, 1.0]), energy=np.array([2.0, 0.0, 2.0])))
-    >>> curve.travel.tolist(), said
+    >>> record, said = in_order(Record(np.array([1.0, 0.0, 1.0]), energy=np.array([2.0, 0.0, 2.0])))
+    >>> record.travel.tolist(), said
     ([0.0, 1.0], ('the points were not in order of travel: sorted', '1 repeated point left out'))
     """
     said = []
-    leading = curve.travel if curve.time is None else curve.time
+    leading = record.travel if record.time is None else record.time
     if (np.diff(leading) < 0.0).any():
-        name = "travel" if curve.time is None else "time"
+        name = "travel" if record.time is None else "time"
         said.append(f"the points were not in order of {name}: sorted")
-        curve = curve.points(np.argsort(leading, kind="stable"))
-    arrays = [v for v in vars(curve).values() if v is not None]
+        record = record.points(np.argsort(leading, kind="stable"))
+    arrays = [v for v in vars(record).values() if v is not None]
     first = np.sort(np.unique(np.stack(arrays), axis=1, return_index=True)[1])
-    if n_repeated := len(curve.travel) - len(first):
+    if n_repeated := len(record.travel) - len(first):
         said.append(f"{n_repeated} repeated point{'s' * (n_repeated != 1)} left out")
-        curve = curve.points(first)
-    return curve, tuple(said)
+        record = record.points(first)
+    return record, tuple(said)
 
 
 def unsampled(travel: Array) -> list[tuple[float, float]]:
@@ -90,66 +90,68 @@ def integral(values: Array, along: Array) -> Array:
     return np.append(0.0, np.cumsum(0.5 * np.diff(along) * (values[1:] + values[:-1])))
 
 
-def work(curve: Curve) -> Array:
+def work(record: Record) -> Array:
     """Energy by integrating ∫F du, or ∫p dV where there is no force (mJ, trapezoids).
 
     Raises FitError where neither is known, or where a static curve has an unsampled stretch.
     """
     along, push = (
-        (curve.travel, curve.force) if curve.force is not None else (curve.volume, curve.pressure)
+        (record.travel, record.force)
+        if record.force is not None
+        else (record.volume, record.pressure)
     )
     if along is None or push is None:
         raise FitError("no work without force_N, or pressure_MPa and volume_mm3")
-    if curve.time is None and (gaps := unsampled(curve.travel)):
+    if record.time is None and (gaps := unsampled(record.travel)):
         start, end = gaps[0]
         raise FitError(f"no work across {start:g} to {end:g} mm, where nothing is known")
     return integral(push, along)
 
 
-def inverted_well(curve: Curve) -> float | None:
+def inverted_well(record: Record) -> float | None:
     """Travel (mm) at which the inverted dome rests, None if the curve does not show it.
 
     The minimum of a cubic through the energies (without them, the integrated force) around the
     lowest one in the last 60 % of the travel, if it is near the points.
 
     >>> travel = np.linspace(0.0, 3.0, 31)
-    >>> round(inverted_well(Curve(travel, energy=travel**2 * (travel - 2.5) ** 2)), 3)
+    >>> round(inverted_well(Record(travel, energy=travel**2 * (travel - 2.5) ** 2)), 3)
     2.5
     """
-    curve = curve.points(np.argsort(curve.travel, kind="stable"))
-    energy, reach = curve.energy, curve.reach
+    record = record.points(np.argsort(record.travel, kind="stable"))
+    energy, reach = record.energy, record.reach
     if energy is None:
-        push = curve.force if curve.force is not None else curve.pressure
+        push = record.force if record.force is not None else record.pressure
         if push is None:
             return None
-        energy = integral(push, curve.travel)
-    late = curve.travel > BEYOND_REST * reach
+        energy = integral(push, record.travel)
+    late = record.travel > BEYOND_REST * reach
     if not late.any():
         return None
-    lowest = curve.travel[late][np.argmin(energy[late])]
-    away = np.where(late, np.abs(curve.travel - lowest), np.inf)
+    lowest = record.travel[late][np.argmin(energy[late])]
+    away = np.where(late, np.abs(record.travel - lowest), np.inf)
     enough = np.unique(away)[:5][-1]  # at least five points, if they are not far
     near = away <= max(NEAR_WELL * reach, min(enough, LARGEST_STEP * reach))
-    if len(np.unique(curve.travel[near])) < 4:
+    if len(np.unique(record.travel[near])) < 4:
         return None
-    cubic = np.polynomial.Polynomial.fit(curve.travel[near], energy[near], 3)
+    cubic = np.polynomial.Polynomial.fit(record.travel[near], energy[near], 3)
     flat = cubic.deriv().roots()
     flat = flat[np.isreal(flat)].real
     wells = flat[cubic.deriv(2)(flat) > 0.0]
     if not len(wells):
         return None
     well = float(wells[0])
-    is_near = np.abs(curve.travel[late] - well).min() <= NEAR_WELL * reach
+    is_near = np.abs(record.travel[late] - well).min() <= NEAR_WELL * reach
     return well if is_near and well > BEYOND_REST * reach else None
 
 
-def speeds(curve: Curve) -> tuple[Array, float]:
+def speeds(record: Record) -> tuple[Array, float]:
     """Speed between points (point − 1,), and the limit above which the dome snaps or rings."""
-    assert curve.time is not None, "speed needs time"
-    duration = float(np.ptp(curve.time)) or 1.0
-    lasting = np.maximum(np.diff(curve.time), np.finfo(float).eps * duration)
-    speed = np.abs(np.diff(curve.travel)) / lasting
-    moving = speed > RESTING * np.ptp(curve.travel) / duration
+    assert record.time is not None, "speed needs time"
+    duration = float(np.ptp(record.time)) or 1.0
+    lasting = np.maximum(np.diff(record.time), np.finfo(float).eps * duration)
+    speed = np.abs(np.diff(record.travel)) / lasting
+    moving = speed > RESTING * np.ptp(record.travel) / duration
     if not moving.any():
         return speed, np.inf
     ascending = np.flatnonzero(moving)[np.argsort(speed[moving], kind="stable")]
@@ -165,62 +167,64 @@ class Pieces(NamedTuple):
     said: str
 
 
-def quasi_static(curve: Curve) -> Pieces:
+def quasi_static(record: Record) -> Pieces:
     """The slow pieces of a record: before a snap, and after its ringing has died.
 
     Slow is at most ten times the speed that three quarters of the moving time stay below, for at
     least a hundredth of the record. Raises FitError if nothing is left.
     """
-    if curve.time is None:
-        return Pieces(np.ones(len(curve.travel), bool), "no time: all points are taken as static")
-    speed, limit = speeds(curve)
+    if record.time is None:
+        return Pieces(np.ones(len(record.travel), bool), "no time: all points are taken as static")
+    speed, limit = speeds(record)
     slow = speed <= limit
     edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False])).astype(int)))
-    shortest = SHORTEST_PIECE * np.ptp(curve.time)
+    shortest = SHORTEST_PIECE * np.ptp(record.time)
     runs = [
         (a, b)
         for a, b in edges.reshape(-1, 2).tolist()
-        if curve.time[b] - curve.time[a] >= shortest
+        if record.time[b] - record.time[a] >= shortest
     ]
-    kept = np.zeros(len(curve.travel), bool)
+    kept = np.zeros(len(record.travel), bool)
     for first, last in runs:
         kept[first : last + 1] = True
     if not kept.any():
         raise FitError("no quasi-static piece: the travel is fast or rings all the time")
-    times = ", ".join(f"{curve.time[a]:.4g} to {curve.time[b]:.4g}" for a, b in runs)
+    times = ", ".join(f"{record.time[a]:.4g} to {record.time[b]:.4g}" for a, b in runs)
     dropped = f"dropped {int((~kept).sum())} of {len(kept)} points"
     why = f"that snap or ring (faster than {limit:.3g} mm/s)"
     return Pieces(kept, f"quasi-static pieces, time {times}: {dropped} {why}")
 
 
-def dirt(curve: Curve, *, is_cut: bool) -> Iterator[str]:
+def dirt(record: Record, *, is_cut: bool) -> Iterator[str]:
     """What is wrong with a record, in words; `is_cut` where only slow pieces are used."""
-    if curve.time is not None and not is_cut and (n_reversals := _reversals(curve)) > 2:
+    if record.time is not None and not is_cut and (n_reversals := _reversals(record)) > 2:
         yield (
             f"ringing: the travel reverses {n_reversals} times while it is fast; "
             "--branches quasi-static leaves that out"
         )
-    if curve.energy is None:
+    if record.energy is None:
         return
-    yield from _disagreement(curve.travel, curve.energy)
-    has_work = curve.force is not None or (curve.pressure is not None and curve.volume is not None)
-    if has_work and (curve.time is not None or not unsampled(curve.travel)):
-        yield from _departure(curve.energy, work(curve))
-    at_rest = np.abs(curve.travel) <= 0.01 * curve.reach
+    yield from _disagreement(record.travel, record.energy)
+    has_work = record.force is not None or (
+        record.pressure is not None and record.volume is not None
+    )
+    if has_work and (record.time is not None or not unsampled(record.travel)):
+        yield from _departure(record.energy, work(record))
+    at_rest = np.abs(record.travel) <= 0.01 * record.reach
     if at_rest.any():
-        offset = float(curve.energy[at_rest][0])
-        if abs(offset) > 0.01 * np.ptp(curve.energy):
+        offset = float(record.energy[at_rest][0])
+        if abs(offset) > 0.01 * np.ptp(record.energy):
             yield f"the energy at rest is {offset:.4g} mJ, not 0 as the law has it"
 
 
-def _reversals(curve: Curve) -> int:
+def _reversals(record: Record) -> int:
     """How often the travel turns back while it is fast."""
-    speed, limit = speeds(curve)
+    speed, limit = speeds(record)
     fast = np.flatnonzero(speed > limit)
     if not len(fast):
         return 0
-    travel = curve.travel[fast[0] : fast[-1] + 2]
-    swing = SMALLEST_SWING * np.ptp(curve.travel)
+    travel = record.travel[fast[0] : fast[-1] + 2]
+    swing = SMALLEST_SWING * np.ptp(record.travel)
     return sum(len(find_peaks(sign * travel, prominence=swing)[0]) for sign in (1.0, -1.0))
 
 
@@ -285,8 +289,3 @@ def alikeness(residuals: Array) -> float:
     """
     squares = float((residuals**2).sum())
     return float((residuals[1:] * residuals[:-1]).sum()) / squares if squares > 0.0 else 0.0
-
-
-def with_energy(curve: Curve, energy: Array) -> Curve:
-    """The curve with another energy."""
-    return replace(curve, energy=energy)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.curves import (
-    Curve,
+from dpgcli.calibration.record import (
+    Record,
     alikeness,
     cleaned,
     dirt,
@@ -31,7 +31,7 @@ def force(travel: Array) -> Array:
     return laws.bistable(travel, *VALUES).force
 
 
-def ringing() -> Curve:
+def ringing() -> Record:
     """Slow loading to 2 mm, a snap that rings around 13 mm and dies out, a slow release."""
     time = np.concatenate((np.linspace(0.0, 1.0, 50), np.linspace(1.001, 1.1, 400)))
     since = time[50:] - 1.0
@@ -39,15 +39,15 @@ def ringing() -> Curve:
     travel = np.concatenate((np.linspace(0.0, 2.0, 50), ring))
     rest = np.linspace(1.101, 2.0, 40)
     travel = np.concatenate((travel, np.linspace(13.5, 13.2, 40)))
-    return Curve(travel, energy=energy(travel), time=np.concatenate((time, rest)))
+    return Record(travel, energy=energy(travel), time=np.concatenate((time, rest)))
 
 
-CLEAN = Curve(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL))
+CLEAN = Record(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL))
 
 
 def test_a_clean_curve_has_no_dirt() -> None:
     assert list(dirt(CLEAN, is_cut=False)) == []
-    loading = Curve(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL), time=TRAVEL)
+    loading = Record(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL), time=TRAVEL)
     assert list(dirt(loading, is_cut=False)) == []
 
 
@@ -59,7 +59,7 @@ def test_ringing_is_said_unless_it_is_cut_away() -> None:
 
 def test_loading_and_unloading_is_not_ringing() -> None:
     there = np.concatenate((TRAVEL, TRAVEL[::-1], TRAVEL, TRAVEL[::-1]))
-    cycles = Curve(there, energy=energy(there), time=np.arange(float(len(there))))
+    cycles = Record(there, energy=energy(there), time=np.arange(float(len(there))))
     assert list(dirt(cycles, is_cut=False)) == []
     assert quasi_static(cycles).kept.all()
 
@@ -67,22 +67,24 @@ def test_loading_and_unloading_is_not_ringing() -> None:
 def test_energies_that_drift_are_said_with_numbers() -> None:
     there = np.concatenate((TRAVEL, TRAVEL[::-1]))
     drifting = energy(there) + np.linspace(0.0, 40.0, len(there))
-    said = list(dirt(Curve(there, energy=drifting, time=np.arange(282.0)), is_cut=False))
+    said = list(dirt(Record(there, energy=drifting, time=np.arange(282.0)), is_cut=False))
     assert said[0].startswith("drifting energy: at ")
     assert "anything from" in said[0]
 
 
 def test_an_energy_that_is_not_the_work_is_said() -> None:
-    said = list(dirt(Curve(TRAVEL, energy=1.1 * energy(TRAVEL), force=force(TRAVEL)), is_cut=False))
+    said = list(
+        dirt(Record(TRAVEL, energy=1.1 * energy(TRAVEL), force=force(TRAVEL)), is_cut=False)
+    )
     assert [text.partition(":")[0] for text in said] == ["the energy is not the work done"]
-    by_volume = Curve(
+    by_volume = Record(
         TRAVEL, energy=1.1 * energy(TRAVEL), pressure=force(TRAVEL) / 50, volume=50 * TRAVEL
     )
     assert list(dirt(by_volume, is_cut=False)) == said
 
 
 def test_an_energy_at_rest_is_said() -> None:
-    said = list(dirt(Curve(TRAVEL, energy=energy(TRAVEL) + 20.0), is_cut=False))
+    said = list(dirt(Record(TRAVEL, energy=energy(TRAVEL) + 20.0), is_cut=False))
     assert said == ["the energy at rest is 20 mJ, not 0 as the law has it"]
 
 
@@ -101,7 +103,7 @@ def test_a_long_hold_does_not_make_the_loading_fast() -> None:
     assert held.time is not None
     travel = np.append(held.travel, np.full(500, held.travel[-1]))
     time = np.append(held.time, np.linspace(2.001, 50.0, 500))
-    kept = quasi_static(Curve(travel, time=time)).kept
+    kept = quasi_static(Record(travel, time=time)).kept
     assert kept[time < 0.99].all()
     assert not kept[(time > 1.002) & (time < 1.05)].any()
 
@@ -114,23 +116,23 @@ def test_without_time_everything_is_static() -> None:
 
 def test_the_work_is_the_energy() -> None:
     fine = np.linspace(0.0, 14.0, 4001)
-    assert work(Curve(fine, force=force(fine))) == pytest.approx(energy(fine), abs=1e-3)
-    by_volume = Curve(fine, pressure=force(fine) / 50.0, volume=50.0 * fine)
+    assert work(Record(fine, force=force(fine))) == pytest.approx(energy(fine), abs=1e-3)
+    by_volume = Record(fine, pressure=force(fine) / 50.0, volume=50.0 * fine)
     assert work(by_volume) == pytest.approx(energy(fine), abs=1e-3)
 
 
 @pytest.mark.parametrize(
     ("curve", "said"),
     [
-        (Curve(TRAVEL, energy=energy(TRAVEL)), "no work without force_N"),
-        (Curve(TRAVEL, pressure=force(TRAVEL)), "no work without force_N"),
+        (Record(TRAVEL, energy=energy(TRAVEL)), "no work without force_N"),
+        (Record(TRAVEL, pressure=force(TRAVEL)), "no work without force_N"),
         (
-            Curve(TRAVEL, force=force(TRAVEL)).points((TRAVEL < 2.0) | (TRAVEL > 12.95)),
+            Record(TRAVEL, force=force(TRAVEL)).points((TRAVEL < 2.0) | (TRAVEL > 12.95)),
             "no work across 1.9 to 13 mm",
         ),
     ],
 )
-def test_no_work_without_what_it_needs(curve: Curve, said: str) -> None:
+def test_no_work_without_what_it_needs(curve: Record, said: str) -> None:
     with pytest.raises(FitError, match=said):
         work(curve)
 
@@ -145,7 +147,7 @@ def test_points_are_put_in_order() -> None:
     found, said = in_order(CLEAN.points(shuffled))
     assert np.array_equal(found.travel, TRAVEL)
     assert said == ("the points were not in order of travel: sorted",)
-    timed = Curve(TRAVEL[::-1], energy=energy(TRAVEL[::-1]), time=TRAVEL)
+    timed = Record(TRAVEL[::-1], energy=energy(TRAVEL[::-1]), time=TRAVEL)
     assert in_order(timed) == (timed, ())
     twice, said = in_order(CLEAN.points(np.repeat(np.arange(141), 2)))
     assert np.array_equal(twice.travel, TRAVEL)
@@ -156,7 +158,7 @@ def test_points_are_put_in_order() -> None:
 def test_the_inverted_well_is_where_the_force_is_zero(kept: Array) -> None:
     beta = 1.0 - VALUES[1]
     well = VALUES[2] * (3 * beta + np.sqrt(9 * beta**2 - 8 * beta)) / (4 * beta)
-    for curve in (Curve(TRAVEL, energy=energy(TRAVEL)), Curve(TRAVEL, force=force(TRAVEL))):
+    for curve in (Record(TRAVEL, energy=energy(TRAVEL)), Record(TRAVEL, force=force(TRAVEL))):
         assert inverted_well(curve.points(kept)) == pytest.approx(well, abs=0.02)
 
 
@@ -166,7 +168,7 @@ def test_no_well_where_there_are_no_points(kept: Array) -> None:
 
 
 def test_a_law_with_one_well_has_no_inverted_one() -> None:
-    assert inverted_well(Curve(TRAVEL, energy=TRAVEL**2)) is None
+    assert inverted_well(Record(TRAVEL, energy=TRAVEL**2)) is None
 
 
 def test_gaps() -> None:
