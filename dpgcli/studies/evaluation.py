@@ -12,6 +12,7 @@ from dpgcli.arrays import keep_freed_memory
 from dpgcli.errors import Problem, SpecError
 from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
+from dpgcli.files.sections import unit_of
 from dpgcli.files.spec import variant
 from dpgcli.files.sweep import flattened
 from dpgcli.mechanics.chain import Chain
@@ -223,7 +224,7 @@ def value_columns(space: Space) -> dict[str, Column]:
     return {
         key: Column(
             short if last.count(short) == 1 and ".overrides." not in key else key,
-            _unit_of(key),
+            unit_of(key),
             f"value of {key}",
             Group.STATES,
             Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
@@ -251,17 +252,6 @@ def _calibration(scene: Scene | None) -> str:
 def _reason(problem: Problem) -> str:
     hint = f" ({problem.hint})" if problem.hint else ""
     return f"{problem.key}: expected {problem.expected}, found {problem.found}{hint}"
-
-
-def _unit_of(key: str) -> str:
-    suffixes = {
-        "_N_mm_per_rad": "N mm/rad",
-        "_N_per_mm": "N/mm",
-        "_mm": "mm",
-        "_MPa": "MPa",
-        "_deg": "°",
-    }
-    return next((unit for suffix, unit in suffixes.items() if key.endswith(suffix)), "")
 
 
 def _dtype(kind: Kind) -> str:

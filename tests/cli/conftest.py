@@ -20,6 +20,27 @@ AMBIENT = {"NO_COLOR", "FORCE_COLOR", "GITHUB_ACTIONS", "COLUMNS", "CLICOLOR_FOR
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
+STUDY = """\
+finger:
+  units: 3
+  linear_stiffness_N_per_mm: 1.0e4
+  lattice:
+    segment_length_mm: 13.75
+    segment_height_mm: 10.75
+    stroke_mm: 3.5
+    bistable_stiffness_N_per_mm: 12.84
+    force_linearity: 0.043
+    hinge_stiffness_N_mm_per_rad: 24.2
+"""
+TIPS = """\
+pattern,tip_x_mm,tip_y_mm,tip_angle_rad,seconds
+000,51.99976,-0.00817,-0.000297,22.5
+001,51.36669,-3.44429,-0.266250,22.5
+010,50.85420,-7.16644,-0.274989,22.5
+100,50.46532,-10.33568,-0.263758,22.5
+110,47.71870,-16.52155,-0.524182,22.5
+"""
+
 
 def surroundings(changes: Mapping[str, str] | None = None) -> dict[str, str]:
     """The environment without what would change how output is written."""
@@ -37,6 +58,14 @@ def folder(tmp_path: Path) -> Path:
     for name in ("three_unit.yaml", "twenty_unit.yaml", "gripper.yaml"):
         (tmp_path / name).write_bytes((CONFIGS / name).read_bytes())
     return tmp_path
+
+
+@pytest.fixture
+def study(folder: Path) -> tuple[str, str]:
+    """Names of a lattice with the study's springs, and of a finite-element finger's tips."""
+    (folder / "study.yaml").write_text(STUDY)
+    (folder / "tips.csv").write_text(TIPS)
+    return "study.yaml", "tips.csv"
 
 
 @pytest.fixture

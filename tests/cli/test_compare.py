@@ -102,26 +102,6 @@ def test_what_makes_no_sense(
     assert result.stdout == ""
 
 
-PUBLISHED = """\
-finger:
-  units: 3
-  linear_stiffness_N_per_mm: 1.0e4
-  lattice:
-    segment_length_mm: 13.75
-    segment_height_mm: 10.75
-    stroke_mm: 3.5
-    bistable_stiffness_N_per_mm: 12.84
-    force_linearity: 0.043
-    hinge_stiffness_N_mm_per_rad: 24.2
-"""
-TIPS = """\
-pattern,tip_x_mm,tip_y_mm,tip_angle_rad,seconds
-000,51.99976,-0.00817,-0.000297,22.5
-001,51.36669,-3.44429,-0.266250,22.5
-010,50.85420,-7.16644,-0.274989,22.5
-100,50.46532,-10.33568,-0.263758,22.5
-110,47.71870,-16.52155,-0.524182,22.5
-"""
 PHALANGES = """\
 pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,chamber4_angle_rad,\
 opening1_mm,opening2_mm,opening3_mm,push1_N,push2_N,push3_N
@@ -138,11 +118,9 @@ values: {segment_height_mm: {value: 12.33}}
 
 
 @pytest.fixture
-def published(folder: Path) -> tuple[str, ...]:
+def published(study: tuple[str, str]) -> tuple[str, ...]:
     """The same finger with the study's springs, of which tips are known."""
-    (folder / "study.yaml").write_text(PUBLISHED)
-    (folder / "tips.csv").write_text(TIPS)
-    return ("compare", "study.yaml", "tips.csv", *FRAME)
+    return ("compare", *study, *FRAME)
 
 
 @pytest.fixture

@@ -20,33 +20,7 @@ LEVER = "segment_height_mm"
 GEOMETRY = ("-g", "chamber_width_mm=20", "-g", "limiting_layer_thickness_mm=1.5")
 
 
-STUDY = """\
-finger:
-  units: 3
-  linear_stiffness_N_per_mm: 1.0e4
-  lattice:
-    segment_length_mm: 13.75
-    segment_height_mm: 10.75
-    stroke_mm: 3.5
-    bistable_stiffness_N_per_mm: 12.84
-    force_linearity: 0.043
-    hinge_stiffness_N_mm_per_rad: 24.2
-"""
-TIPS = """\
-pattern,tip_x_mm,tip_y_mm,tip_angle_rad,seconds
-000,51.99976,-0.00817,-0.000297,22.5
-001,51.36669,-3.44429,-0.266250,22.5
-010,50.85420,-7.16644,-0.274989,22.5
-100,50.46532,-10.33568,-0.263758,22.5
-110,47.71870,-16.52155,-0.524182,22.5
-"""
-
-
-@pytest.fixture(autouse=True)
-def files(folder: Path) -> None:
-    """The finite-element finger's tips, and a lattice of it with the study's springs."""
-    (folder / SPEC).write_text(STUDY)
-    (folder / DATA).write_text(TIPS)
+pytestmark = pytest.mark.usefixtures("study")
 
 
 @pytest.fixture
@@ -160,6 +134,14 @@ def test_the_method_says_frame_and_law(fitted: Any) -> None:
     )
 
 
+def test_residuals_beyond_a_size_count_less(fitted: Any) -> None:
+    robust = fitted("--loss", "huber", "--loss-scale", "0.2")
+    assert "huber loss beyond 0.2, first station" in robust.method
+    assert value(robust, LEVER) != pytest.approx(value(fitted(), LEVER), abs=1e-3)
+    beyond_all = fitted("--loss", "huber", "--loss-scale", "100")
+    assert value(beyond_all, LEVER) == pytest.approx(value(fitted(), LEVER), rel=1e-9)
+
+
 def test_several_values_at_once(fitted: Any) -> None:
     found = fitted("--free", LEVER, "--free", "segment_length_mm")
     assert list(found.uncertain) == [LEVER, "segment_length_mm"]
@@ -244,6 +226,7 @@ def test_a_figure(call: Any, folder: Path) -> None:
         (("-g", "chamber_width_mm=0"), "--geometry: geometry.chamber_width_mm: expected a length"),
         (("-g", "dome_hight_mm=3"), "did you mean dome_height_mm?"),
         (("--loss", "square"), "--loss"),
+        (("--loss", "huber", "--loss-scale", "0"), "--loss-scale 0: expected a number > 0"),
         (("--bootstrap", "-1"), "--bootstrap"),
         (("--plot", "f.pdf"), "expected a name that ends in .svg or .png"),
     ],

@@ -15,16 +15,15 @@ from dpgcli.calibration.grid import Law, Points
 from dpgcli.errors import OutputError, SpecError
 from dpgcli.files.calibration import (
     Calibration,
+    DataFile,
     made_by,
     read_calibration,
     source_of,
     write_calibration,
 )
 from dpgcli.files.calibration.results import (
-    correlation_of,
+    fitted,
     grid_of,
-    quality_of,
-    values_of,
 )
 
 WHOLE = """\
@@ -243,24 +242,19 @@ def test_a_fit_is_written_and_read_back(path: Path) -> None:
     free = [Parameter(key, 0.5, is_free=key != "force_linearity") for key in keys]
     observed = design @ np.array([2.0, 0.5, 1.0]) + np.random.default_rng(1).normal(size=20) / 10
     found = fit_linear(free, design, observed, resamples=20)
-    values = values_of(found)
-    correlation = correlation_of(found)
     head = {"calibration_version": 1, "made_by": made_by(), "method": "test"}
-    content = {
-        **head,
-        "values": values,
-        "correlation": correlation,
-        "quality": quality_of(found, "N"),
-    }
-    write_calibration(path, Calibration.model_validate(content))
+    source = DataFile(file="some.csv", sha256=64 * "0", rows=20)
+    written = Calibration.model_validate({**head, **fitted(found, "N", source)})
+    write_calibration(path, written)
     again = read_calibration(path)
-    assert again.values == values
+    assert again.values == written.values
     assert list(again.uncertain) == [keys[0], keys[2]]
-    assert again.correlation == correlation
-    assert correlation is not None
-    assert correlation[0][1] == pytest.approx(found.correlation[0, 2])
-    assert values.force_linearity is not None
-    assert values.force_linearity.interval is None
+    assert again.correlation == written.correlation
+    assert again.correlation is not None
+    assert again.correlation[0][1] == pytest.approx(found.correlation[0, 2])
+    assert again.values is not None
+    assert again.values.force_linearity is not None
+    assert again.values.force_linearity.interval is None
 
 
 @pytest.mark.parametrize("method", list(Method))

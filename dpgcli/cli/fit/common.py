@@ -52,7 +52,7 @@ GeometrySpec = Annotated[
 ]
 
 NO_GEOMETRY = (
-    "no geometry given (--geometry or --spec): specs will treat the values as extrapolated"
+    "no geometry given (by --geometry or a spec): specs will treat the values as extrapolated"
 )
 VALUE_COLUMNS = (
     Column("key", "", "key of a spec's lattice section", Group.STATES, Kind.TEXT),
@@ -65,14 +65,6 @@ INTERVAL_COLUMNS = (
     Column("lower", "", "lower end of the 95 % bootstrap interval", Group.STATES),
     Column("upper", "", "upper end of the 95 % bootstrap interval", Group.STATES),
 )
-UNITS = {
-    "bistable_stiffness_N_per_mm": "N/mm",
-    "stroke_mm": "mm",
-    "hinge_stiffness_N_mm_per_rad": "N mm/rad",
-    "segment_height_mm": "mm",
-    "segment_length_mm": "mm",
-    "linear_stiffness_N_per_mm": "N/mm",
-}
 
 
 def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path | None) -> None:
@@ -114,12 +106,14 @@ def print_fit(fit: "Fit", printed_as: Format) -> None:
     """One row for each parameter on standard output."""
     import numpy as np
 
+    from dpgcli.files.sections import unit_of
+
     states = zip(fit.parameters, fit.at_bound, strict=True)
     rows: dict[str, Any] = {
         "key": np.array([parameter.key for parameter in fit.parameters]),
         "value": fit.values,
         "standard_error": fit.standard_errors,
-        "unit": np.array([UNITS.get(parameter.key, "") for parameter in fit.parameters]),
+        "unit": np.array([unit_of(parameter.key) for parameter in fit.parameters]),
         "status": np.array(
             ["at bound" if bound else "free" if p.is_free else "fixed" for p, bound in states]
         ),

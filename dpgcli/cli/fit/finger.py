@@ -7,14 +7,18 @@ import typer
 
 from dpgcli.calibration.choices import Loss, Target
 from dpgcli.cli.fit.common import (
+    NO_GEOMETRY,
     Bootstrap,
     GeometryValues,
+    LossOption,
+    LossScale,
     Output,
     Plot,
     Printed,
     Seed,
     check_files,
     method_of,
+    positive,
     print_fit,
     quality_line,
     tell,
@@ -26,16 +30,12 @@ from dpgcli.cli.printing import Format
 if TYPE_CHECKING:
     from dpgcli.calibration.finger import FingerFit
     from dpgcli.calibration.fits import Fit
-    from dpgcli.files.calibration import DataFile
 
 LEVER = "segment_height_mm"
 STILL_OFF = 0.3  # of the deflection
 STILL_OFF_WARNING = (
     "tips are still off by more than 30 % of the deflection: look at --first-station, "
     "--tip-offset, units, and the sign of y (inverted units curl towards -y)"
-)
-NO_GEOMETRY = (
-    "no geometry given (--geometry or in the spec): specs will treat the values as extrapolated"
 )
 UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad"}
 
@@ -55,7 +55,8 @@ def finger(
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     geometry: GeometryValues = None,
-    loss: Annotated[Loss, typer.Option(help="How residuals count")] = Loss.LINEAR,
+    loss: LossOption = Loss.LINEAR,
+    loss_scale: LossScale = None,
     bootstrap: Bootstrap = 0,
     seed: Seed = 0,
     printed_as: Printed = Format.TABLE,
@@ -65,6 +66,7 @@ def finger(
     """Fit lattice values to tips or angles of known states."""
     from dpgcli.calibration.finger import FingerFit
     from dpgcli.files.calibration import geometry_of, source_of
+    from dpgcli.files.calibration.results import fitted
     from dpgcli.files.known_states import check_scale, read_states
     from dpgcli.files.spec import read_scene, scene_of
     from dpgcli.files.spec.problems import checked as checked_spec
@@ -80,12 +82,14 @@ def finger(
     known = read_states(data, base.n_units)
     check_scale(data, known, float(reach(base)[0]))
     frame = frame_of(first_station, tip_offset)
-    study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss)
+    size = positive("--loss-scale", loss_scale)
+    study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss, size)
     found = study.fit(bootstrap, seed)
     warnings = [*_warnings(study, found), *([] if where else [NO_GEOMETRY])]
+    source = source_of(data, known.patterns.shape[1])
     content = {
+        **fitted(found, UNITS[target], source, only_free=True),
         "method": _method(study, found, bootstrap, seed),
-        **_fitted(found, UNITS[target], source_of(data, known.patterns.shape[1])),
         "geometry": where,
         "warnings": warnings,
     }
@@ -118,17 +122,6 @@ def _method(study: "FingerFit", found: "Fit", resamples: int, seed: int) -> str:
         f"{method_of(what, found, resamples, seed)}, first station {station} mm, "
         f"tip offset {tip} mm, {study.finger.law.description}; held: {held}"
     )
-
-
-def _fitted(found: "Fit", unit: str, source: "DataFile") -> dict[str, object]:
-    from dpgcli.files.calibration.results import correlation_of, quality_of, values_of
-
-    return {
-        "values": values_of(found, only_free=True),
-        "correlation": correlation_of(found),
-        "quality": quality_of(found, unit),
-        "sources": [source],
-    }
 
 
 def _summary(study: "FingerFit", found: "Fit") -> list[str]:

@@ -1,7 +1,7 @@
 """`dpg fit hinge`: the stiffness of a hinge from moments over rotations."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -55,6 +55,8 @@ def hinge(
 ) -> None:
     """Fit k_theta to moments over rotations, and check that it is one number."""
     from dpgcli.calibration.hinge import fit_hinge
+    from dpgcli.files.calibration import source_of
+    from dpgcli.files.calibration.results import fitted
     from dpgcli.files.measured import read_moments
 
     check_files((curve, spec), output, plot)
@@ -73,7 +75,9 @@ def hinge(
         warnings.append(f"columns not used: {', '.join(data.ignored)}")
     method = method_of("moment", found.fit, bootstrap, seed)
     method += f", rows where {where}" if where else ""
-    _write(output, curve, found, {"method": method, "geometry": at, "warnings": warnings})
+    source = source_of(curve, found.fit.n_points)
+    content = {"method": method, "geometry": at, "warnings": warnings}
+    write(output, {**fitted(found.fit, "N mm", source), **content})
     if plot is not None:
         _draw(found, data, curve.name, plot)
     print_fit(found.fit, printed_as)
@@ -91,19 +95,6 @@ def _mixed(data: "Moments") -> list[str]:
         for name, texts in data.texts.items()
         if (n := len(set(texts))) > 1
     ]
-
-
-def _write(output: Path | None, curve: Path, found: "HingeFit", content: dict[str, Any]) -> None:
-    from dpgcli.files.calibration import source_of
-    from dpgcli.files.calibration.results import correlation_of, quality_of, values_of
-
-    content |= {
-        "values": values_of(found.fit),
-        "correlation": correlation_of(found.fit),
-        "quality": quality_of(found.fit, "N mm"),
-        "sources": [source_of(curve, found.fit.n_points)],
-    }
-    write(output, content)
 
 
 def _draw(found: "HingeFit", data: "Moments", name: str, path: Path) -> None:

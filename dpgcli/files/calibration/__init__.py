@@ -63,8 +63,10 @@ def source_of(path: Path, rows: int) -> DataFile:
 
 
 def made_by() -> str:
-    """This program, as calibration files name it."""
-    return f"dpg {__version__}"
+    """This program and what its fits depend on, as calibration files name them."""
+    import scipy
+
+    return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}"
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:

@@ -177,7 +177,7 @@ class Calibration(Section):
 
     file: str | None = Field(default=None, description="the name of the file, once it is read")
     calibration_version: Literal[1] = Field(description="1: what this version of dpg reads")
-    made_by: str = Field(description="the program and its version")
+    made_by: str = Field(description="the program and the versions behind its numbers")
     method: str = Field(description="one line of text")
     values: Values | None = Field(default=None, description="a section of fitted values")
     correlation: list[Numbers] | None = Field(

@@ -11,6 +11,7 @@ from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
 from dpgcli.files.calibration.models import (
     Curve,
+    DataFile,
     Grid,
     Quality,
     ScalingLaw,
@@ -19,8 +20,18 @@ from dpgcli.files.calibration.models import (
 )
 
 
-def values_of(fit: Fit, *, only_free: bool = False) -> Values:
-    """Values, errors and intervals of a fit whose parameters are lattice keys."""
+def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) -> dict[str, object]:
+    """The sections on a fit whose parameters are lattice keys, with residuals in `unit`."""
+    return {
+        "values": values_of(fit, only_free=only_free),
+        "correlation": correlation_of(fit),
+        "quality": quality_of(fit, unit),
+        "sources": [source],
+    }
+
+
+def values_of(fit: Fit, *, only_free: bool) -> Values:
+    """Values, errors and intervals; `only_free` leaves out those that were held."""
     said: dict[str, Any] = {}
     for place, parameter in enumerate(fit.parameters):
         if only_free and not parameter.is_free:
