@@ -59,6 +59,13 @@ def test_the_models_error_stands_beside_the_solvers() -> None:
     pose = extended_states(study.finger, patterns).pose[:2]
     assert row["max_tip_error_mm"] == pytest.approx(float(np.hypot(*(pose - tips)).max()))
     assert row["n_missing"] == 0
+    assert np.isnan(row["max_angle_error_rad"]), "the data have no angles"
+    angles = np.array([-1.0, -0.5])
+    study = Bench(Scene(finger(2), ()), 1, known=KnownStates.of_tips(patterns, tips, angles))
+    (row,) = (row for row in study.rows() if row["group"] == "model")
+    off = np.abs(extended_states(study.finger, patterns).pose[2] - angles).astype(float)
+    assert row["max_angle_error_rad"] == pytest.approx(off.max())
+    assert row["rms_angle_error_rad"] == pytest.approx(np.sqrt((off**2).mean()))
 
 
 def test_errors_count_states_that_exist_only() -> None:
