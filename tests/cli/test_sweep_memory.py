@@ -35,6 +35,7 @@ LIMIT = 600 * 1024  # KiB
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs procfs")
 def test_two_hundred_thousand_designs_stay_small(folder: Path) -> None:
     (folder / "sweep.yaml").write_text(SWEEP)
     command = [sys.executable, "-c", PROGRAM, "sweep", "sweep.yaml", "-o", "out", "-q"]
