@@ -70,23 +70,25 @@ class Sweep:
 def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     """Read and check a sweep; `settings` change its base spec.
 
-    Raises SpecError with all problems.
+    Raises SpecError with all problems of both files at once, those of content after those of form.
     """
     document = read_document(path)
     spec, problems = _validated(document)
-    if spec is None:
+    named = document.data.get("base")
+    base_path = path.parent / str(named)
+    base_document, base = None, None
+    if isinstance(named, str):
+        base_document, base = _base(base_path, settings, problems)
+    if spec is None or base_document is None:
         raise SpecError(in_order([*document.problems, *problems]))
-    base_path = path.parent / spec.base
-    base_document = read_scene(base_path, settings)
-    base = checked(base_document)
-    reader = _SpaceReader(document, path.parent, base.gripper is not None)
+    reader = _SpaceReader(document, path.parent, "gripper" in base_document.data)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
     rules = [
         reader.constraint(place, text, base_document.data)
         for place, text in enumerate(spec.constraints or ())
     ]
-    problems = [*document.problems, *reader.problems, *_varied(settings, reader.keys)]
-    if problems:
+    problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
+    if problems or base is None:
         raise SpecError(in_order(problems))
     return Sweep(
         base,
@@ -98,6 +100,19 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
     )
+
+
+def _base(
+    path: Path, settings: Sequence[str], problems: list[Problem]
+) -> tuple[Document | None, Spec | None]:
+    """The data of the base and what they mean, None where `problems` now say why not."""
+    document = None
+    try:
+        document = read_scene(path, settings)
+        return document, checked(document)
+    except SpecError as error:
+        problems += error.problems
+    return document, None
 
 
 def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:

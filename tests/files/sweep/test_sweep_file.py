@@ -283,6 +283,20 @@ def test_a_missing_or_wrong_base_is_named(read: Read, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "wrong",
+    ["{key: finger.geometry.dome_hight_mm, values: [6]}", f"{{key: {HEIGHT}, valuse: [6]}}"],
+    ids=["content", "form"],
+)
+def test_mistakes_of_sweep_and_base_are_said_together(
+    read: Read, tmp_path: Path, wrong: str
+) -> None:
+    (tmp_path / "wrong.yaml").write_text("finger: {unts: 3}\n")
+    found = problems(read, wrong, head="base: wrong.yaml")
+    assert any("wrong.yaml" in problem and "unts" in problem for problem in found), found
+    assert any("hight" in problem or "valuse" in problem for problem in found), found
+
+
+@pytest.mark.parametrize(
     "number", [10**30, 10**400, 2**63, -(2**64)], ids=["1e30", "1e400", "2^63", "-2^64"]
 )
 def test_huge_whole_numbers_are_numbers_or_refused(read: Read, number: int) -> None:
