@@ -8,7 +8,7 @@ limit, may reach 1e18.
 import math
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
 
@@ -37,6 +37,11 @@ def unit_of(key: str) -> str:
     return next((unit for suffix, unit in UNITS.items() if key.endswith(suffix)), "")
 
 
+def _spelled_out(value: object) -> object:
+    """Infinity where it is a text: JSON, in which tables keep their spec, has no number for it."""
+    return math.inf if value == ".inf" else value
+
+
 def _rigid_or_bounded(value: float) -> float:
     if value > STIFFEST and not math.isinf(value):
         raise ValueError("out of range")
@@ -47,7 +52,10 @@ Positive = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 BarStiffness = Annotated[
-    float, Field(ge=SMALLEST, allow_inf_nan=True), AfterValidator(_rigid_or_bounded)
+    float,
+    Field(ge=SMALLEST, allow_inf_nan=True),
+    BeforeValidator(_spelled_out),
+    AfterValidator(_rigid_or_bounded),
 ]
 
 

@@ -483,6 +483,13 @@ def test_canonical_json_is_the_same_for_the_same_meaning(read):
     assert canonical_json(one) != canonical_json(read(LATTICE, "finger.units=5"))
 
 
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("changes", [(), ("finger.linear_stiffness_N_per_mm=.inf",)])
+def test_what_tables_keep_of_a_spec_is_a_spec(path, changes, read):
+    kept = canonical_json(read_spec(path, changes))
+    assert canonical_json(read(kept)) == kept
+
+
 def test_scene_of_a_spec_made_in_python_checks_it_too():
     data = {"finger": {"units": 2, "linear_stiffness_N_per_mm": 1e4}}
     with pytest.raises(SpecError) as caught:
