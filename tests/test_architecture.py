@@ -21,6 +21,7 @@ FLOORS = {
     "report": 6,
     "studies": 7,
     "cli": 8,
+    "__main__": 9,
 }
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 

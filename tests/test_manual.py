@@ -92,7 +92,7 @@ def test_a_session_prints_what_the_manual_shows(
 ) -> None:
     """Its commands one after the other, in a folder of its own beside the examples."""
     (tmp_path / "configs").symlink_to(ROOT / "configs")
-    run = "from dpgcli.cli.main import main; main()"
+    run = "from dpgcli.__main__ import main; main()"
     for command, expected in session:
         program, *arguments = shlex.split(command)
         assert program == "dpg"

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from dpgcli.cli.main import app
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-PROGRAM = (sys.executable, "-c", "from dpgcli.cli.main import main; main()")
+PROGRAM = (sys.executable, "-c", "from dpgcli.__main__ import main; main()")
 AMBIENT = {"NO_COLOR", "FORCE_COLOR", "GITHUB_ACTIONS", "COLUMNS", "CLICOLOR_FORCE"}
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]

@@ -3,6 +3,7 @@
 import resource
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -40,6 +41,24 @@ def is_writing(folder: Path) -> Callable[[], bool]:
         return any(sizes)
 
     return happened
+
+
+def test_an_interrupt_while_the_program_is_still_loading(tmp_path: Path) -> None:
+    program = """
+import sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "typer":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Interrupting())
+from dpgcli.__main__ import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == ExitCode.INTERRUPTED
+    assert done.stderr == "dpg: interrupted; nothing half-written is left\n"
 
 
 @pytest.mark.parametrize(("number", "code", "word"), SIGNALS)

@@ -20,7 +20,7 @@ PROGRAM = (
     sys.executable,
     "-c",
     "import dpgcli.studies.sweep as s; s.STATES_PER_CHUNK = 2**11; "
-    "from dpgcli.cli.main import main; main()",
+    "from dpgcli.__main__ import main; main()",
 )
 SWEEP = """base: eight_unit.yaml
 space:

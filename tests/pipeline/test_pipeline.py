@@ -25,7 +25,7 @@ def checkout(tmp_path: Path) -> Path:
     program = tmp_path / "bin" / "dpg"
     program.parent.mkdir()
     program.write_text(
-        f"#!{sys.executable}\nfrom dpgcli.cli.main import main\n"
+        f"#!{sys.executable}\nfrom dpgcli.__main__ import main\n"
         "if __name__ == '__main__':\n    main()\n",
         encoding="utf-8",
     )

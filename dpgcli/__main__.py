@@ -1,0 +1,18 @@
+"""The program's start, with an answer to Ctrl-C before anything else is imported."""
+
+import sys
+
+
+def main() -> None:
+    """Run the program."""
+    try:
+        from dpgcli.cli.main import main as run
+
+        run()
+    except KeyboardInterrupt:  # while the imports are under way; later ones are met by commands
+        print("dpg: interrupted; nothing half-written is left", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()
