@@ -18,14 +18,15 @@ from dpgcli.calibration.record import (
     cleaned,
     dirt,
     in_order,
-    integral,
     inverted_well,
     quasi_static,
+    rings,
     unsampled,
     work,
 )
 from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
+from dpgcli.mechanics.curve import FEWEST_POINTS
 
 LIMIT = 1.0 / 9.0  # of the linearity: from here on there is one well only
 HARDLY = 0.9  # of the limit: from here on the hinge may cost the second well
@@ -137,12 +138,14 @@ def fit_bistable(record: Record, choice: Choice) -> BistableFit:
     well = inverted_well(curve)
     factor = _factor(choice.opening, well)
     found = _fitted(factor * curve.travel, observed, factor, choice)
+    energies = None
+    try:
+        energies = _energies(curve, observed, choice)
+    except FitError as error:
+        warnings.append(f"no curve written: {error}")
     gaps = unsampled(curve.travel)
-    result = BistableFit(found, curve.travel, observed, factor, well, gaps, None, ())
-    energies, missing = _energies(curve, observed, choice, gaps, warnings)
-    judged = _judgments(result)
-    every = (*found.warnings, *warnings, *missing, *judged)
-    return replace(result, curve=energies, warnings=every)
+    result = BistableFit(found, curve.travel, observed, factor, well, gaps, energies, ())
+    return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result)))
 
 
 def _observed(record: Record, choice: Choice) -> Array:
@@ -212,27 +215,20 @@ def _stroke(start: float, reach: float, *, is_free: bool) -> Parameter:
     return Parameter(STROKE, start, SPAN[0] * reach, SPAN[1] * reach)
 
 
-def _energies(
-    curve: Record,
-    observed: Array,
-    choice: Choice,
-    gaps: list[tuple[float, float]],
-    warnings: list[str],
-) -> tuple[tuple[Array, Array] | None, list[str]]:
-    """The dome's energy by travel, or why it is not known."""
-    if any(text.startswith("ringing") for text in warnings):
-        return None, ["no curve written: its energies are those of a ringing dome"]
+def _energies(record: Record, observed: Array, choice: Choice) -> tuple[Array, Array]:
+    """The dome's energy by travel. Raises FitError where it is not known."""
+    if not choice.is_quasi_static and rings(record):
+        raise FitError("its energies are those of a ringing dome")
     if UNITS[choice.quantity] == "mJ":
-        return cleaned(curve.travel, observed), []
-    if curve.energy is not None:
-        return cleaned(curve.travel, curve.energy), []
-    if gaps:
-        start, end = gaps[0]
-        why = f"the force is not known from {start:.4g} to {end:.4g} mm"
-        return None, [f"no curve written: {why}, so its energy is not"]
-    travel, force = cleaned(curve.travel, observed)
-    before = 0.5 * travel[0] * force[0]  # from rest, where the force is 0
-    return (travel, before + integral(force, travel)), []
+        travel, energy = cleaned(record.travel, observed)
+    elif record.energy is not None:
+        travel, energy = cleaned(record.travel, record.energy)
+    else:
+        travel, force = cleaned(record.travel, observed)
+        energy = work(Record(travel, force=force))
+    if len(travel) < FEWEST_POINTS:
+        raise FitError(f"expected {FEWEST_POINTS} points or more, found {len(travel)}")
+    return travel, energy
 
 
 def _judgments(found: BistableFit) -> Iterator[str]:

@@ -6,6 +6,7 @@ All thresholds are ours; messages give the numbers behind a judgment.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -22,6 +23,8 @@ FAST = 10.0  # times the speed that three quarters of the moving time stay below
 RESTING = 0.01  # of the mean speed, range over duration: slower is not moving
 SHORTEST_PIECE = 0.01  # of the record's duration: slower for less than that is a turning point
 SMALLEST_SWING = 0.02  # of the range of travels: smaller ones do not count as a reversal
+AT_REST = 0.01  # of the largest travel: closer to 0 a dome is at rest
+MOST_REVERSALS = 2  # of a fast travel: those of a cycle
 CELLS = 100
 DISAGREEMENT = 0.02  # of the range of energies: standard deviation at one travel
 MOST_POINTS = 200
@@ -71,12 +74,12 @@ def in_order(record: Record) -> tuple[Record, tuple[str, ...]]:
 
 
 def unsampled(travel: Array) -> list[tuple[float, float]]:
-    """Stretches of the travel (mm) longer than 15 % of its reach without a point.
+    """Stretches of the travel (mm), from rest on, longer than 15 % of its reach without a point.
 
-    >>> unsampled(np.array([0.0, 1.0, 9.0, 10.0]))
-    [(1.0, 9.0)]
+    >>> unsampled(np.array([2.0, 3.0, 9.0, 10.0]))
+    [(0.0, 2.0), (3.0, 9.0)]
     """
-    ascending = np.sort(travel)
+    ascending = np.append(min(0.0, travel.min()), np.sort(travel))
     wide = np.flatnonzero(np.diff(ascending) > LARGEST_STEP * ascending[-1])
     return [(float(ascending[i]), float(ascending[i + 1])) for i in wide]
 
@@ -91,9 +94,10 @@ def integral(values: Array, along: Array) -> Array:
 
 
 def work(record: Record) -> Array:
-    """Energy by integrating ∫F du, or ∫p dV where there is no force (mJ, trapezoids).
+    """Energy by integrating ∫F du, or ∫p dV where there is no force (mJ, trapezoids), from rest on.
 
-    Raises FitError where neither is known, or where a static curve has an unsampled stretch.
+    Raises FitError where neither is known, where a static record has an unsampled stretch, or
+    where it is not known how much was done up to the first point.
     """
     along, push = (
         (record.travel, record.force)
@@ -102,10 +106,15 @@ def work(record: Record) -> Array:
     )
     if along is None or push is None:
         raise FitError("no work without force_N, or pressure_MPa and volume_mm3")
-    if record.time is None and (gaps := unsampled(record.travel)):
-        start, end = gaps[0]
-        raise FitError(f"no work across {start:g} to {end:g} mm, where nothing is known")
-    return integral(push, along)
+    start = float(record.travel[0])
+    near_rest = LARGEST_STEP if record.force is not None else AT_REST
+    gaps = unsampled(record.travel) if record.time is None else []
+    if abs(start) > near_rest * record.reach:
+        gaps = [(0.0, start)]
+    if gaps:
+        raise FitError("no work across {:g} to {:g} mm, where nothing is known".format(*gaps[0]))
+    before = 0.5 * start * push[0] if record.force is not None else 0.0
+    return before + integral(push, along)
 
 
 def inverted_well(record: Record) -> float | None:
@@ -197,28 +206,32 @@ def quasi_static(record: Record) -> Pieces:
 
 def dirt(record: Record, *, is_cut: bool) -> Iterator[str]:
     """What is wrong with a record, in words; `is_cut` where only slow pieces are used."""
-    if record.time is not None and not is_cut and (n_reversals := _reversals(record)) > 2:
+    if not is_cut and rings(record):
         yield (
-            f"ringing: the travel reverses {n_reversals} times while it is fast; "
+            f"ringing: the travel reverses {_reversals(record)} times while it is fast; "
             "--branches quasi-static leaves that out"
         )
     if record.energy is None:
         return
     yield from _disagreement(record.travel, record.energy)
-    has_work = record.force is not None or (
-        record.pressure is not None and record.volume is not None
-    )
-    if has_work and (record.time is not None or not unsampled(record.travel)):
+    with suppress(FitError):  # no work is known
         yield from _departure(record.energy, work(record))
-    at_rest = np.abs(record.travel) <= 0.01 * record.reach
+    at_rest = np.abs(record.travel) <= AT_REST * record.reach
     if at_rest.any():
         offset = float(record.energy[at_rest][0])
         if abs(offset) > 0.01 * np.ptp(record.energy):
             yield f"the energy at rest is {offset:.4g} mJ, not 0 as the law has it"
 
 
+def rings(record: Record) -> bool:
+    """Whether the travel swings while it is fast; without time nothing is known of that."""
+    return _reversals(record) > MOST_REVERSALS
+
+
 def _reversals(record: Record) -> int:
     """How often the travel turns back while it is fast."""
+    if record.time is None:
+        return 0
     speed, limit = speeds(record)
     fast = np.flatnonzero(speed > limit)
     if not len(fast):
@@ -252,6 +265,7 @@ def _disagreement(travel: Array, energy: Array) -> Iterator[str]:
 
 def _departure(energy: Array, done: Array) -> Iterator[str]:
     """An energy that is not the work done."""
+    done = done - done[0]
     away = np.abs(energy - energy[0] - done)
     worst = int(away.argmax())
     if away[worst] > 0.05 * np.ptp(energy):
@@ -262,9 +276,10 @@ def _departure(energy: Array, done: Array) -> Iterator[str]:
 
 
 def cleaned(travel: Array, energy: Array) -> tuple[Array, Array]:
-    """The curve by ascending travel, thinned to about 200 points at most.
+    """The curve by ascending travel, thinned to about 200 points.
 
-    Points that are closer than a two-hundredth of the sampled travel are averaged.
+    Points within the same two-hundredth of the sampled travel are averaged, as are neighbors that
+    are closer than a quarter of it.
 
     >>> cleaned(np.array([2.0, 0.0, 2.0]), np.array([5.0, 0.0, 7.0]))
     (array([0., 2.]), array([0., 6.]))
@@ -272,7 +287,7 @@ def cleaned(travel: Array, energy: Array) -> tuple[Array, Array]:
     ascending = np.argsort(travel, kind="stable")
     travel, energy = travel[ascending], energy[ascending]
     gaps = sum(end - start for start, end in unsampled(travel))
-    width = (np.ptp(travel) - gaps) / MOST_POINTS
+    width = (travel[-1] - min(0.0, travel[0]) - gaps) / MOST_POINTS
     for cell in (np.floor(travel / width) if width > 0.0 else travel, None):
         if cell is None:  # neighbors on both sides of a cell's edge
             cell = np.cumsum(np.diff(travel, prepend=travel[0]) > 0.25 * width)

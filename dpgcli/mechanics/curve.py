@@ -88,13 +88,15 @@ def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tup
     edges = [travel[0], *(end for gap in gaps for end in gap), travel[-1]]
     travels, values = [travel], [value]
     for piece in range(0, len(edges), 2):
-        start, stop = edges[piece], edges[piece + 1]
-        own = (travel >= start) & (travel <= stop)
-        for end, gap in ((start, piece // 2 - 1), (stop, piece // 2)):
-            if not 0 <= gap < len(gaps) or own.sum() < FEWEST_POINTS:
+        own = (travel >= edges[piece]) & (travel <= edges[piece + 1])
+        if own.sum() < FEWEST_POINTS:
+            continue
+        first, last = travel[own].min(), travel[own].max()
+        for end, sign, gap in ((first, -1.0, piece // 2 - 1), (last, 1.0, piece // 2)):
+            if not 0 <= gap < len(gaps):
                 continue
-            reach = min(stop - start, (gaps[gap][1] - gaps[gap][0]) / 3.0)
-            beyond = (reach if end == stop else -reach) * np.array([1.0, 2.0, 3.0]) / 3.0
+            reach = min(last - first, (gaps[gap][1] - gaps[gap][0]) / 3.0)
+            beyond = sign * reach * np.array([1.0, 2.0, 3.0]) / 3.0
             travels.append(end + beyond)
             values.append(_continued(travel[own] - end, value[own], beyond))
     order = np.argsort(np.concatenate(travels))

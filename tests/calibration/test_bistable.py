@@ -195,11 +195,32 @@ def test_an_integral_begins_at_rest() -> None:
     assert found.curve[1] == pytest.approx(law(TRAVEL[2:], TRUE, Quantity.ENERGY), abs=0.03)
 
 
+def test_work_from_a_first_point_that_is_not_rest() -> None:
+    fine = np.linspace(0.3, 4.2, 3001)
+    found = fitted(curve(Quantity.FORCE, travel=fine), Quantity.WORK)
+    assert found.fit.values == pytest.approx(TRUE, rel=0.02), "½ u F up to the first point"
+
+
+def test_what_is_before_the_first_point_is_not_known() -> None:
+    late = fitted(curve(Quantity.FORCE, travel=np.linspace(2.8, 4.2, 40)), Quantity.FORCE)
+    assert late.gaps == [(0.0, 2.8)]
+    assert late.curve is None
+    assert warned(late, "no curve written: no work across 0 to 2.8 mm")
+    assert warned(late, "nothing is sampled from 0 to 2.8 mm: the fitted barrier")
+
+
+def test_a_curve_of_few_points_is_not_written() -> None:
+    one = curve(Quantity.ENERGY, travel=np.array([3.0]))
+    found = fitted(one, fixed={"stroke_mm": 3.5, "force_linearity": 0.043})
+    assert found.fit.values[0] == pytest.approx(12.84)
+    assert warned(found, "no curve written: expected 4 points or more, found 1")
+
+
 def test_no_curve_where_the_force_is_not_known() -> None:
     ends = TRAVEL[(TRAVEL < 0.6) | (TRAVEL > 3.2)]
     found = fitted(curve(Quantity.FORCE, travel=ends), Quantity.FORCE)
     assert found.curve is None
-    assert warned(found, "no curve written: the force is not known from 0.55 to 3.25 mm")
+    assert warned(found, "no curve written: no work across 0.55 to 3.25 mm")
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,12 @@ def test_the_work_is_the_energy() -> None:
             Record(TRAVEL, force=force(TRAVEL)).points((TRAVEL < 2.0) | (TRAVEL > 12.95)),
             "no work across 1.9 to 13 mm",
         ),
+        (Record(TRAVEL[40:], force=force(TRAVEL[40:])), "no work across 0 to 4 mm"),
+        (Record(TRAVEL[:40:-1], force=TRAVEL[:40:-1], time=TRAVEL[:100]), "no work across 0 to 14"),
+        (
+            Record(TRAVEL[5:], pressure=force(TRAVEL[5:]), volume=TRAVEL[5:]),
+            "no work across 0 to 0.5 mm",
+        ),
     ],
 )
 def test_no_work_without_what_it_needs(curve: Record, said: str) -> None:

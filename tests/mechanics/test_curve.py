@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from dpgcli.mechanics.curve import spline
+from dpgcli.mechanics.curve import bridged, spline
 
 TRAVEL = np.array([0.0, 0.2, 0.45, 0.7, 0.9, 1.0, 1.1, 1.3])
 ENERGY = 0.5 * TRAVEL**2 * (0.043 + 0.957 * (1.0 - TRAVEL) ** 2)
@@ -61,3 +61,18 @@ def test_complex_travels_carry_their_derivative() -> None:
     moved = CURVE(travel + 1e-100j)
     assert moved.value.imag / 1e-100 == pytest.approx(CURVE(travel).slope, rel=1e-13)
     assert moved.slope.imag / 1e-100 == pytest.approx(CURVE(travel).bend, rel=1e-13)
+
+
+def test_a_piece_goes_on_from_its_own_end_wherever_the_gap_is_said_to_begin() -> None:
+    """Points beside a gap may have been averaged, away from where the samples ended."""
+    travel = np.array([0.0, 1.0, 2.0, 2.9, 9.2, 10.0, 11.0, 12.0])
+    more, value = bridged(travel, 3.0 + travel**2, [(3.0, 9.0)])
+    assert len(more) == len(travel) + 6
+    assert value == pytest.approx(3.0 + more**2, rel=1e-12)
+
+
+def test_a_gap_before_the_first_piece_is_bridged_towards_rest() -> None:
+    travel = np.array([0.0, 6.0, 7.0, 8.0, 9.0])
+    more, value = bridged(travel, travel**2, [(0.0, 6.0)])
+    assert more.tolist() == pytest.approx([0.0, 4.0, 14.0 / 3.0, 16.0 / 3.0, 6.0, 7.0, 8.0, 9.0])
+    assert value == pytest.approx(more**2, rel=1e-12)
