@@ -16,7 +16,7 @@ ARRAYS = (
     "force_linearity",
     "hinge_stiffness",
     "linear_stiffness",
-    "contact_travel",
+    "dome_travel",
 )
 
 KEYS = {  # names with units, as files say them
@@ -42,7 +42,8 @@ class Finger:
     - `bistable_stiffness` k_b: N/mm; `force_linearity` α: 1
     - `hinge_stiffness` k_θ: N mm/rad, of one hinge (two corners in series)
     - `linear_stiffness` k_L: N/mm of every bar, infinite where bars are rigid
-    - `contact_travel` c: mm, see `laws.Dome`; 0 but for domes with a travel of their own
+    - `dome_travel` D: mm, of the pole of the inverted dome at rest, where the law is of its own
+      travel; 0 where the opening stands for it
 
     `law` says how the domes answer.
     """
@@ -55,7 +56,7 @@ class Finger:
     force_linearity: Array
     hinge_stiffness: Array
     linear_stiffness: Array
-    contact_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: Law = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -92,8 +93,11 @@ class Finger:
 
     @property
     def domes(self) -> Dome:
-        """The constants that the law needs."""
-        return Dome(self.bistable_stiffness, self.force_linearity, self.stroke, self.contact_travel)
+        """The constants that the law needs; a dome touches its neighbor at c = D − d."""
+        contact = 0.0 * self.dome_travel
+        if self.dome_travel.any():
+            contact = np.where(self.dome_travel > 0.0, self.dome_travel - self.stroke, 0.0)
+        return Dome(self.bistable_stiffness, self.force_linearity, self.stroke, contact)
 
     def springs(self, extension: Array) -> SpringResponse:
         """Energy, force and stiffness of the bistable springs at extensions (unit, batch)."""

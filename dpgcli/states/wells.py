@@ -80,9 +80,10 @@ def inverted_wells(finger: Finger) -> Wells:
 def _searched_wells(finger: Finger) -> Wells:
     """The inverted well of any law: sign changes of de/dx on a grid, then bisection."""
     lever = 2.0 * finger.segment_height
-    whole = finger.stroke + finger.contact_travel
-    widest = np.minimum(1.5 * whole - finger.contact_travel, (1.0 - 1e-9) * lever)
-    lowest = finger.law.rests(finger.domes).top if finger.law.pushes_only else 0.0 * widest
+    domes = finger.domes
+    whole = domes.stroke + domes.contact
+    widest = np.minimum(1.5 * whole - domes.contact, (1.0 - 1e-9) * lever)
+    lowest = finger.law.rests(domes).top if finger.law.pushes_only else 0.0 * widest
     lowest = np.where(np.isnan(lowest), 0.0, lowest)
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
     grid = lowest + (widest - lowest) * shares

@@ -28,7 +28,7 @@ def in_other_units(finger: Finger, length: float, force: float) -> Finger:
         "force_linearity": 1.0,
         "hinge_stiffness": force * length,
         "linear_stiffness": force / length,
-        "contact_travel": length,
+        "dome_travel": length,
     }
     return Finger(
         finger.n_units, **{name: v * factors[name] for name, v in finger.arrays().items()}

@@ -94,7 +94,7 @@ def dome_that_inverts_before_it_touches() -> Finger:
     """A dome of 13.7 mm travel that touches its neighbor at 9.5 mm."""
     finger = Finger(
         2,
-        *(np.array([[value]]) for value in (13.5, 10.75, 4.2, 12.84, 0.0, 24.2, 1e4, 9.5)),
+        *(np.array([[value]]) for value in (13.5, 10.75, 4.2, 12.84, 0.0, 24.2, 1e4, 13.7)),
     )
     return replace(finger, law=PushOnly(Tabulated(table())))
 

@@ -2,26 +2,24 @@
 
 A value of the lattice section is taken as it is, but where the geometry fixes it too both must
 agree. The spring constants that are left out come from the published calibration, scaled to the
-geometry, and only if the spec asks for it: a calibrated value never moves silently to a dome or
-hinge other than its own.
+geometry, or from the first calibration file that has them, if the spec asks for it: a calibrated
+value never moves silently to a dome or hinge other than its own.
 """
 
 from dpgcli.files.calibration.models import Calibration
-from dpgcli.files.sections import LARGEST, SMALLEST
 from dpgcli.files.spec.fitted import from_file
 from dpgcli.files.spec.rules import (
     FORCE_LINEARITY,
     PUBLISHED,
-    STROKE,
     Derivation,
     Group,
     Issue,
     Value,
     agree,
-    impossible,
     listed,
     missing_from,
     number,
+    possible,
 )
 from dpgcli.mechanics.scene import Origin
 
@@ -33,7 +31,7 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
     for place, calibration in enumerate(group.calibrations):
         if calibration == PUBLISHED and derivation.origin is not None:
             return _derived_value(derivation, group)
-        if not isinstance(calibration, Calibration) or not derivation.is_fitted:
+        if not isinstance(calibration, Calibration) or calibration is derivation.unlike:
             continue
         value = from_file(derivation, group, calibration)
         if isinstance(value, Value):
@@ -51,8 +49,8 @@ def _derived_value(derivation: Derivation, group: Group) -> Value | Issue:
     if missing:
         return missing_from(derivation, group, missing)
     derived = _derived(derivation, group)
-    if not SMALLEST <= derived <= LARGEST and derivation is not FORCE_LINEARITY:
-        return impossible(derivation, group, derived)
+    if wrong := possible(derivation, group, derived):
+        return wrong
     if derivation.origin is None:
         return Value(derived, Origin.DERIVED, derivation.rule)
     origin = derivation.origin(*_dimensions(derivation, group))
@@ -67,8 +65,8 @@ def _given_value(derivation: Derivation, group: Group, base: Group) -> Value | I
         changed = _changed(derivation, group, base)
         return _moved(derivation, group, given, changed) if changed else _as_given(given)
     derived = _derived(derivation, group)
-    if derivation is STROKE and derived <= 0:
-        return impossible(derivation, group, derived)
+    if wrong := possible(derivation, group, derived):
+        return wrong
     if not agree(given, derived):
         return _disagreement(derivation, group, given, derived)
     return _as_given(given)

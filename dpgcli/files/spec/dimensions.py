@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, located
+from dpgcli.files.sections import expected_of
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.rules import sizes_of
 
@@ -33,5 +34,4 @@ def overridden(spec: Spec, keys: Sequence[str]) -> tuple[str, ...]:
 
 def _problem(file: str, key: str, purpose: str) -> Problem:
     hint = f"or unit_cell_mm; {purpose}" if key == "chamber_width_mm" else purpose
-    expected = "a modulus > 0 in MPa" if key == "elastic_modulus_MPa" else "a length > 0 in mm"
-    return located(Place(file), f"finger.geometry.{key}", expected, "nothing", hint)
+    return located(Place(file), f"finger.geometry.{key}", expected_of(key), "nothing", hint)

@@ -70,7 +70,7 @@ def _no_well(calibration: Calibration) -> Issue:
 def _tabulated(
     calibration: Calibration, curve: Curve, stiffness: float, stroke: float
 ) -> Domes | Issue:
-    factor = curve.travel_to_opening.factor
+    factor = curve.opening_per_travel
     shape = spline(*_points(curve, stroke / factor, stiffness * stroke**2))
     if not np.isfinite(shape.rests[1]):
         return _no_well(calibration)
@@ -89,7 +89,7 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
         STROKE,
         value=lambda height, separation: domes.travel_at(height) - height - separation,
         rule="travel of the inverted dome - dome height - unit separation (contact)",
-        is_fitted=False,
+        unlike=calibration,
     )
     rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
     return replace(domes, derivations=tuple(rules))

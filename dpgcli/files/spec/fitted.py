@@ -6,16 +6,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from dpgcli.files.calibration.models import Calibration
-from dpgcli.files.sections import LARGEST, SMALLEST
 from dpgcli.files.spec.rules import (
     Derivation,
     Group,
     Issue,
     Value,
     agree,
-    impossible,
     listed,
     missing_from,
+    possible,
     sizes_of,
 )
 from dpgcli.mechanics import geometry
@@ -26,8 +25,17 @@ def from_file(
     derivation: Derivation, group: Group, calibration: Calibration
 ) -> Value | Issue | None:
     """A calibrated value, brought to the geometry; None if the file has none."""
+    value = _in_file(derivation, group, calibration)
+    if not isinstance(value, Value):
+        return value
+    return possible(derivation, group, value.value, value.rule) or value
+
+
+def _in_file(
+    derivation: Derivation, group: Group, calibration: Calibration
+) -> Value | Issue | None:
     if found := calibration.fitted(derivation.key):
-        base = Value(found.value, Origin.CALIBRATED, found.verb, found.standard_error)
+        base = Value(found.value, Origin.CALIBRATED, "from", found.standard_error)
         return _brought(derivation, group, calibration, base, ())
     grid = calibration.grid
     if grid is None or not grid.has(derivation.key):
@@ -46,7 +54,7 @@ def from_file(
     base = Value(
         value,
         origin,
-        f"{how} {listed(grid.over)}",
+        f"{how} {listed(grid.over)},",
         value * error if math.isfinite(error) else None,
     )
     return _brought(derivation, group, calibration, base, tuple(grid.over))
@@ -60,7 +68,7 @@ def _brought(
     over: tuple[str, ...],
 ) -> Value | Issue:
     """A file's value, scaled by the rule where dimensions that it is not over are others."""
-    name = f"{base.rule}, {calibration.file}"
+    name = f"{base.rule} {calibration.file}"
     own = sizes_of(calibration.geometry) | {k: group.geometry[k] for k in over}
     here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
     if unknown := [need for need in here if need not in own]:
@@ -72,11 +80,11 @@ def _brought(
     if missing := [need for need in derivation.needs if need not in own]:
         rule = f"{name}, which does not state its {listed(missing)} to scale by"
         return base._replace(origin=Origin.EXTRAPOLATED, rule=rule)
-    there = [own[need] for need in derivation.needs]
-    factor = derivation.value(*(here.get(need, own[need]) for need in derivation.needs))
-    factor /= derivation.value(*there)
-    if not SMALLEST <= factor <= LARGEST:
-        return impossible(derivation, group, base.value * factor)
+    there = derivation.value(*(own[need] for need in derivation.needs))
+    if possible(derivation, group, there):
+        rule = f"{name}, whose geometry has no such value to scale by"
+        return base._replace(origin=Origin.EXTRAPOLATED, rule=rule)
+    factor = derivation.value(*(here.get(need, own[need]) for need in derivation.needs)) / there
     origin = _graver(base.origin, Origin.SCALED)
     if derivation.origin is geometry.dome_origin:
         origin = _graver(origin, geometry.dome_origin(*_dome(own | here)))

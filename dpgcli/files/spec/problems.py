@@ -7,7 +7,17 @@ from pydantic import ValidationError
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import KeyPath, dotted, in_order, shown
-from dpgcli.files.sections import EXPECTED, Geometry, Lattice, Section, UnitGeometry, UnitLattice
+from dpgcli.files.sections import (
+    LARGEST,
+    SMALLEST,
+    STIFFEST,
+    Geometry,
+    Lattice,
+    Section,
+    UnitGeometry,
+    UnitLattice,
+    expected_of,
+)
 from dpgcli.files.source import Document
 from dpgcli.files.spec.models import (
     MAX_UNITS,
@@ -53,7 +63,7 @@ HINTS = {
 CALIBRATION: KeyPath = ("finger", "calibration")
 TEXTS = ("calibration", "law")
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
-OUT_OF_RANGE = "from 1e-12 to 1e12; 1e18 for the linear stiffness"
+OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
 
 def checked(document: Document) -> Spec:
@@ -112,7 +122,7 @@ def _expected(path: KeyPath) -> str:
     key = str(path[-1]) if path else "document"
     if _pattern(path) in SECTIONS or key == "overrides":
         return "a section of keys"
-    return {**EXPECTED, **OWN}.get(key, "a length > 0 in mm")
+    return OWN.get(key, expected_of(key))
 
 
 def _hint(key: str, error: Any) -> str:

@@ -46,7 +46,8 @@ class Value(NamedTuple):
 class Derivation:
     """How geometry yields one lattice value; `origin` only where a calibration is behind it.
 
-    `is_fitted` says whether a calibration file may give the value instead.
+    Calibration files may give the value instead, but not the one that `unlike` names: there the
+    key means something else.
     """
 
     key: str
@@ -54,7 +55,8 @@ class Derivation:
     value: Callable[..., float]
     rule: str
     origin: Callable[..., Origin] | None = None
-    is_fitted: bool = True
+    unlike: Calibration | None = None
+    bounds: tuple[float, float] = (SMALLEST, LARGEST)
 
 
 SEGMENT_LENGTH = Derivation(
@@ -88,6 +90,7 @@ FORCE_LINEARITY = Derivation(
     lambda dome_height, dome_thickness: geometry.FORCE_LINEARITY,
     "kept constant (finite-element scaling)",
     geometry.dome_origin,
+    bounds=(0.0, 1.0),
 )
 HINGE_STIFFNESS = Derivation(
     "hinge_stiffness_N_mm_per_rad",
@@ -100,6 +103,7 @@ HINGE_STIFFNESS = Derivation(
     geometry.hinge_stiffness,
     "E W_ch t_L^3 / s (inferred scaling)",
     geometry.hinge_origin,
+    bounds=(0.0, LARGEST),
 )
 DERIVATIONS = (
     SEGMENT_LENGTH,
@@ -151,15 +155,20 @@ def missing_from(
     )
 
 
-def impossible(derivation: Derivation, group: Group, derived: float) -> Issue:
-    """A derived value that no finger can have."""
+def possible(
+    derivation: Derivation, group: Group, value: float, rule: str | None = None
+) -> Issue | None:
+    """What is wrong with a value that a rule gives, if no finger can have it."""
+    low, high = derivation.bounds
+    if low <= value <= high:
+        return None
     needs = [need for need in derivation.needs if need in group.own_geometry]
     path = group.path("geometry", (needs or derivation.needs)[0])
-    found = f"{derivation.key} = {number(derived)}"
-    if derivation is STROKE and derived <= 0:
+    found = f"{derivation.key} = {number(value)}"
+    if derivation is STROKE and value <= 0:
         hint = "the dome never reaches its neighbor"
         return Issue(path, "a dome height > the unit separation", found, hint)
-    return Issue(path, f"a derived value from {SMALLEST:g} to {LARGEST:g}", found, derivation.rule)
+    return Issue(path, f"a value from {low:g} to {high:g}", found, rule or derivation.rule)
 
 
 def agree(given: float, derived: float) -> bool:

@@ -167,7 +167,7 @@ def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
         return Value(finger.linear_stiffness_N_per_mm, Origin.GIVEN, "as given")
     for place, calibration in enumerate(base.calibrations):
         if isinstance(calibration, Calibration) and (found := calibration.fitted(LINEAR_STIFFNESS)):
-            rule = f"{found.verb}, {calibration.file}"
+            rule = f"from {calibration.file}"
             return Value(found.value, Origin.CALIBRATED, rule, found.standard_error, place)
     return NO_BARS
 
@@ -251,15 +251,15 @@ def _finger(spec: FingerSpec, resolution: Resolution) -> Finger:
         force_linearity=columns.get("force_linearity", none),  # curves need none
         hinge_stiffness=columns["hinge_stiffness_N_mm_per_rad"],
         linear_stiffness=columns[LINEAR_STIFFNESS],
-        contact_travel=_contact(spec.units, resolution) if domes.travel else none,
+        dome_travel=_travels(spec.units, resolution) if domes.travel else none,
         law=domes.law,
     )
 
 
-def _contact(n_units: int, resolution: Resolution) -> Array:
-    """Travels at which domes touch: those of inverted domes at rest, less the strokes."""
+def _travels(n_units: int, resolution: Resolution) -> Array:
+    """Travels of inverted domes at rest, by the heights of the domes."""
     pairs = [
-        (group, value._replace(value=resolution.domes.travel_at(height) - value.value))
+        (group, value._replace(value=resolution.domes.travel_at(height)))
         for group, value in resolution.values[STROKE.key]
         for height in [group.geometry.get("dome_height_mm")]
     ]

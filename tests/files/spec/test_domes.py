@@ -65,7 +65,7 @@ def calibration(travel=TRAVEL, energy=None, **changes):
         "curve": {
             "travel_mm": list(travel),
             "energy_mJ": list(energy),
-            "travel_to_opening": {"rule": "proportional", "factor": FACTOR},
+            "opening_per_travel": FACTOR,
         },
     }
     return {key: value for key, value in {**data, **changes}.items() if value is not None}
@@ -120,7 +120,7 @@ def test_published_needs_the_linearity_that_a_curve_does_without(scene, problem)
 def test_a_tabulated_law_has_the_files_energy_at_its_openings(scene):
     finger = scene("tabulated").finger
     assert isinstance(finger.law, Tabulated)
-    assert finger.contact_travel.tolist() == [[0.0]]
+    assert finger.domes.contact.tolist() == [[0.0]]
     assert energies(finger, FACTOR * TRAVEL) == pytest.approx(polynomial(TRAVEL), abs=1e-9)
     assert finger.law.rests(finger.domes).well.item() == pytest.approx(FACTOR * WELL, abs=1e-4)
 
@@ -169,7 +169,7 @@ def test_higher_domes_travel_further_and_hold_more(scene):
     """By the rules found in finite elements: travel as h, inverted energy as t^2.8 h^1.75."""
     changes = ("finger.geometry.dome_height_mm=7.5", "finger.geometry.dome_thickness_mm=1")
     finger = scene("push_only", *changes).finger
-    assert finger.contact_travel.item() == pytest.approx(7.5 + 3.0, rel=1e-12)
+    assert finger.domes.contact.item() == pytest.approx(7.5 + 3.0, rel=1e-12)
     assert finger.stroke.item() == pytest.approx(WELL * 7.5 / 6.5 - 10.5, abs=1e-3)
     inverted = energies(finger, [finger.stroke.item() + 1.0]).item()
     growth = (1.0 / 0.75) ** 2.8 * (7.5 / 6.5) ** 1.75
@@ -178,8 +178,21 @@ def test_higher_domes_travel_further_and_hold_more(scene):
 
 def test_a_dome_that_never_reaches_its_neighbor_is_a_problem(problem):
     said = problem("push_only", "finger.geometry.unit_separation_mm=8")
-    assert "finger.geometry.dome_height_mm: expected a derived value" in said
+    assert "finger.geometry.dome_height_mm: expected a value from 1e-12" in said
     assert "travel of the inverted dome - dome height - unit separation (contact)" in said
+
+
+def test_a_stroke_fitted_elsewhere_comes_before_that_of_contact(scene):
+    """The dome travels as far as before, so that it touches earlier; `with_values` agrees."""
+    head = {"calibration_version": 1, "made_by": "hand", "method": "none"}
+    stroke = {**head, "values": {"stroke_mm": {"value": 3.0, "standard_error": 0.1}}}
+    Path("stroke.yaml").write_text(json.dumps(stroke), encoding="utf-8")
+    found = scene("push_only", "finger.calibration=[stroke.yaml, dome.yaml, published]")
+    assert source(found, "stroke_mm").value == 3.0
+    assert found.finger.domes.contact.item() == pytest.approx(WELL - 3.0, abs=1e-4)
+    assert found.uncertainty is not None
+    changed = scene("push_only").finger.with_values({"stroke_mm": 3.0})
+    assert changed.domes.contact.item() == found.finger.domes.contact.item()
 
 
 def test_units_with_domes_of_their_own_push_each_in_its_way(scene):
@@ -187,7 +200,7 @@ def test_units_with_domes_of_their_own_push_each_in_its_way(scene):
     same = scene("push_only"), scene("push_only", "finger.geometry.dome_height_mm=7.5")
     turns = [_turns(s, "100")[0] for s in same]
     found = _turns(graded, "111")
-    assert graded.finger.contact_travel[:, 0] == pytest.approx([9.5, 10.5, 9.5])
+    assert graded.finger.domes.contact[:, 0] == pytest.approx([9.5, 10.5, 9.5])
     assert found == pytest.approx([turns[0], turns[1], turns[0]], rel=1e-10)
 
 
@@ -242,7 +255,7 @@ def test_the_first_file_with_a_curve_gives_it(scene):
 def test_pushing_by_the_published_law_needs_no_curve(scene):
     finger = scene("push_only", "finger.calibration=published").finger
     assert finger.law.description == "push-only law, published energy of the dome"
-    assert (finger.stroke.item(), finger.contact_travel.item()) == (3.5, 0.0)
+    assert (finger.stroke.item(), finger.domes.contact.item()) == (3.5, 0.0)
     assert source(scene("push_only", "finger.calibration=published"), "force_linearity")
 
 

@@ -51,16 +51,11 @@ def grid(method, quantity=STIFFNESS, value=power_law):
         "dome_thickness_mm": [t for _, t in POINTS],
         quantity: [value(h, t) for h, t in POINTS],
     }
-    law = (
-        f"  scaling: {{{quantity}: {{at_reference: 1, "
-        "exponents: {dome_height_mm: 0, dome_thickness_mm: 0}}}\n"
-    )
     return (
         HEAD
         + "geometry: {elastic_modulus_MPa: 26}\n"
         + f"grid:\n  method: {method}\n  over: [dome_height_mm, dome_thickness_mm]\n"
         + f"  points: {json.dumps(lists)}\n"
-        + (law if method == "scaling" else "")
     )
 
 
@@ -104,6 +99,29 @@ def sources(scene, key):
 def only(scene, key):
     (source,) = sources(scene, key)
     return source
+
+
+@pytest.mark.parametrize("height", [3.0, 2.0])
+def test_a_file_whose_geometry_has_no_stroke_is_not_scaled_by_it(write, scene, height):
+    geometry = f"geometry: {{dome_height_mm: {height}, unit_separation_mm: 3}}\n"
+    write("a.yaml", HEAD + geometry + "values: {stroke_mm: {value: 3.3}}\n")
+    found = only(scene("[a.yaml, published]"), "stroke_mm")
+    assert (found.value, found.origin) == (3.3, Origin.EXTRAPOLATED)
+    assert found.rule == "from a.yaml, whose geometry has no such value to scale by"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value", "said"),
+    [
+        ("force_linearity", lambda h, t: 0.5 * t / 0.6 * h**4 / 625, "a value from 0 to 1, found"),
+        (STIFFNESS, lambda h, t: 1e9 * (h / 5) ** 20, "a value from 1e-12 to 1e+12, found"),
+    ],
+)
+def test_a_grid_that_ends_in_no_value_is_a_problem(write, problems, quantity, value, said):
+    write("a.yaml", grid("interpolation", quantity, value))
+    (found,) = problems("[a.yaml, published]", "finger.geometry.dome_height_mm=9")
+    assert said in found
+    assert "interpolated over dome_height_mm, dome_thickness_mm, a.yaml" in found
 
 
 def test_the_first_file_that_has_a_value_gives_it(write, scene):
@@ -158,7 +176,7 @@ def test_a_files_own_geometry_keeps_its_value(write, scene):
     write("a.yaml", HEAD + STUDY + SPRING)
     source = only(scene("[a.yaml, published]"), STIFFNESS)
     assert (source.value, source.origin, source.standard_error) == (20.0, Origin.CALIBRATED, 0.5)
-    assert source.rule == "fitted, a.yaml"
+    assert source.rule == "from a.yaml"
 
 
 @pytest.mark.parametrize(
@@ -266,7 +284,7 @@ def test_bars_may_be_fitted_too(write, scene, problems):
     found = scene("[published, a.yaml]", text=soft)
     source = only(found, "linear_stiffness_N_per_mm")
     assert (source.value, source.units, source.origin) == (123.0, "1-4", Origin.CALIBRATED)
-    assert source.rule == "held, a.yaml"
+    assert source.rule == "from a.yaml"
     assert scene("[published, a.yaml]").finger.linear_stiffness.item() == 1e4
     assert problems("published", text=soft) == [
         "x.yaml:1:1: finger.linear_stiffness_N_per_mm: expected a stiffness > 0 in N/mm, or .inf, "
@@ -393,7 +411,7 @@ def test_what_a_table_keeps_is_checked_as_a_file_is(write, scene, problems, list
     calibration["curve"] = {
         "travel_mm": [0, 3, 2, 4],
         "energy_mJ": [0, 1, 2, 0],
-        "travel_to_opening": {"rule": "equal"},
+        "opening_per_travel": 1.0,
     }
     kept["finger"]["calibration"] = [calibration, "published"] if listed else calibration
     where = "finger.calibration.0" if listed else "finger.calibration"

@@ -93,7 +93,7 @@ def test_the_study_s_finger_has_the_published_lattice_exactly():
         "force_linearity": [[0.043]],
         "hinge_stiffness": [[24.2]],
         "linear_stiffness": [[1e4]],
-        "contact_travel": [[0.0]],
+        "dome_travel": [[0.0]],
     }
 
 
