@@ -19,7 +19,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.losses import influence
-from dpgcli.calibration.search import Function, Parameter, Search, differences
+from dpgcli.calibration.search import Function, Parameter, Search
 from dpgcli.errors import FitError
 
 __all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
@@ -72,10 +72,10 @@ class Fit:
 def fit(
     parameters: Sequence[Parameter],
     residual: Function,
-    jacobian: Function | None,
+    jacobian: Function,
     *,
     observed: Array,
-    loss: Loss | str = Loss.LINEAR,
+    loss: Loss = Loss.LINEAR,
     loss_scale: float | None = None,
     resamples: int = 0,
     seed: int = 0,
@@ -84,13 +84,13 @@ def fit(
 
     `residual` and `jacobian` take the values of all parameters, fixed ones included, (n,), and
     give residuals (point,), predicted less `observed` and in its unit, and their derivatives
-    (point, n); without `jacobian` it comes from central differences. `loss_scale` is the size
-    from which a residual counts less; by default a multiple of the median residual.
+    (point, n). `loss_scale` is the size from which a residual counts less; by default a multiple
+    of the median residual.
     `resamples` asks for bootstrap intervals: points drawn anew with replacement, each time
     fitted again; the same `seed` gives the same intervals.
 
     Raises FitError if there are fewer points than free parameters, if some of them cannot be
-    told apart, or if the search does not converge.
+    told apart, or if the search does not converge; ValueError for a start outside its bounds.
 
     >>> through_origin = Parameter("stiffness", 1.0)
     >>> x, y = np.array([1.0, 2.0]), np.array([2.0, 4.0])
@@ -100,15 +100,15 @@ def fit(
     """
     if not all(p.lower <= p.start <= p.upper for p in parameters):
         raise ValueError(f"a start outside its bounds in {parameters}")
-    slopes = jacobian or differences(residual, tuple(parameters))
-    search = Search(tuple(parameters), residual, slopes, Loss(loss), np.arange(len(observed)))
+    search = Search(tuple(parameters), residual, jacobian, loss, np.arange(len(observed)))
     free = np.array([p.is_free for p in parameters])
     start = np.array([p.start for p in parameters])
     _check_points(observed, int(free.sum()))
     values, scale = search.scaled(start, free, loss_scale)
     values, still_free = search.solved(values, free, scale)
     found = _judged(search, values, still_free, scale, observed)
-    found = replace(found, at_bound=free & ~still_free, warnings=_warnings(search, found, free))
+    found = replace(found, at_bound=free & ~still_free)
+    found = replace(found, warnings=_warnings(found))
     return _bootstrapped(search, found, free, resamples, seed) if resamples else found
 
 
@@ -133,7 +133,8 @@ def fit_linear(
 
 def _check_points(observed: Array, n_free: int) -> None:
     if len(observed) < n_free:
-        raise FitError(f"{len(observed)} points for {n_free} free values: give more, or fix some")
+        points = f"{len(observed)} point{'s' * (len(observed) != 1)}"
+        raise FitError(f"{points} for {n_free} free values: give more, or fix some")
 
 
 def _judged(search: Search, values: Array, free: Flags, scale: float, observed: Array) -> Fit:
@@ -175,24 +176,25 @@ def _covariance(search: Search, values: Array, free: Flags, scale: float) -> Arr
     return np.asarray((pull**2).sum() / n_spare * (spread @ spread.T) * np.outer(size, size))
 
 
-def _warnings(search: Search, found: Fit, free: Flags) -> tuple[str, ...]:
+def _warnings(found: Fit) -> tuple[str, ...]:
     said = []
-    for parameter, value, is_free, error in zip(
-        search.parameters, found.values, free, found.standard_errors, strict=True
+    n_free = sum(parameter.is_free for parameter in found.parameters)
+    for parameter, value, is_at_bound, error in zip(
+        found.parameters, found.values, found.at_bound, found.standard_errors, strict=True
     ):
-        if is_free and value in (parameter.lower, parameter.upper):
+        if is_at_bound:
             said.append(
                 f"{parameter.key} ended at its bound {value:g}: it has no standard error, and "
                 "those of the others are as if it were known"
             )
-        elif is_free and np.isnan(error) and found.n_points > free.sum():
+        elif parameter.is_free and np.isnan(error) and found.n_points > n_free:
             said.append(f"{parameter.key}: too many outliers for a standard error")
-        elif is_free and error > abs(value):
+        elif parameter.is_free and error > abs(value):
             said.append(
                 f"{parameter.key}: its standard error, {error:.2g}, is larger than the value: "
                 "the data hardly determine it"
             )
-    if found.n_points == free.sum():
+    if found.n_points == n_free:
         points = "1 point" if found.n_points == 1 else f"{found.n_points} points"
         said.append(f"{points} for as many free values: no error estimate")
     return tuple(said)
@@ -211,6 +213,8 @@ def _bootstrapped(search: Search, found: Fit, free: Flags, resamples: int, seed:
             fitted.append(again.solved(found.values, free, found.loss_scale)[0])
         except FitError:
             continue  # counted below
+    if resamples == 1:
+        raise FitError("bootstrap: one sample gives no interval, draw a few hundred")
     if len(fitted) < max(2, resamples // 2):
         raise FitError(f"bootstrap: {resamples - len(fitted)} of {resamples} samples have no fit")
     edges = (0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE))

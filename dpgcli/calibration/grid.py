@@ -67,20 +67,21 @@ class Points:
 
     def are_inside(self, geometry: Array) -> Flags:
         """Whether geometries (design, key) lie in the convex hull of the points, edges included."""
-        low, high = self.geometry.min(axis=0), self.geometry.max(axis=0)
-        size = np.where(high > low, high - low, 1.0)
-        scaled = (geometry - low) / size
-        in_range = ((scaled >= -SLACK) & (scaled <= (high - low) / size + SLACK)).all(axis=1)
+        scaled, own = self._scaled(geometry), self._scaled(self.geometry)
+        in_range = ((scaled >= -SLACK) & (scaled <= own.max(axis=0) + SLACK)).all(axis=1)
         if len(self.over) == 1:
             return np.asarray(in_range)
         return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=SLACK) >= 0))
 
+    def _scaled(self, geometry: Array) -> Array:
+        """Geometries (design, key) over the ranges of the points, which begin at 0."""
+        size = np.ptp(self.geometry, axis=0)
+        return np.asarray((geometry - self.geometry.min(axis=0)) / np.where(size > 0.0, size, 1.0))
+
     @cached_property
     def _hull(self) -> Any:
-        low = self.geometry.min(axis=0)
-        size = np.ptp(self.geometry, axis=0)
         try:
-            return Delaunay((self.geometry - low) / np.where(size > 0.0, size, 1.0))
+            return Delaunay(self._scaled(self.geometry))
         except (QhullError, ValueError):
             raise FitError(
                 f"the points leave no room between them over {', '.join(self.over)}: "
@@ -127,8 +128,8 @@ class Law:
     def leave_one_out(self, key: str) -> tuple[float, float]:
         """Largest and root mean square relative error of each point from the others.
 
-        NaN where the others are too few. Without one of its points a grid is none any more:
-        thin-plate splines then take the place of the grid.
+        NaN where the others are too few. Without one of its points a grid over several keys is
+        none any more: thin-plate splines then take its place.
         """
         errors = self._left_out[key]
         return float(np.abs(errors).max()), float(np.sqrt(np.mean(errors**2)))

@@ -81,7 +81,10 @@ def _curvature(moment: Array, rotation: Array, secants: tuple[float, float]) -> 
     for name, power in (("quadratic", 2), ("cubic", 3)) if is_known else ():
         shape = np.stack((powers, powers**power), axis=1)
         terms = (Parameter("linear", secants[0] * reach), Parameter(name, 0.0))
-        found = fit_linear(terms, shape, moment)
+        try:
+            found = fit_linear(terms, shape, moment)
+        except FitError:  # the rotations hardly differ: nothing to be said of a curvature
+            continue
         size, error = float(found.values[1]), float(found.standard_errors[1])
         if abs(size) > SIGNIFICANT * error and abs(size) > 1e-6 * abs(found.values[0]):
             yield (
@@ -92,5 +95,5 @@ def _curvature(moment: Array, rotation: Array, secants: tuple[float, float]) -> 
     if abs(far - near) > LARGEST_CHANGE * abs(near):
         yield (
             f"not linear: moment over rotation changes from {near:.4g} to {far:.4g} N mm/rad "
-            f"({100.0 * (far / near - 1.0):+.1f} %) towards {reach:.3g} rad"
+            f"towards {reach:.3g} rad"
         )

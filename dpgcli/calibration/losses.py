@@ -11,7 +11,7 @@ from dpgcli.calibration.choices import Loss
 
 # in standard deviations: estimates are 95 % as efficient as plain ones if errors are normal
 # (Holland and Welsch 1977; soft_l1 from the same condition by quadrature)
-TUNING = {Loss.LINEAR: 1.0, Loss.SOFT_L1: 1.287, Loss.HUBER: 1.345, Loss.CAUCHY: 2.385}
+TUNING = {Loss.SOFT_L1: 1.287, Loss.HUBER: 1.345, Loss.CAUCHY: 2.385}
 
 
 def growth(loss: Loss, ratio: Array) -> Array:

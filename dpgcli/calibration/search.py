@@ -127,8 +127,8 @@ class Search:
         effect = length * np.array([p.size for p in self.parameters])[free]
         length = np.where(effect > IDLE * effect.max(initial=0.0), length, 0.0)
         columns = slopes / np.where(length > 0.0, length, np.inf)
-        _, singular, directions = np.linalg.svd(columns)
-        if len(singular) == len(length) and singular[-1] > ALIKE:
+        _, singular, directions = np.linalg.svd(columns, full_matrices=False)
+        if singular[-1] > ALIKE:
             return
         keys = [p.key for p, is_free in zip(self.parameters, free, strict=True) if is_free]
         if idle := [key for key, size in zip(keys, length, strict=True) if size == 0.0]:
@@ -152,14 +152,3 @@ def _with(values: Array, free: Flags, some: Array) -> Array:
     changed = values.copy()
     changed[free] = some
     return changed
-
-
-def differences(residual: Function, parameters: tuple[Parameter, ...]) -> Function:
-    """A Jacobian by central differences."""
-    steps = np.diag([6e-6 * p.size for p in parameters])  # cube root of the rounding unit
-
-    def jacobian(values: Array) -> Array:
-        pairs = [(residual(values + s) - residual(values - s)) / (2.0 * s.sum()) for s in steps]
-        return np.stack(pairs, axis=1)
-
-    return jacobian

@@ -60,6 +60,18 @@ def test_hinges_that_are_none(moment: list[float], rotation: list[float], said: 
         fit_hinge(np.array(moment), np.array(rotation))
 
 
+def test_a_hinge_without_moment_at_first_is_not_linear() -> None:
+    found = fit_hinge(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3, 0.4]))
+    assert any("changes from 0 to" in text for text in found.fit.warnings), found.fit.warnings
+
+
+def test_rotations_that_hardly_differ_say_nothing_of_curvature() -> None:
+    rotation = 0.2 + 1e-10 * np.arange(4)
+    found = fit_hinge(24.2 * rotation, rotation).fit
+    assert found.values[0] == pytest.approx(24.2)
+    assert found.warnings == ()
+
+
 def test_three_points_that_stiffen_are_not_linear() -> None:
     found = fit_hinge(np.array([1.0, 5.0, 9.0]), np.array([0.2, 0.3, 0.4]))
     assert any("changes from 5 to 20" in text for text in found.fit.warnings), found.fit.warnings

@@ -10,6 +10,7 @@ from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.dome import Dome, DomeMesh
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
+from dpgcli.mechanics.geometry import WALL_THICKNESS
 
 UNITS = "Units: mm, N, MPa, s; mass in t."
 DENSITY = 1.2e-9
@@ -138,9 +139,9 @@ def hinge_deck(
 def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
     """What a hinge's model is, for people."""
     return (
-        f"{chambers.count} hollow chambers on a limiting layer, half of them (z = 0 is a plane of "
+        "2 hollow chambers on a limiting layer, half of them (z = 0 is a plane of "
         f"symmetry): inner length {chambers.length:g} mm,",
-        f"inner width and height {chambers.width:g} mm, walls {chambers.wall_thickness:g} mm, "
+        f"inner width and height {chambers.width:g} mm, walls {WALL_THICKNESS:g} mm, "
         f"flat lid {chambers.lid_thickness:g} mm in the dome's place,",
         f"gap {chambers.separation:g} mm, layer {chambers.layer_thickness:g} mm.",
         f"St Venant-Kirchhoff, E = {chambers.elastic_modulus:g} MPa, nu = {chambers.poisson:g}; "

@@ -1,4 +1,4 @@
-"""Hollow chambers in a row on their limiting layer, as a mesh of twenty-node bricks."""
+"""Two hollow chambers on their limiting layer, as a mesh of twenty-node bricks."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from dpgcli.mechanics.geometry import WALL_THICKNESS
 
 @dataclass(frozen=True)
 class Chambers:
-    """Chambers on a limiting layer, one half of them: the plane z = 0 is one of symmetry; mm, MPa.
+    """Two chambers on a limiting layer, halved by the plane of symmetry z = 0; mm, MPa.
 
     Along x a chamber is a wall, its inner length and a lid as thick as the dome that it stands
     for; across, an inner width and as much height, within walls. The layer is its floor.
@@ -25,13 +25,11 @@ class Chambers:
     layer_thickness: float
     elastic_modulus: float
     poisson: float = 0.48
-    wall_thickness: float = WALL_THICKNESS
-    count: int = 2
 
     @property
     def outer_length(self) -> float:
         """Length of one chamber with wall and lid, in mm."""
-        return self.wall_thickness + self.length + self.lid_thickness
+        return WALL_THICKNESS + self.length + self.lid_thickness
 
     @property
     def pitch(self) -> float:
@@ -52,13 +50,13 @@ def chamber_bricks(chambers: Chambers, density: int) -> Bricks:
 
 def _lines(chambers: Chambers, density: int) -> tuple[Array, Array, Array]:
     """Lines of the grid along x, y and z: every face of the chambers, and their middles."""
-    wall, inner, outer = chambers.wall_thickness, chambers.length, chambers.outer_length
-    starts = chambers.pitch * np.arange(chambers.count)
+    wall, inner, outer = WALL_THICKNESS, chambers.length, chambers.outer_length
+    starts = np.array([0.0, chambers.pitch])
     along = starts[:, None] + np.array([0.0, wall, outer / 2, wall + inner, outer])
     one_chamber = (1, density, density, 1)
     half, layer = chambers.width / 2, chambers.layer_thickness
     return (
-        grid_lines(along.ravel(), (*one_chamber, *(density, *one_chamber) * (chambers.count - 1))),
+        grid_lines(along.ravel(), (*one_chamber, density, *one_chamber)),
         grid_lines(np.cumsum([0.0, layer, half, half, wall]), (1, 2 * density, 2 * density, 1)),
         grid_lines(np.cumsum([0.0, half, wall]), (2 * density, 1)),
     )
@@ -70,8 +68,8 @@ def _is_solid(chambers: Chambers, x: Array, y: Array, z: Array) -> Flags:
     is_layer = y < chambers.layer_thickness
     is_chamber = within < chambers.outer_length
     is_cavity = (
-        (within > chambers.wall_thickness)
-        & (within < chambers.wall_thickness + chambers.length)
+        (within > WALL_THICKNESS)
+        & (within < WALL_THICKNESS + chambers.length)
         & (y < top)
         & (z < chambers.width / 2)
     )

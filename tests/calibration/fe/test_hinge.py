@@ -43,12 +43,12 @@ def turned(mesh: Bricks, angle: float, place: float) -> Array:
 
 
 @pytest.mark.parametrize("density", [1, 2, 4])
-@pytest.mark.parametrize("chambers", [REFERENCE, replace(REFERENCE, count=4, separation=0.1)])
+@pytest.mark.parametrize("chambers", [REFERENCE, replace(REFERENCE, separation=0.1)])
 def test_bricks_are_upright_and_fill_the_chambers(chambers: Chambers, density: int) -> None:
     mesh = chamber_bricks(chambers, density)
     sizes = edges(mesh)
     assert sizes.min() > 0
-    n, width, length = chambers.count, chambers.width, chambers.length
+    n, width, length = 2, chambers.width, chambers.length
     layer = (n * chambers.pitch - chambers.separation) * chambers.layer_thickness * (width / 2 + 1)
     hull = chambers.outer_length * (width + 1) * (width / 2 + 1)
     exact = layer + n * (hull - length * width * width / 2)
