@@ -19,7 +19,8 @@ class KnownStates:
     `patterns` (unit, state), `tip` x and y (2, state) in mm, by unit (unit, state) the `angles` of
     the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
     their domes (N), `seconds` (state,) that each state took. `shapes` are the limiting layer's
-    points from base to tip, (2, point) in mm, by state. `unused` names what else the data have.
+    points from base to tip, (2, point) in mm, by state. `unused` names what else the data have,
+    `sha256` is that of their file.
     """
 
     patterns: Flags
@@ -30,6 +31,7 @@ class KnownStates:
     seconds: Array
     shapes: tuple[Array, ...] = ()
     unused: tuple[str, ...] = ()
+    sha256: str = ""
 
     def chosen(self, states: Indices) -> "KnownStates":
         """Some of the states."""

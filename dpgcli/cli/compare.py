@@ -91,7 +91,7 @@ def _calibrated(finger: "Finger", calibration: Path) -> "Finger":
     values = found.values
     if values is None or not values.given():
         raise UsageError(f"--calibration {calibration}: a grid; name it in a spec instead")
-    if found.curve is not None and finger.contact_travel.any():
+    if found.curve is not None and finger.dome_travel.any():
         raise UsageError(
             f"--calibration {calibration}: a dome's curve, from which the push-only law has its "
             f"strokes: take -s finger.calibration={calibration} instead"
@@ -130,6 +130,7 @@ def _errors(found: "Comparison", what: str) -> Iterator[str]:
         ("tips", found.distance, "mm"),
         ("tips, of the deflection", 100.0 * found.relative, "%"),
         ("tip angles", found.tip_angle, "rad"),
+        ("angles", found.angle, "rad"),
         ("openings", found.opening, "mm"),
         ("pushes", found.push, "N"),
         ("shapes", found.shape[0], "mm"),

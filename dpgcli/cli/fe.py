@@ -30,7 +30,6 @@ HINGE_KEYS = (
     "limiting_layer_thickness_mm",
     "elastic_modulus_MPa",
 )
-SMALLEST, LARGEST = 1e-12, 1e12
 
 
 class Mesh(StrEnum):
@@ -117,6 +116,7 @@ def hinge(
 def _check_positive(lengths: dict[str, float | None]) -> None:
     """Options that are neither zero nor negative, nor no number, nor beyond reason."""
     from dpgcli.errors import UsageError
+    from dpgcli.files.sections import LARGEST, SMALLEST
 
     for option, value in lengths.items():
         if value is not None and not SMALLEST <= value <= LARGEST:

@@ -38,7 +38,6 @@ Tolerance = Annotated[
 ]
 
 
-FARTHEST = 1e12  # mm, as any length of a spec
 MICRO = ("um", "\u00b5m", "\u03bcm")  # the micro sign and the Greek letter
 POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of ten, in mm
 TargetError = Annotated[
@@ -139,12 +138,13 @@ def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
 
 def _point(option: str, text: str) -> tuple[float, float]:
     from dpgcli.errors import UsageError
+    from dpgcli.files.sections import LARGEST
 
     try:
         x, y = map(float, text.split(","))
     except ValueError:
         x, y = float("nan"), 0.0
-    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
+    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
         raise UsageError(f"{option} {text}: expected two numbers in mm, such as 5.375,-0.75")
     return x, y
 

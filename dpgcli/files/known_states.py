@@ -46,6 +46,7 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
         seconds=_columns(sheet, [SECONDS])[0],
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
         unused=_unused(sheet, n_units),
+        sha256=sheet.sha256,
     )
 
 

@@ -11,8 +11,9 @@ from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order
-from dpgcli.files.sections import EXPECTED, Geometry, unit_of
+from dpgcli.files.sections import SMALLEST, Geometry, expected_of, unit_of
 from dpgcli.files.sheet import Sheet, read_sheet
+from dpgcli.mechanics.geometry import snap_pressure
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}
@@ -39,26 +40,33 @@ USUAL = {  # largest values of a geometry, by the unit of its key, and what othe
     "mm": (0.05, 200.0, "meters?", "micrometers?"),
     "MPa": (1e-3, 1e4, "gigapascals?", "kPa or Pa?"),
 }
+POSITIVE = f"a number > 0, at least {SMALLEST:g}, since logarithms are fitted"
+DOME = ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa")
+BEHIND = {"travel": DOME[:1], "energy": DOME, "force": DOME, "pressure": DOME}  # a range of its own
 MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit is 1000 off
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A curve, the columns that were not used, and how many rows there are."""
+    """A curve, the columns that were not used, and the SHA-256 of the file."""
 
     curve: Record
     ignored: tuple[str, ...]
-    n_rows: int
+    sha256: str
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Moments (N mm) over rotations (rad), (row,); the texts of columns that hold text, by name."""
+    """Moments (N mm) over rotations (rad), (row,); the texts of columns that hold text, by name.
+
+    `ignored` are columns that were not used, `sha256` is the file's.
+    """
 
     moment: Array
     rotation: Array
     texts: Mapping[str, tuple[str, ...]]
     ignored: tuple[str, ...]
+    sha256: str
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,7 @@ class Table:
     constant: dict[str, float]
     ignored: tuple[str, ...]
     doubts: tuple[str, ...]
+    sha256: str
 
 
 def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measured:
@@ -95,7 +104,7 @@ def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measu
     problems = [*_signs(sheet, travel, arrays["travel"]), *_scales(sheet, columns, known, geometry)]
     if problems:
         raise SpecError(in_order(problems))
-    return Measured(Record(**arrays), _unused(sheet, known), len(sheet.rows))
+    return Measured(Record(**arrays), _unused(sheet, known), sheet.sha256)
 
 
 def read_moments(path: Path, where: str | None = None) -> Moments:
@@ -119,7 +128,7 @@ def read_moments(path: Path, where: str | None = None) -> Moments:
         raise SpecError(in_order(problems))
     texts = {name: tuple(sheet.cells(name)) for name in sheet.names if not _is_numeric(sheet, name)}
     unused = tuple(name for name in _unused(sheet, known) if name not in texts)
-    return Moments(columns[MOMENT], columns[rotation], texts, unused)
+    return Moments(columns[MOMENT], columns[rotation], texts, unused, sheet.sha256)
 
 
 def read_table(path: Path) -> Table:
@@ -136,12 +145,12 @@ def read_table(path: Path) -> Table:
         raise SpecError((sheet.missing("of a quantity, such as bistable_stiffness_N_per_mm"),))
     columns = sheet.numbers([*keys, *others])
     problems = [
-        sheet.problem(row, name, "a number > 0, since logarithms are fitted", f"{values[row]:g}")
+        sheet.problem(row, name, POSITIVE, f"{values[row]:g}")
         for name, values in columns.items()
-        for row in np.flatnonzero(values <= 0.0).tolist()
+        for row in np.flatnonzero(values < SMALLEST).tolist()
     ]
     problems += [
-        sheet.problem(row, LINEARITY, EXPECTED[LINEARITY], f"{columns[LINEARITY][row]:g}")
+        sheet.problem(row, LINEARITY, expected_of(LINEARITY), f"{columns[LINEARITY][row]:g}")
         for row in np.flatnonzero(columns.get(LINEARITY, np.zeros(0)) > 1.0).tolist()
     ]
     problems += _repeated(sheet, np.stack([columns[key] for key in keys], axis=1))
@@ -157,6 +166,7 @@ def read_table(path: Path) -> Table:
         {key: float(columns[key][0]) for key in keys if key not in over},
         tuple(name for name in sheet.names if name not in columns),
         tuple(_doubts({key: columns[key] for key in keys})),
+        sheet.sha256,
     )
 
 
@@ -236,8 +246,10 @@ def _scales(
         low, high = ranges[kind]
         if not low <= largest <= high:
             hint = GUESSES[kind][largest > high]
-            if kind not in ("moment", "rotation") and not geometry:
-                hint += " if it is right, say how large the dome is: --geometry dome_height_mm=..."
+            needed = BEHIND.get(kind, ())
+            if missing := [key for key in needed if key not in (geometry or {})]:
+                hint += f" if it is right, say how large the dome is: --geometry {missing[0]}=..."
+                hint += "".join(f" --geometry {key}=..." for key in missing[1:])
             expected = f"a largest value of {low:.3g} to {high:.3g}"
             yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
 
@@ -245,18 +257,17 @@ def _scales(
 def _of_dome(geometry: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """Largest values that a dome of this geometry may have.
 
-    Energy E t^2.8 h^1.75 and pressure E t^2.5 h^1.2, from 68 mJ and 0.15 MPa at h = 6.5 mm,
-    t = 0.75 mm, E = 26 MPa: the finite-element grid of configs/calibration.
+    Energy E t^2.8 h^1.75, from 68 mJ at h = 6.5 mm, t = 0.75 mm, E = 26 MPa: the finite-element
+    grid of configs/calibration.
     """
     height = geometry.get("dome_height_mm")
     if height is None:
         return {}
     ranges = {"travel": (0.05 * height, 20.0 * height)}
-    if {"dome_thickness_mm", "elastic_modulus_MPa"} <= set(geometry):
-        thickness = geometry["dome_thickness_mm"] / 0.75
-        modulus, relative = geometry["elastic_modulus_MPa"] / 26.0, height / 6.5
-        energy = 68.0 * modulus * thickness**2.8 * relative**1.75
-        pressure = 0.15 * modulus * thickness**2.5 * relative**1.2
+    if set(DOME) <= set(geometry):
+        _, thickness, modulus = dome = [geometry[key] for key in DOME]
+        energy = 68.0 * modulus / 26.0 * (thickness / 0.75) ** 2.8 * (height / 6.5) ** 1.75
+        pressure = snap_pressure(*dome)
         usual = {"energy": energy, "force": energy / height, "pressure": pressure}
         ranges |= {kind: (size / MARGIN, size * MARGIN) for kind, size in usual.items()}
     return ranges

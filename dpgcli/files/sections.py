@@ -28,6 +28,11 @@ UNITS = {
 }
 
 
+def expected_of(key: str) -> str:
+    """What a key of the geometry or the lattice expects, in words."""
+    return EXPECTED.get(key, "a length > 0 in mm")
+
+
 def unit_of(key: str) -> str:
     """The unit in a key's name, none where it has none.
 

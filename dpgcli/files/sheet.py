@@ -1,9 +1,10 @@
 """CSV read strictly: what each cell says, where it stands, and all problems at once."""
 
 import csv
+import hashlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -12,18 +13,18 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, in_order, located, shown
-
-LARGEST = 1e12  # a number beyond that has another meaning, or is a mistake
+from dpgcli.files.sections import LARGEST
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The cells of a CSV file by row, and the line of each row."""
+    """The cells of a CSV file by row, the line of each row, and the SHA-256 of the file."""
 
     file: str
     names: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
+    sha256: str
 
     def cells(self, name: str) -> list[str]:
         """The texts of one column."""
@@ -33,7 +34,7 @@ class Sheet:
     def chosen(self, kept: Sequence[int]) -> "Sheet":
         """The sheet with some of its rows."""
         rows, lines = [self.rows[i] for i in kept], [self.lines[i] for i in kept]
-        return Sheet(self.file, self.names, rows, lines)
+        return replace(self, rows=rows, lines=lines)
 
     def problem(
         self, row: int | None, key: str, expected: str, found: str, hint: str = ""
@@ -78,32 +79,45 @@ def read_sheet(path: Path) -> Sheet:
 
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
-    file = str(path)
-    rows, lines = [], []
-    for number, line in enumerate(_text(path).splitlines(), start=1):
+    file, content = str(path), _content(path)
+    rows, lines, problems = [], [], []
+    for number, line in enumerate(_text(file, content).splitlines(), start=1):
         if line.strip() and not line.lstrip().startswith("#"):
-            rows.append([cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))])
+            try:
+                cells = next(csv.reader([line], skipinitialspace=True))
+            except csv.Error as error:
+                problems.append(located(Place(file, number), "row", "cells of a CSV", str(error)))
+                continue
+            rows.append([cell.strip() for cell in cells])
             lines.append(number)
-    if not rows:
-        raise SpecError((located(Place(file), "file", "a header and rows", "nothing"),))
-    sheet = Sheet(file, tuple(rows[0]), rows[1:], lines[1:])
+    if not rows and not problems:
+        problems.append(located(Place(file), "file", "a header and rows", "nothing"))
+    if problems:
+        raise SpecError(in_order(problems))
+    digest = hashlib.sha256(content).hexdigest()
+    sheet = Sheet(file, tuple(rows[0]), rows[1:], lines[1:], digest)
     problems = list(_form_problems(sheet, lines[0]))
     if problems:
         raise SpecError(in_order(problems))
     return sheet
 
 
-def _text(path: Path) -> str:
-    place = Place(str(path))
+def _content(path: Path) -> bytes:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return path.read_bytes()
     except OSError as error:
         found = (error.strerror or str(error)).lower()
-        raise SpecError((located(place, "file", "a readable file", found),)) from None
+        wrong = located(Place(str(path)), "file", "a readable file", found)
+        raise SpecError((wrong,)) from None
+
+
+def _text(file: str, content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         found = f"byte 0x{error.object[error.start]:02x}"
         hint = "save the file as UTF-8"
-        raise SpecError((located(place, "file", "text in UTF-8", found, hint),)) from None
+        raise SpecError((located(Place(file), "file", "text in UTF-8", found, hint),)) from None
 
 
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:

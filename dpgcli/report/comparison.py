@@ -9,6 +9,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.comparison import Comparison
 from dpgcli.calibration.known import KnownStates
 from dpgcli.report.drawing import drawn_to
+from dpgcli.states.patterns import texts
 
 
 def draw_comparison(
@@ -19,6 +20,7 @@ def draw_comparison(
 
     words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": name}
     with drawn_to(path, 9.0, 6.0, aspect="equal", **words) as axes:
+        names = texts(known.patterns)
         for state, inverted in enumerate(known.patterns.T):
             color = colormaps["viridis"](0.85 * inverted.mean())
             axes.plot(*found.states.layer[:, :, state], ".-", color=color)
@@ -26,8 +28,7 @@ def draw_comparison(
                 axes.plot(*calibrated.states.layer[:, :, state], "--", color=color)
             if known.shapes:
                 axes.plot(*known.shapes[state], "+", color=color, ms=4)
-            pattern = "".join("1" if on else "0" for on in inverted)
-            _draw_known(axes, known.tip[:, state], pattern, color)
+            _draw_known(axes, known.tip[:, state], names[state].decode(), color)
         axes.plot([], [], "k.-", label="predicted, to its tip")
         if calibrated is not None:
             axes.plot([], [], "k--", label="predicted, calibrated")

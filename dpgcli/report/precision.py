@@ -28,7 +28,7 @@ def points(rows: Sequence[Row]) -> list[Row]:
 
 def model_error(rows: Sequence[Row]) -> float | None:
     """Largest error of the lattice against given data (mm), if there are any."""
-    found = [row["max_tip_error_mm"] for row in rows if row["group"] == "model"]
+    found = [max(row["max_tip_error_mm"], SMALLEST) for row in rows if row["group"] == "model"]
     return found[0] if found else None
 
 
@@ -60,7 +60,7 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     left, right = math.floor(min(across)), math.ceil(max(across))
     low, high = math.floor(min(up)), math.ceil(top)
     grid = [[" "] * WIDTH for _ in range(HEIGHT)]
-    if model:
+    if model is not None:
         grid[_place(math.log10(model), high, low, HEIGHT)] = list("-" * WIDTH)
     for x, y, mark in zip(across, up, MARKS, strict=False):
         _mark(grid[_place(y, high, low, HEIGHT)], _place(x, left, right, WIDTH), mark)
@@ -74,7 +74,7 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
         f"{'':>7}{mark}  {row['way']} ({LABELS[row['group']]})"
         for mark, row in zip(MARKS, shown, strict=False)
     ]
-    if model:
+    if model is not None:
         lines.append(f"{'':>7}-  the lattice's own error against the data given, {model:.2g} mm")
     return lines
 
@@ -97,7 +97,7 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
     with drawn_to(path, 9.0, 5.5, xscale="log", yscale="log", **words) as axes:
         _draw_points(axes, points(rows))
         model = model_error(rows)
-        if model:
+        if model is not None:
             label = f"the model against data: {model:.2g} mm"
             axes.axhline(model, color="#009E73", ls="--", label=label)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)

@@ -27,15 +27,12 @@ Direction = Mapping[str, Array]
 class Sensitivities:
     """Derivatives by a step along each direction, arrays of shape (…, direction, batch).
 
-    `pose` (3, …) of tip x, y (mm) and angle (rad), `strut_angles` (unit, …) of all stations (rad),
-    `extensions` (unit, …) of the bistable springs (mm) and `forces` (unit, …) of them (N), each
-    per unit of the direction.
+    `pose` (3, …) of tip x, y (mm) and angle (rad), and `strut_angles` (unit, …) of all stations
+    (rad), each per unit of the direction.
     """
 
     pose: Array
     strut_angles: Array
-    extensions: Array
-    forces: Array
 
 
 def sensitivities(batch: Batch, directions: Sequence[Direction]) -> Sensitivities:
@@ -70,10 +67,8 @@ def _along(batch: Batch, direction: Direction) -> tuple[Array, ...]:
         stations = moved.stations(stepped)
         _, near, far, _ = internal(change, moved.finger.is_rigid)
         turns = -np.cumsum(near + far, axis=0)
-        extension = moved.springs(stepped).extension
-        force = moved.finger.springs(extension).force
     x, y = (nodes[-1].imag / STEP for nodes in (stations.base_x, stations.base_y))
-    return np.stack((x, y, turns[-1])), turns, extension.imag / STEP, force.imag / STEP
+    return np.stack((x, y, turns[-1])), turns
 
 
 def _moved(batch: Batch, direction: Direction) -> Finger:

@@ -92,12 +92,12 @@ def test_values_of_a_file_have_their_error_and_its_name(call: Call, folder: Path
         "units": "1-3",
         "value": 13.0,
         "origin": "calibrated",
-        "rule": "fitted, fitted.yaml",
+        "rule": "from fitted.yaml",
         "standard_error": 0.25,
     }
     assert sources["force_linearity"]["standard_error"] is None
     text = call("explain", *BY_FILE).stdout
-    assert "calibrated    fitted, fitted.yaml (± 0.25)" in text
+    assert "calibrated    from fitted.yaml (± 0.25)" in text
 
 
 def test_uncertainty_is_left_out_until_it_is_asked_for(call: Call, folder: Path) -> None:

@@ -55,7 +55,7 @@ def test_a_dome_becomes_a_calibration(fit: Any, folder: Path) -> None:
     assert found.geometry is not None
     assert found.geometry.dome_height_mm == 6.5
     assert found.curve is not None
-    assert found.curve.travel_to_opening.rule == "equal"
+    assert found.curve.opening_per_travel == 1.0
     assert len(found.curve.travel_mm) == 55
     assert found.curve.unsampled_mm == [[1.86437563, 13.7083004]]
     assert found.sources[0].file == PATH
@@ -85,8 +85,7 @@ def test_a_stroke_is_a_proportion(fit: Any, folder: Path) -> None:
     assert "opening = 0.25533 travel, so that the inverted well opens 3.5 mm" in result.stderr
     curve = read_calibration(folder / "dome.yaml").curve
     assert curve is not None
-    assert curve.travel_to_opening.rule == "proportional"
-    assert curve.travel_to_opening.factor == pytest.approx(3.5 / 13.7083, abs=1e-4)
+    assert curve.opening_per_travel == pytest.approx(3.5 / 13.7083, abs=1e-4)
 
 
 def test_dirty_data_are_called_so(fit: Any, folder: Path) -> None:
@@ -251,7 +250,13 @@ def test_a_grid_for_people(fit: Any) -> None:
         (("bistable", PATH, *EQUAL, "--fix", "force_linearity=2"), "expected a number from 0 to 1"),
         (("bistable", PATH, *EQUAL, "--free", "stroke_mm"), "is not free: give its value, --fix"),
         (("bistable", PATH, *EQUAL, "--free", "stroke"), "did you mean stroke_mm?"),
-        (("bistable", PATH, *EQUAL, "--loss-scale", "0"), "--loss-scale 0: expected a number > 0"),
+        (
+            ("bistable", PATH, *EQUAL, "--loss", "huber", "--loss-scale", "0"),
+            "--loss-scale 0: expected a number > 0",
+        ),
+        (("bistable", PATH, *EQUAL, "--loss-scale", "1"), "--loss-scale is for a robust loss"),
+        (("bistable", PATH, *EQUAL, "--bootstrap", "1"), "one sample gives no interval"),
+        (("grid", GRID, "-g", "dome_height_mm=3"), "the table has a column dome_height_mm"),
         (("bistable", PATH, *EQUAL, "-g", "dome_hight_mm=6.5"), "did you mean dome_height_mm?"),
         (("bistable", PATH, *EQUAL, "-g", "dome_height_mm=-1"), "expected a length > 0 in mm"),
         (("bistable", PATH, *EQUAL, "-g", "dome_height_mm"), "expected KEY=VALUE"),
@@ -269,7 +274,7 @@ def test_a_grid_for_people(fit: Any) -> None:
         (("bistable", GRID, *EQUAL), "expected a column pole_travel_mm or travel_mm"),
         (("bistable", "none.csv", *EQUAL), "none.csv: file: expected a readable file"),
         (("hinge", GRID), "expected a column rotation_rad or rotation_mid_chamber_rad"),
-        (("hinge", HINGE, "--loss-scale", "-1"), "--loss-scale -1: expected a number > 0"),
+        (("hinge", HINGE, "--loss-scale", "-1"), "--loss-scale is for a robust loss"),
         (("grid", PATH), "expected a column of the geometry, such as dome_height_mm"),
         (("grid", GRID, "-o", "g.csv"), "expected a name that ends in .yaml"),
     ],

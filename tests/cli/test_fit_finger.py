@@ -254,7 +254,7 @@ def test_a_fit_that_cannot_be_writes_nothing(
         (
             "pattern,tip_angle_rad\n100,-0.26\n",
             ("--target", "angles", "--free", LEVER, "--free", "stroke_mm"),
-            "1 points for 2 free values",
+            "1 point for 2 free values",
         ),
     ],
 )

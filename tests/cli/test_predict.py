@@ -464,7 +464,7 @@ def test_the_law_is_named_wherever_states_are_summed_up(
         "curve": {
             "travel_mm": travel,
             "energy_mJ": [6.42 * x**2 * (0.043 + 0.957 * (1 - x / 3.5) ** 2) for x in travel],
-            "travel_to_opening": {"rule": "equal"},
+            "opening_per_travel": 1.0,
         },
     }
     head = {"calibration_version": 1, "made_by": "hand", "method": "none"}

@@ -465,7 +465,7 @@ def calibration(linearity: float = 0.04) -> str:
         "curve": {
             "travel_mm": travel,
             "energy_mJ": energy,
-            "travel_to_opening": {"rule": "equal"},
+            "opening_per_travel": 1.0,
         },
         "grid": {
             "method": "interpolation",

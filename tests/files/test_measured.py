@@ -1,5 +1,6 @@
 """Curves and tables from CSV: what is read, and the message of every mistake."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,13 @@ def test_columns_in_any_order_with_comments_marks_and_spaces(path: Path) -> None
     assert found.curve.time is not None
     assert found.curve.force is None
     assert found.ignored == ("note",)
-    assert found.n_rows == 2
+    assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_cell_without_end(path: Path) -> None:
+    path.write_text(f"travel_mm,energy_mJ\n0,0\n{'1' * 200_000},2\nx,3\n", encoding="utf-8")
+    with pytest.raises(SpecError, match="3: row: expected cells of a CSV, found field larger"):
+        read_curve(path)
 
 
 def test_windows_line_ends(path: Path) -> None:
@@ -146,7 +153,7 @@ def test_another_unit_is_suspected(
 
 def test_a_small_dome_is_no_mistake_where_the_geometry_says_so(path: Path) -> None:
     path.write_text("travel_mm,force_N\n0,0\n0.06,1\n", encoding="utf-8")
-    assert read_curve(path, {"dome_height_mm": 0.03}).n_rows == 2
+    assert read_curve(path, {"dome_height_mm": 0.03}).curve.reach == 0.06
 
 
 MOMENTS = 'variant,moment_N_mm,rotation_rad,note\n"a, b",2.5,0.1,1\n"a, b",5,0.2,2\nc,5,0.3,3\n'
@@ -221,7 +228,10 @@ def test_a_geometry_that_no_soft_finger_has(
     [
         ("height,stroke_mm\n1,1\n", "expected a column of the geometry, such as dome_height_mm"),
         ("dome_height_mm,name\n1,a\n", "expected a column of a quantity, such as bistable_stiff"),
-        ("dome_height_mm,stroke_mm\n1,0\n2,1\n", "2: stroke_mm: expected a number > 0, since log"),
+        (
+            "dome_height_mm,stroke_mm\n1,0\n2,1\n",
+            "2: stroke_mm: expected a number > 0, at least 1e-12, since log",
+        ),
         ("dome_height_mm,stroke_mm\n-1,1\n2,1\n", "2: dome_height_mm: expected a number > 0"),
         (
             "dome_height_mm,stroke_mm\n1,1\n2,2\n1,1\n",

@@ -110,7 +110,7 @@ def test_from_geometry_by_finite_elements_to_all_states(checkout: Path) -> None:
     metadata = pq.read_metadata(folder / "calibrated" / "states.parquet").metadata
     sources = json.loads(metadata[b"dpg.sources"])
     origins = {key: (origin, rule) for key, _, _, origin, rule in sources}
-    assert origins["bistable_stiffness_N_per_mm"] == ("calibrated", "fitted, dome.yaml")
-    assert origins["hinge_stiffness_N_mm_per_rad"] == ("calibrated", "fitted, hinge.yaml")
+    assert origins["bistable_stiffness_N_per_mm"] == ("calibrated", "from dome.yaml")
+    assert origins["hinge_stiffness_N_mm_per_rad"] == ("calibrated", "from hinge.yaml")
     again = shell("make -f calibration.mk", checkout, folder)
     assert "dpg" not in again.stdout

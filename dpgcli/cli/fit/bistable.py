@@ -26,6 +26,7 @@ from dpgcli.cli.fit.common import (
     positive,
     print_fit,
     quality_line,
+    scale_of,
     tell,
     write,
 )
@@ -34,6 +35,7 @@ from dpgcli.cli.printing import Format
 
 if TYPE_CHECKING:
     from dpgcli.calibration.bistable import BistableFit, Choice, Opening
+    from dpgcli.files.calibration import DataFile
     from dpgcli.files.measured import Measured
 
 WHY_OPENING = """\
@@ -96,6 +98,7 @@ def bistable(
 ) -> None:
     """Fit k_b, alpha and d of the bistable law to a dome's curve."""
     from dpgcli.calibration.bistable import Choice, fit_bistable
+    from dpgcli.files.calibration import DataFile
     from dpgcli.files.measured import read_curve
 
     opening, fixed = _opening(travel_to_opening), _fixed(fix or [], free)
@@ -110,7 +113,7 @@ def bistable(
         area=_area(chosen, area),
         fixed=fixed,
         loss=loss,
-        loss_scale=positive("--loss-scale", loss_scale),
+        loss_scale=scale_of(loss, loss_scale),
         resamples=bootstrap,
         seed=seed,
     )
@@ -118,7 +121,8 @@ def bistable(
     warnings = [*found.warnings, *([] if where else [NO_GEOMETRY])]
     if measured.ignored:
         warnings.append(f"columns not used: {', '.join(measured.ignored)}")
-    _write(output, curve, found, choice, where, warnings)
+    source = DataFile(file=curve.name, sha256=measured.sha256, rows=found.fit.n_points)
+    _write(output, source, found, choice, where, warnings)
     if plot is not None:
         _draw(found, choice, curve.name, plot)
     print_fit(found.fit, printed_as)
@@ -135,7 +139,7 @@ def _opening(text: str | None) -> "Opening":
     rule, _, amount = text.partition(":")
     if text == Rule.EQUAL:
         return Opening(Rule.EQUAL)
-    if rule in (Rule.PROPORTIONAL, Rule.STROKE) and (size := _number(amount)) is not None:
+    if rule in (Rule.PROPORTIONAL, Rule.STROKE) and (size := _number(amount)):
         return Opening(Rule(rule), size)
     raise UsageError(
         f"--travel-to-opening {text}: expected equal, proportional:FACTOR or stroke:MM, "
@@ -144,14 +148,14 @@ def _opening(text: str | None) -> "Opening":
 
 
 def _number(text: str) -> float | None:
-    """A number above zero, None for anything else."""
+    """A number from zero on, None for anything else."""
     if not re.fullmatch(r"\s*[0-9]*\.?[0-9]*(?:[eE][-+]?[0-9]+)?\s*", text):
         return None
     try:
         value = float(text)
     except ValueError:
         return None
-    return value if 0.0 < value < float("inf") else None
+    return value if value < float("inf") else None
 
 
 def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
@@ -163,8 +167,9 @@ def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
     fixed: dict[str, float] = {}
     for text in fix:
         key, _, value = (part.strip() for part in text.partition("="))
-        number = 0.0 if key == LINEARITY and value in ("0", "0.0") else _number(value)
-        if key in LAW_KEYS and (number is None or (key == LINEARITY and number > 1.0)):
+        number = _number(value)
+        is_possible = number is not None and (number <= 1.0 if key == LINEARITY else number > 0.0)
+        if key in LAW_KEYS and not is_possible:
             bound = "from 0 to 1" if key == LINEARITY else "> 0"
             raise UsageError(f"--fix {text}: expected a number {bound}")
         fixed[key] = number or 0.0
@@ -223,21 +228,20 @@ def _summary(found: "BistableFit", choice: "Choice") -> list[str]:
 
 def _write(
     output: Path | None,
-    curve: Path,
+    source: "DataFile",
     found: "BistableFit",
     choice: "Choice",
     geometry: object,
     warnings: list[str],
 ) -> None:
     from dpgcli.calibration.bistable import UNITS
-    from dpgcli.files.calibration import source_of
     from dpgcli.files.calibration.results import curve_of, fitted
 
     method = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
     if choice.quantity is Quantity.PRESSURE:
         method += f", area {choice.area:g} mm2"
     content = {
-        **fitted(found.fit, UNITS[choice.quantity], source_of(curve, found.fit.n_points)),
+        **fitted(found.fit, UNITS[choice.quantity], source),
         "method": method + (", quasi-static pieces" if choice.is_quasi_static else ""),
         "geometry": geometry,
         "curve": curve_of(found),

@@ -88,6 +88,15 @@ def positive(option: str, value: float | None) -> float | None:
     return value
 
 
+def scale_of(loss: Loss, scale: float | None) -> float | None:
+    """The scale of a robust loss, if one is given."""
+    from dpgcli.errors import UsageError
+
+    if scale is not None and loss is Loss.LINEAR:
+        raise UsageError("--loss-scale is for a robust loss: --loss soft_l1, huber or cauchy")
+    return positive("--loss-scale", scale)
+
+
 def geometry_from(values: list[str] | None, spec: Path | None) -> "Geometry | None":
     """The geometry that a fit holds at: that of a spec, with values changed or added."""
     from dpgcli.files.calibration import geometry_of

@@ -18,9 +18,9 @@ from dpgcli.cli.fit.common import (
     Seed,
     check_files,
     method_of,
-    positive,
     print_fit,
     quality_line,
+    scale_of,
     tell,
     write,
 )
@@ -65,7 +65,7 @@ def finger(
 ) -> None:
     """Fit lattice values to tips or angles of known states."""
     from dpgcli.calibration.finger import FingerFit
-    from dpgcli.files.calibration import geometry_of, source_of
+    from dpgcli.files.calibration import DataFile, geometry_of
     from dpgcli.files.calibration.results import fitted
     from dpgcli.files.known_states import check_scale, read_states
     from dpgcli.files.spec import read_scene, scene_of
@@ -82,11 +82,11 @@ def finger(
     known = read_states(data, base.n_units)
     check_scale(data, known, float(reach(base)[0]))
     frame = frame_of(first_station, tip_offset)
-    size = positive("--loss-scale", loss_scale)
+    size = scale_of(loss, loss_scale)
     study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss, size)
     found = study.fit(bootstrap, seed)
     warnings = [*_warnings(study, found), *([] if where else [NO_GEOMETRY])]
-    source = source_of(data, known.patterns.shape[1])
+    source = DataFile(file=data.name, sha256=known.sha256, rows=known.patterns.shape[1])
     content = {
         **fitted(found, UNITS[target], source, only_free=True),
         "method": _method(study, found, bootstrap, seed),

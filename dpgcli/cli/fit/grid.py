@@ -1,5 +1,6 @@
 """`dpg fit grid`: quantities over geometries, as scaling laws or interpolated."""
 
+from collections.abc import Container, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,19 +43,40 @@ def grid(
 ) -> None:
     """Fit quantities over geometries, with the error at points that are left out."""
     from dpgcli.calibration.grid import Law, Points
+    from dpgcli.files.calibration import DataFile
+    from dpgcli.files.calibration.results import grid_of
     from dpgcli.files.measured import read_table
 
     check_files((table, spec), output, None)
-    shared = known(geometry_from(geometry, spec))
     read = read_table(table)
+    _check_apart(geometry or (), (*read.over, *read.constant))
+    shared = known(geometry_from(geometry, spec))
     law = Law(method, Points(read.over, read.geometry, read.quantities))
     columns, rows = _rows(law)
     warnings = list(_warnings(law, read))
     elsewhere = {key: value for key, value in shared.items() if key not in read.over}
-    _write(output, table, law, {**elsewhere, **read.constant}, warnings)
+    source = DataFile(file=table.name, sha256=read.sha256, rows=len(read.geometry))
+    content = {
+        "method": f"{law.method} over {', '.join(read.over)}",
+        "geometry": {**elsewhere, **read.constant} or None,
+        "grid": grid_of(law),
+        "warnings": warnings,
+        "sources": [source],
+    }
+    write(output, content)
     print_rows(columns, rows, printed_as)
     if not quiet:
         tell(_summary(law, read), warnings, output)
+
+
+def _check_apart(geometry: Iterable[str], columns: Container[str]) -> None:
+    """Options that speak of what the table has itself."""
+    from dpgcli.errors import UsageError
+
+    for text in geometry:
+        key = text.partition("=")[0].strip()
+        if key in columns:
+            raise UsageError(f"--geometry {text}: the table has a column {key}")
 
 
 def _rows(law: "Law") -> tuple[tuple[Column, ...], dict[str, Any]]:
@@ -107,24 +129,3 @@ def _warnings(law: "Law", table: "Table") -> list[str]:
             "too few points to leave one out: nothing is known about the error between them"
         )
     return said
-
-
-def _write(
-    output: Path | None,
-    path: Path,
-    law: "Law",
-    geometry: dict[str, float],
-    warnings: list[str],
-) -> None:
-    """`geometry` is what all points share."""
-    from dpgcli.files.calibration import source_of
-    from dpgcli.files.calibration.results import grid_of
-
-    content = {
-        "method": f"{law.method} over {', '.join(law.points.over)}",
-        "geometry": geometry or None,
-        "grid": grid_of(law),
-        "warnings": warnings,
-        "sources": [source_of(path, len(law.points.geometry))],
-    }
-    write(output, content)

@@ -20,9 +20,9 @@ from dpgcli.cli.fit.common import (
     check_files,
     geometry_from,
     method_of,
-    positive,
     print_fit,
     quality_line,
+    scale_of,
     tell,
     write,
 )
@@ -55,7 +55,7 @@ def hinge(
 ) -> None:
     """Fit k_theta to moments over rotations, and check that it is one number."""
     from dpgcli.calibration.hinge import fit_hinge
-    from dpgcli.files.calibration import source_of
+    from dpgcli.files.calibration import DataFile
     from dpgcli.files.calibration.results import fitted
     from dpgcli.files.measured import read_moments
 
@@ -66,7 +66,7 @@ def hinge(
         data.moment,
         data.rotation,
         loss=loss,
-        loss_scale=positive("--loss-scale", loss_scale),
+        loss_scale=scale_of(loss, loss_scale),
         resamples=bootstrap,
         seed=seed,
     )
@@ -75,7 +75,7 @@ def hinge(
         warnings.append(f"columns not used: {', '.join(data.ignored)}")
     method = method_of("moment", found.fit, bootstrap, seed)
     method += f", rows where {where}" if where else ""
-    source = source_of(curve, found.fit.n_points)
+    source = DataFile(file=curve.name, sha256=data.sha256, rows=found.fit.n_points)
     content = {"method": method, "geometry": at, "warnings": warnings}
     write(output, {**fitted(found.fit, "N mm", source), **content})
     if plot is not None:

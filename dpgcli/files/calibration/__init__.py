@@ -3,8 +3,8 @@
 Written by `dpg fit`, read by specs. Keys of values and geometry are those of a spec.
 """
 
-import hashlib
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from dpgcli import __version__
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import FitError, Problem, SpecError
 from dpgcli.files.calibration.models import (
     Calibration,
     Curve,
@@ -24,12 +24,11 @@ from dpgcli.files.calibration.models import (
     Grid,
     Quality,
     ScalingLaw,
-    TravelToOpening,
     Values,
 )
 from dpgcli.files.output import whole_file
 from dpgcli.files.places import KeyPath, Place, in_order, located, shown
-from dpgcli.files.sections import EXPECTED, Geometry, Section, UnitGeometry
+from dpgcli.files.sections import Geometry, Section, UnitGeometry, expected_of
 from dpgcli.files.source import Document, parse_value, read_document
 
 __all__ = [
@@ -41,25 +40,18 @@ __all__ = [
     "Grid",
     "Quality",
     "ScalingLaw",
-    "TravelToOpening",
     "Values",
     "calibration_in",
     "geometry_of",
     "made_by",
     "read_calibration",
-    "source_of",
     "write_calibration",
 ]
 
 VERSION = 1
+AGREEMENT = 1e-6  # of a written law and its points
 SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
-
-
-def source_of(path: Path, rows: int) -> DataFile:
-    """The name and SHA-256 of a file of data, and how many of its rows were used."""
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return DataFile(file=path.name, sha256=digest, rows=rows)
 
 
 def made_by() -> str:
@@ -138,7 +130,7 @@ def _problem(document: Document, error: Any) -> Problem:
         hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
         return document.problem(path, "a known key", shown(path[-1]), hint)
     if issubclass(section, UnitGeometry):
-        description = EXPECTED.get(str(path[-1]), "a length > 0 in mm")
+        description = expected_of(str(path[-1]))
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
     return document.problem(path, description, found)
 
@@ -202,9 +194,6 @@ def _order_issues(calibration: Calibration, document: Document) -> Iterator[Issu
 
 
 def _curve_issues(curve: Curve) -> Iterator[Issue]:
-    rule = curve.travel_to_opening
-    if rule.rule == "proportional" and "factor" not in rule.model_fields_set:
-        yield ("curve", "travel_to_opening"), "a factor beside rule: proportional", "none"
     path: KeyPath = ("curve", "travel_mm")
     if len(curve.travel_mm) != len(curve.energy_mJ):
         yield path, f"{len(curve.energy_mJ)} numbers, as energies", str(len(curve.travel_mm))
@@ -227,21 +216,48 @@ def _curve_issues(curve: Curve) -> Iterator[Issue]:
 
 
 def _grid_issues(grid: Grid) -> Iterator[Issue]:
+    before: list[Issue] = []
     sizes = {len(values) for values in grid.points.values()}
     if len(sizes) > 1:
-        yield ("grid", "points"), "lists of one length", " and ".join(map(str, sorted(sizes)))
+        found = " and ".join(map(str, sorted(sizes)))
+        before.append((("grid", "points"), "lists of one length", found))
     for index, key in enumerate(grid.over):
+        place: KeyPath = ("grid", "over", index)
         if key not in Geometry.model_fields:
-            yield ("grid", "over", index), "a key of the geometry section", shown(key)
+            before.append((place, "a key of the geometry section", shown(key)))
+        elif key in grid.over[:index]:
+            before.append((place, "each key once", f"{key} again"))
         elif key not in grid.points:
-            yield ("grid", "points"), f"a list for {key}", "none"
-    if (grid.method == "scaling") != (grid.scaling is not None):
-        found = "another method" if grid.scaling is not None else "no section scaling"
-        yield ("grid", "method"), "scaling with a section scaling, else none", found
+            before.append((("grid", "points"), f"a list for {key}", "none"))
+    if grid.method != "scaling" and grid.scaling is not None:
+        before.append((("grid", "scaling"), "nothing beside another method", "a section"))
+    yield from before or _law_issues(grid)
+
+
+def _law_issues(grid: Grid) -> Iterator[Issue]:
+    """What the points do not yield: an interpolation or a law at all, or the laws as written."""
+    quantities = [key for key in grid.points if key not in grid.over]
+    middle = np.array([[np.mean(grid.points[key]) for key in grid.over]])
+    points = grid.model_copy().law  # what a grid has computed is no part of its file
+    try:
+        for key in quantities:
+            points.at(key, middle)
+    except FitError as error:
+        yield ("grid", "points"), f"points for method {grid.method}", str(error)
+        return
     for key, law in (grid.scaling or {}).items():
         path: KeyPath = ("grid", "scaling", key)
-        if key not in grid.points:
+        if key not in quantities:
             yield path, "a quantity among the points", shown(key)
-        if set(law.exponents) != set(grid.over):
-            found = ", ".join(law.exponents) or "none"
-            yield (*path, "exponents"), f"exponents of {', '.join(grid.over)}", found
+            continue
+        values = points.scaling(key).values
+        own = {"at_reference": math.exp(values[0]), **dict(zip(grid.over, values[1:], strict=True))}
+        written = {"at_reference": law.at_reference, **law.exponents}
+        if set(own) != set(written):
+            yield (*path, "exponents"), f"those of {', '.join(grid.over)}", ", ".join(law.exponents)
+        elif not np.allclose([written[k] for k in own], list(own.values()), AGREEMENT, AGREEMENT):
+            yield path, f"the law of the points: {_listed(own)}", _listed(written)
+
+
+def _listed(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{key} {value:.6g}" for key, value in values.items())

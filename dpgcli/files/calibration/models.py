@@ -37,11 +37,6 @@ class Fitted(Section, Generic[T]):
         default=None, description="two numbers, the lower one first"
     )
 
-    @property
-    def verb(self) -> str:
-        """Whether the value was fitted, or held while others were."""
-        return "held" if self.standard_error is None else "fitted"
-
 
 # Classes of their own, since processes know a class by its name, and Fitted[Positive] has none.
 class FittedPositive(Fitted[Positive]):
@@ -76,13 +71,6 @@ class Values(Section):
         return {key: value for key, value in vars(self).items() if value is not None}
 
 
-class TravelToOpening(Section):
-    """How the opening x of a unit follows from the dome's travel u: x = factor u."""
-
-    rule: Literal["equal", "proportional"] = Field(description="equal or proportional")
-    factor: Positive = Field(default=1.0, description="a number > 0")
-
-
 Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -95,7 +83,9 @@ class Curve(Section):
     energy_mJ: Annotated[list[Bounded], Field(min_length=2)] = Field(
         description="numbers in mJ up to 1e12, one for each travel"
     )
-    travel_to_opening: TravelToOpening = Field(description="a rule and its factor")
+    opening_per_travel: Positive = Field(
+        description="a number > 0: the opening of a unit over the travel of its dome"
+    )
     unsampled_mm: list[Stretch] = Field(
         default_factory=list, description="pairs of travels in mm between which nothing is known"
     )
@@ -104,7 +94,7 @@ class Curve(Section):
 class ScalingLaw(Section):
     """A product of powers: value at the reference geometry, times (geometry/reference)^exponent."""
 
-    at_reference: Positive = Field(description="a number > 0")
+    at_reference: Annotated[float, Field(gt=0)] = Field(description="a number > 0")
     standard_error: Size | None = Field(
         default=None, description="a number >= 0, relative to the value"
     )
@@ -128,7 +118,7 @@ class Grid(Section):
         default=None, description="a geometry: a number > 0 for each key of `over`"
     )
     scaling: dict[str, ScalingLaw] | None = Field(
-        default=None, description="a law for each quantity, for method scaling"
+        default=None, description="the law of each quantity, as the points have it"
     )
     leave_one_out: dict[str, Size] | None = Field(
         default=None, description="the largest relative error by quantity"

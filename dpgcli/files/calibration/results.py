@@ -15,7 +15,6 @@ from dpgcli.files.calibration.models import (
     Grid,
     Quality,
     ScalingLaw,
-    TravelToOpening,
     Values,
 )
 
@@ -70,11 +69,10 @@ def curve_of(found: BistableFit) -> Curve | None:
     if found.curve is None:
         return None
     travel, energy = found.curve
-    rule = "equal" if found.factor == 1.0 else "proportional"
     return Curve(
         travel_mm=travel.tolist(),
         energy_mJ=energy.tolist(),
-        travel_to_opening=TravelToOpening.model_validate({"rule": rule, "factor": found.factor}),
+        opening_per_travel=found.factor,
         unsampled_mm=[list(gap) for gap in found.gaps],
     )
 
