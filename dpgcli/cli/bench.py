@@ -25,6 +25,8 @@ from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
+    from dpgcli.calibration.known import KnownStates
+    from dpgcli.mechanics.finger import Finger
     from dpgcli.studies.bench import Row
 
 GROUPS = {
@@ -90,9 +92,8 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
-    from dpgcli.files.known_states import read_states
     from dpgcli.files.output import check_outputs, check_table_name
-    from dpgcli.files.spec import canonical_json, read_spec, scene_of
+    from dpgcli.files.spec import canonical_json, checked, read_scene, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
 
@@ -102,10 +103,12 @@ def bench(
     sources = [path for path in (spec, against, compare) if path is not None]
     check_outputs(sources, output, record, plot)
     check_table_name(output)
-    checked = read_spec(spec, settings or ())
-    scene, said = scene_of(checked), canonical_json(checked)
+    document = read_scene(spec, settings or ())
+    check_outputs([*sources, *document.files], output, record, plot)
+    content = checked(document)
+    scene, said = scene_of(content), canonical_json(content)
     target = None if target_error is None else millimeters("--target-error", target_error)
-    known = None if against is None else read_states(against, scene.finger.n_units)
+    known = None if against is None else _known(against, scene.finger)
     then = None if compare is None else _recorded(compare, said)
     study = Bench(
         scene, repeats, tuple(keep or ()), target, known, frame_of(first_station, tip_offset)
@@ -119,6 +122,15 @@ def bench(
     findings = [] if target is None else [cheapest_way(rows, target)]
     for line in findings + ([] if then is None else _changes(then, rows)):
         _tell(printed_as, line)
+
+
+def _known(path: Path, finger: "Finger") -> "KnownStates":
+    from dpgcli.files.known_states import check_scale, read_states
+    from dpgcli.states.solve import reach
+
+    known = read_states(path, finger.n_units)
+    check_scale(path, known, float(reach(finger)[0]))
+    return known
 
 
 def _recorded(path: Path, said: str) -> "Sequence[Row]":

@@ -35,11 +35,14 @@ def check(
     ] = None,
 ) -> None:
     """Check that every design of a table meets requirements."""
+    from dpgcli.files.output import check_appendable
     from dpgcli.files.reading import read_designs
     from dpgcli.report.page import verdicts_markdown
     from dpgcli.report.requirements import check_requirements, number_columns, requirement
 
     designs, _ = read_designs(table)
+    if summary_file is not None:
+        check_appendable(summary_file, (table,))
     columns = number_columns(designs)
     verdicts = check_requirements(designs, [requirement(text, columns) for text in require])
     if summary_file is not None:

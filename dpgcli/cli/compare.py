@@ -56,18 +56,20 @@ def compare(
     from dpgcli.calibration.comparison import columns, compare, rows
     from dpgcli.files.known_states import check_scale, read_states
     from dpgcli.files.output import check_outputs
-    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.files.spec import checked, read_scene, recalibrated, scene_of
     from dpgcli.states.solve import reach
 
-    scene = scene_of(read_spec(spec, settings or ()))
-    finger, frame = scene.finger, frame_of(first_station, tip_offset)
+    document = read_scene(spec, settings or ())
+    finger, frame = scene_of(checked(document)).finger, frame_of(first_station, tip_offset)
     known = read_states(data, finger.n_units, shapes)
     check_scale(data, known, float(reach(finger)[0]))
-    better = None if calibration is None else _calibrated(finger, calibration)
+    better = None
+    if calibration is not None:
+        better = scene_of(checked(recalibrated(document, calibration))).finger
     if plot is not None:
         check_plot(plot)
         sources = [path for path in (spec, data, shapes, calibration) if path is not None]
-        check_outputs(sources, plot)
+        check_outputs([*sources, *document.files], plot)
     found = compare(finger, known, frame)
     calibrated = None if better is None else compare(better, known, frame)
     table = rows(known, found, calibrated)
@@ -80,23 +82,6 @@ def compare(
     if not quiet:
         sys.stdout.flush()
         say("\n".join(_summary(finger, known, found, calibrated)))
-
-
-def _calibrated(finger: "Finger", calibration: Path) -> "Finger":
-    """The finger with a calibration's values instead of its own."""
-    from dpgcli.errors import UsageError
-    from dpgcli.files.calibration import read_calibration
-
-    found = read_calibration(calibration)
-    values = found.values
-    if values is None or not values.given():
-        raise UsageError(f"--calibration {calibration}: a grid; name it in a spec instead")
-    if found.curve is not None and finger.dome_travel.any():
-        raise UsageError(
-            f"--calibration {calibration}: a dome's curve, from which the push-only law has its "
-            f"strokes: take -s finger.calibration={calibration} instead"
-        )
-    return finger.with_values({key: fitted.value for key, fitted in values.given().items()})
 
 
 def _summary(

@@ -167,11 +167,14 @@ def _carry_out(
         check_outputs((spec,), deck, curve, deck.with_suffix(".log"), deck.with_suffix(".dat"))
         for path in studies.write_deck(model, folder):
             say(f"{path}: removed, it came from another deck")
-        print(deck, flush=True)
         if limits is None:
+            print(deck)
             return
         start = time.monotonic()
-        finding = studies.run(model, folder, limits)
+        try:
+            finding = studies.run(model, folder, limits)
+        finally:
+            print(deck)
         print(curve)
     if not quiet:
         sys.stdout.flush()

@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -57,11 +57,12 @@ def predict(
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
-    from dpgcli.files.spec import canonical_json, read_spec, scene_of
+    from dpgcli.files import spec as specs
     from dpgcli.states import predict as states
 
-    checked = read_spec(spec, settings or ())
-    scene = scene_of(checked)
+    document = specs.read_scene(spec, settings or ())
+    checked = specs.checked(document)
+    scene = specs.scene_of(checked)
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
@@ -69,7 +70,7 @@ def predict(
     if plot is not None:
         check_plot(plot)
         _check_drawable(prediction.plan.n_states)
-    _check_outputs(spec, output, plot)
+    _check_outputs((spec, *document.files), output, plot)
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
         principal = columns == "default" and not nodes
@@ -80,7 +81,7 @@ def predict(
             pass
     else:
         with patient_output():
-            _write(prediction, output, canonical_json(checked), rows)
+            _write(prediction, output, specs.canonical_json(checked), rows)
     if plot is not None:
         _draw(scene, request.patterns, plot)
     if not quiet:
@@ -97,12 +98,12 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
     line.clear()
 
 
-def _check_outputs(spec: Path, output: Path | None, plot: Path | None) -> None:
+def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.files.output import check_outputs, check_table_name
 
-    check_outputs((spec,), output, plot)
-    check_outputs((spec,), output, plot, None if output is None else _run_file(output))
+    check_outputs(sources, output, plot)
+    check_outputs(sources, output, plot, None if output is None else _run_file(output))
     check_table_name(output)
 
 

@@ -55,10 +55,10 @@ def stress(
     from dpgcli.files.spec import scene_of
 
     check_installed("dpg stress", "mpmath")
-    checked = _spec(spec, settings or ())
+    checked, sources = _spec(spec, settings or ())
     finger = None if checked is None else scene_of(checked).finger
     cases = _cases(finger, only or ())
-    check_outputs((spec,) if spec else (), output)
+    check_outputs(sources, output)
     check_table_name(output)
     began = perf_counter()
     with patient_output():
@@ -72,13 +72,17 @@ def stress(
         raise typer.Exit(ExitCode.REQUIREMENT)
 
 
-def _spec(spec: Path | None, settings: Sequence[str]) -> "Spec | None":
+def _spec(spec: Path | None, settings: Sequence[str]) -> tuple["Spec | None", tuple[Path, ...]]:
+    """The spec, if there is one, and the files it is read from."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.spec import read_spec
+    from dpgcli.files.spec import checked, read_scene
 
     if spec is None and settings:
         raise UsageError("--set changes a spec: give one")
-    return None if spec is None else read_spec(spec, settings)
+    if spec is None:
+        return None, ()
+    document = read_scene(spec, settings)
+    return checked(document), (spec, *document.files)
 
 
 def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:

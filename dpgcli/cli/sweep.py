@@ -86,15 +86,16 @@ def sweep(
         _start_fork_server_early()
     from dpgcli.errors import UsageError
     from dpgcli.files.output import check_appendable, sole_use
-    from dpgcli.studies.sweep import drop_parts
+    from dpgcli.studies.sweep import DESIGNS, STATES, drop_parts
 
     part = _shard(shard)
     _check_executor(executor, scheduler)
-    if summary_file is not None:
-        check_appendable(summary_file)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     study = _study(spec, settings or (), output, tolerance, target_error)
+    if summary_file is not None:
+        tables = (output / name for name in (STATES, DESIGNS))
+        check_appendable(summary_file, (*study.sweep.files, *tables))
     rules = _rules(study, require or [])
     if depfile is not None:
         write_depfile(depfile, study)

@@ -41,7 +41,7 @@ def check_outputs(sources: Iterable[Path], *paths: Path | None) -> None:
     given = [path for path in paths if path is not None]
     for path in given:
         check_writable(path)
-    if len({path.resolve() for path in given}) < len(given):
+    if len({os.path.realpath(path) for path in given}) < len(given):
         raise UsageError(f"{', '.join(map(str, given))}: expected names that differ")
     check_not_read(sources, given)
 
@@ -63,8 +63,12 @@ def check_table_name(path: Path | None) -> None:
         )
 
 
-def check_appendable(path: Path) -> None:
-    """Fail before the work rather than after it."""
+def check_appendable(path: Path, sources: Iterable[Path]) -> None:
+    """Fail before the work rather than after it.
+
+    Raises OutputError for what cannot be written, UsageError for one of the files that are read.
+    """
+    check_not_read(sources, (path,))
     try:
         path.open("ab").close()
     except OSError as error:

@@ -19,6 +19,7 @@ from dpgcli.files.output import whole_file
 
 SOLVER = "ccx"
 RESULTS = (".dat", ".csv", ".log")
+OWN_DECK, OWN_CURVE = b"** dpg fe ", b"# dpg fe "  # how files of this module begin
 THREADS = (
     "OMP_NUM_THREADS",
     "CCX_NPROC_STIFFNESS",
@@ -46,8 +47,12 @@ class Output:
 
 
 def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
-    """Write a model's deck, and remove results of another one under its name; tells which."""
+    """Write a model's deck, and remove results of another one under its name; tells which.
+
+    Raises UsageError where files of these names are not of `dpg fe`.
+    """
     deck = deck_path(model, folder)
+    _check_own(deck)
     outdated: tuple[Path, ...] = ()
     if not deck.exists() or deck.read_bytes() != model.deck.encode():
         beside = (deck.with_suffix(suffix) for suffix in RESULTS)
@@ -58,17 +63,28 @@ def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
     return outdated
 
 
+def _check_own(deck: Path) -> None:
+    """Nobody else's files are overwritten or removed."""
+    curve = deck.with_suffix(".csv")
+    is_own = deck.exists() and deck.read_bytes().startswith(OWN_DECK)
+    foreign = [] if is_own else [deck, *(deck.with_suffix(suffix) for suffix in RESULTS)]
+    if is_own and curve.exists() and not curve.read_bytes().startswith(OWN_CURVE):
+        foreign = [curve]
+    if there := [str(path) for path in foreign if path.exists()]:
+        raise UsageError(f"{', '.join(there)}: not of dpg fe, give another folder")
+
+
 def run(model: Model, folder: Path, limits: Limits) -> str:
     """Run CalculiX on the deck in a folder and write the curve; gives what the curve says.
 
-    Raises UsageError where there is no CalculiX, SolverError where it fails or makes no sense.
+    Until then a curve of the same deck stays. Raises UsageError where there is no CalculiX,
+    SolverError where it fails or makes no sense.
     """
     deck = deck_path(model, folder)
     if shutil.which(SOLVER) is None:
         raise UsageError(
             f"{SOLVER} (CalculiX) is not installed: apt install calculix-ccx; the deck is {deck}"
         )
-    curve_path(model, folder).unlink(missing_ok=True)
     output = solve(deck, limits)
     times, moved = displacements(output.displacements, model.n_nodes)
     if times[-1] < (1 - 1e-6) * model.end:
@@ -102,7 +118,6 @@ def solve(deck: Path, limits: Limits) -> Output:
     """
     log, results = deck.with_suffix(".log"), deck.with_suffix(".dat")
     with _scratch(deck) as scratch:
-        results.unlink(missing_ok=True)
         with log.open("wb") as stream:
             code = _ended(deck.stem, scratch, stream, limits, log)
         said = log.read_text(encoding="utf-8", errors="replace")

@@ -224,7 +224,7 @@ def test_a_figure_of_both(call: Any, published: tuple[str, ...], lever: str, fol
             LEVER.split("values")[0]
             + "grid: {method: interpolation, over: [dome_height_mm], "
             + "points: {dome_height_mm: [5, 6], stroke_mm: [2, 3]}}\n",
-            "--calibration cal.yaml: a grid; name it in a spec instead",
+            "finger.lattice.stroke_mm: expected a value, or geometry with dome_height_mm",
         ),
     ],
 )
@@ -239,35 +239,62 @@ def test_a_calibration_that_cannot_be_used(
     assert result.stdout == ""
 
 
-def test_a_domes_curve_is_not_a_stroke_of_domes_that_push(
-    call: Any, published: tuple[str, ...], folder: Path
-) -> None:
-    """Its stroke is that of the dome's travel, while the push-only law counts from contact."""
+def dome(height: float, stiffness: float) -> str:
+    """A calibration with a curve, of a dome of this height (mm)."""
     travel = [0.1 * place for place in range(150)]
-    energy = [u**2 * (0.02 + (1.0 - u / 13.5) ** 2) for u in travel]
-    dome = {
+    energy = [stiffness * u**2 * (0.02 + (1.0 - u / 13.5) ** 2) for u in travel]
+    data = {
         "calibration_version": 1,
         "made_by": "hand",
         "method": "none",
         "values": {
-            "bistable_stiffness_N_per_mm": {"value": 2.0},
+            "bistable_stiffness_N_per_mm": {"value": 2.0 * stiffness},
             "stroke_mm": {"value": 13.5},
         },
-        "geometry": {"dome_height_mm": 6.5, "unit_separation_mm": 3.0},
-        "curve": {
-            "travel_mm": travel,
-            "energy_mJ": energy,
-            "opening_per_travel": 1.0,
+        "geometry": {
+            "dome_height_mm": height,
+            "dome_thickness_mm": 0.75,
+            "unit_separation_mm": 3.0,
+            "elastic_modulus_MPa": 26.0,
         },
+        "curve": {"travel_mm": travel, "energy_mJ": energy, "opening_per_travel": 1.0},
     }
-    (folder / "dome.yaml").write_text(json.dumps(dome))
-    pushing = ["law=push_only", "calibration=dome.yaml", "geometry.dome_height_mm=6.5"]
-    settings = [word for key in pushing for word in ("-s", f"finger.{key}")]
-    assert call(*published, *settings).exit_code == ExitCode.DONE
-    result = call(*published, *settings, "--calibration", "dome.yaml")
-    assert result.exit_code == ExitCode.USAGE
-    assert "take -s finger.calibration=dome.yaml instead" in result.stderr
-    assert call(*published, "--calibration", "dome.yaml").exit_code == ExitCode.DONE
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize("law", ["published", "tabulated", "push_only"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (),
+        ("finger.geometry.dome_height_mm=7",),
+        ("finger.overrides.2.geometry.dome_height_mm=7",),
+        ("finger.overrides.2.lattice.bistable_stiffness_N_per_mm=9",),
+    ],
+    ids=str,
+)
+def test_calibrated_is_what_a_spec_with_that_calibration_predicts(
+    call: Any, folder: Path, changes: tuple[str, ...], law: str
+) -> None:
+    """Scaled to the geometry, unit by unit, with the file's own curve."""
+    (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n110,36,-15\n011,38,-8\n")
+    (folder / "old.yaml").write_text(dome(6.5, 3.0))
+    (folder / "new.yaml").write_text(dome(6.5, 2.0))
+    calibrations = ("old.yaml, published", "new.yaml, old.yaml, published")
+    settings = [("-s", f"finger.law={law}", *(w for c in changes for w in ("-s", c)))] * 2
+    spec, plain = (
+        (*words, "-s", f"finger.calibration=[{names}]")
+        for words, names in zip(settings, calibrations, strict=True)
+    )
+    command = ("compare", "three_unit.yaml", "tips.csv", "--format", "json", "-q")
+    result = call(*command, *spec, "--calibration", "new.yaml")
+    if "bistable" in str(changes):
+        plain = (*plain, "-s", "finger.overrides.2.lattice.bistable_stiffness_N_per_mm=null")
+    expected = rows(call(*command, *plain).stdout)
+    assert all(row["error_mm"] is not None for row in expected.values())
+    for pattern, row in rows(result.stdout).items():
+        assert row["calibrated_error_mm"] == expected[pattern]["error_mm"]
+        assert row["calibrated_error_percent"] == expected[pattern]["error_percent"]
 
 
 @pytest.mark.parametrize(

@@ -119,19 +119,21 @@ def test_a_run_writes_curve_results_and_log(call: Any, folder: Path, fake: Fake)
         ("sed s/E+01/E+00/ ../../prepared.dat > $1.dat", "ccx wrote ends at time 0.1 of 1"),
     ],
 )
-def test_a_run_that_fails_leaves_no_result(
+def test_a_run_that_fails_leaves_no_new_result(
     call: Any, folder: Path, fake: Fake, script: str, said: str
 ) -> None:
     prepared(folder)
     fake(script)
     assert call(*HINGE).exit_code == ExitCode.DONE
-    (folder / "deck" / "hinge.csv").write_text("of an earlier run")
+    before = "# dpg fe hinge: of an earlier run of the same deck"
+    (folder / "deck" / "hinge.csv").write_text(before)
     result = call(*HINGE, "--run")
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr
     assert "Traceback" not in result.stderr
     assert result.stdout == "deck/hinge.inp\n"
-    assert files(folder) <= {"hinge.inp", "hinge.log", "hinge.dat"}
+    assert files(folder) <= {"hinge.inp", "hinge.log", "hinge.dat", "hinge.csv"}
+    assert (folder / "deck" / "hinge.csv").read_text() == before
 
 
 def test_a_run_that_hangs_is_ended_with_all_it_started(call: Any, folder: Path, fake: Fake) -> None:
@@ -186,6 +188,27 @@ def test_no_solver_but_a_deck(call: Any, folder: Path, monkeypatch: pytest.Monke
     assert result.exit_code == ExitCode.USAGE
     assert "ccx (CalculiX) is not installed: apt install calculix-ccx" in result.stderr
     assert files(folder) == {"hinge.inp"}
+
+
+@pytest.mark.parametrize("name", ["hinge.inp", "hinge.csv", "hinge.log", "hinge.dat"])
+def test_files_of_somebody_else_are_not_touched(call: Any, folder: Path, name: str) -> None:
+    (folder / "deck").mkdir()
+    (folder / "deck" / name).write_text("measured with care")
+    result = call(*HINGE, "--run")
+    assert result.exit_code == ExitCode.USAGE
+    assert f"deck/{name}: not of dpg fe, give another folder" in result.stderr
+    assert files(folder) == {name}
+    assert (folder / "deck" / name).read_text() == "measured with care"
+
+
+def test_a_measured_curve_beside_the_deck_stays(call: Any, folder: Path) -> None:
+    assert call(*HINGE).exit_code == ExitCode.DONE
+    (folder / "deck" / "hinge.csv").write_text("rotation_rad,moment_N_mm\n0.1,2.4\n")
+    for options in (("--moment", "4"), ("--run",)):
+        result = call(*HINGE, *options)
+        assert result.exit_code == ExitCode.USAGE
+        assert "deck/hinge.csv: not of dpg fe" in result.stderr
+    assert "2.4" in (folder / "deck" / "hinge.csv").read_text()
 
 
 def test_another_deck_removes_what_the_old_one_gave(call: Any, folder: Path, fake: Fake) -> None:

@@ -85,7 +85,7 @@ def dome_model(dome: Dome, fineness: str, peak: float) -> Model:
         curve = dome_curve(dome, mesh, loading, time, moved)
         return Outcome(curve, dome_finding(dome, curve))
 
-    deck = dome_deck(dome, mesh, loading, words)
+    deck = dome_deck(dome, mesh, loading, ("dpg fe dome", *words))
     return Model("dome", deck, words, len(mesh.nodes), loading.corners[-1], outcome)
 
 
@@ -99,7 +99,7 @@ def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Mod
         curve = hinge_curve(chambers, mesh, largest_moment, time, moved)
         return Outcome(curve, hinge_finding(curve))
 
-    deck = hinge_deck(chambers, mesh, largest_moment, words)
+    deck = hinge_deck(chambers, mesh, largest_moment, ("dpg fe hinge", *words))
     return Model("hinge", deck, words, len(mesh.nodes), 1.0, outcome)
 
 

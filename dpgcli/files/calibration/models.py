@@ -184,6 +184,11 @@ class Calibration(Section):
         """The value of a key of the lattice, if there is one."""
         return None if self.values is None else self.values.given().get(key)
 
+    def has(self, key: str) -> bool:
+        """Whether the file gives a key of the lattice, at one geometry or over several."""
+        in_grid = self.grid is not None and self.grid.has(key)
+        return in_grid or self.fitted(key) is not None
+
     @property
     def uncertain(self) -> dict[str, float]:
         """Standard errors by key, of the values that have one; the order of `correlation`."""

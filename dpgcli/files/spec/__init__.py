@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec.models import Spec
 from dpgcli.files.spec.problems import checked, checked_keys
-from dpgcli.files.spec.references import with_calibrations
+from dpgcli.files.spec.references import recalibrated, with_calibrations
 from dpgcli.files.spec.scenes import scene_of
 from dpgcli.files.spec.settings import changed, with_settings
 from dpgcli.mechanics.scene import Scene
@@ -20,10 +20,12 @@ from dpgcli.mechanics.scene import Scene
 __all__ = [
     "Spec",
     "canonical_json",
+    "checked",
     "json_schema",
     "read_keys",
     "read_scene",
     "read_spec",
+    "recalibrated",
     "scene_of",
     "spelled",
     "starter",

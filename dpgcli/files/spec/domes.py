@@ -19,20 +19,30 @@ from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
 
 WHERE = ("finger", "law")
 HINT = "dpg fit bistable writes one"
+NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
 
 
 @dataclass(frozen=True)
 class Domes:
     """How domes answer, and by which rules their values come about.
 
-    `travel` is that of the inverted dome at rest (mm), at a dome height of `height` (mm, if it is
-    known), for domes with a travel of their own; else 0.
+    `calibration` has the curve, if there is one. `travel` is that of the inverted dome at rest
+    (mm), at a dome height of `height` (mm, if it is known), for domes with a travel of their own;
+    else 0.
     """
 
     law: Law
     derivations: tuple[Derivation, ...]
+    calibration: Calibration | None = None
     travel: float = 0.0
     height: float | None = None
+
+    def carries(self, key: str, calibration: object) -> bool:
+        """Whether an error of a file's value is one of the finger.
+
+        What normalizes the file's own curve cancels: the curve is as it is.
+        """
+        return calibration is not self.calibration or key not in NORMALS
 
     def travel_at(self, height: float | None) -> float:
         """Travel of an inverted dome of another height, which it grows with (finite elements)."""
@@ -75,7 +85,7 @@ def _tabulated(
     if not np.isfinite(shape.rests[1]):
         return _no_well(calibration)
     rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
-    return Domes(Tabulated(shape), rules)
+    return Domes(Tabulated(shape), rules, calibration)
 
 
 def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes | Issue:
@@ -84,7 +94,7 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
         return _no_well(calibration)
     height = sizes_of(calibration.geometry).get("dome_height_mm")
     shape = spline(*_points(curve, travel, stiffness * travel**2))
-    domes = Domes(PushOnly(Tabulated(shape)), (), travel, height)
+    domes = Domes(PushOnly(Tabulated(shape)), (), calibration, travel, height)
     stroke = replace(
         STROKE,
         value=lambda height, separation: domes.travel_at(height) - height - separation,

@@ -8,7 +8,7 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
-from dpgcli.files.spec.rules import PUBLISHED
+from dpgcli.files.spec.rules import LINEAR_STIFFNESS, PUBLISHED
 from dpgcli.files.spec.settings import SETTING, changed
 
 EXPECTED = '"published" or the name of a calibration file'
@@ -38,6 +38,29 @@ def with_calibrations(document: Document, folder: Path) -> Document:
     embedded = changed(document, {".".join(KEY): value})
     problems = (*document.problems, *reader.problems)
     return replace(embedded, problems=problems, files=tuple(reader.files))
+
+
+def recalibrated(document: Document, file: Path) -> Document:
+    """The document with a calibration's values in the place of its own, wherever it has them.
+
+    They come before its other calibrations, and its lattice sections lose what the file gives.
+    Raises SpecError with every problem of the file.
+    """
+    calibration = read_calibration(file).model_copy(update={"file": file.name})
+    finger = document.data["finger"]
+    said = finger.get("calibration")
+    before = said if isinstance(said, list) else [] if said is None else [said]
+
+    def without(section: dict[str, Any]) -> dict[str, Any]:
+        kept = (section.get("lattice") or {}).items()
+        return {**section, "lattice": {k: v for k, v in kept if not calibration.has(k)}}
+
+    changes = {**without(finger), "calibration": [calibration, *before]}
+    if calibration.has(LINEAR_STIFFNESS):
+        changes.pop(LINEAR_STIFFNESS, None)
+    overrides = finger.get("overrides") or {}
+    changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}
+    return replace(document, data={**document.data, "finger": changes})
 
 
 @dataclass

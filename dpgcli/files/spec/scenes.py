@@ -17,6 +17,7 @@ from dpgcli.files.spec.domes import Domes, domes_of
 from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
 from dpgcli.files.spec.rules import (
     DERIVATIONS,
+    FORCE_LINEARITY,
     LINEAR_STIFFNESS,
     PUBLISHED,
     SEGMENT_HEIGHT,
@@ -70,7 +71,7 @@ def scene_of(spec: Spec) -> Scene:
         sources=tuple(_sources(spec.finger, values)),
         gripper=_gripper(spec),
         layer_thickness=_given(spec.finger.geometry).get("limiting_layer_thickness_mm"),
-        uncertainty=uncertainty_of(_calibrations(spec.finger), _shares(spec.finger, values)),
+        uncertainty=uncertainty_of(_calibrations(spec.finger), _shares(spec.finger, resolution)),
     )
 
 
@@ -144,6 +145,7 @@ def _resolved(finger: FingerSpec) -> Resolution:
         resolution.issues.append(domes)
         return resolution
     resolution.domes = domes
+    resolution.issues += _linearity_issues(finger, domes)
     groups = [group for group in (base, *_overridden(finger, base)) if group.units]
     for derivation in domes.derivations:
         chosen = [base] if derivation is SEGMENT_HEIGHT else groups
@@ -161,6 +163,21 @@ def _resolved(finger: FingerSpec) -> Resolution:
     return resolution
 
 
+def _linearity_issues(finger: FingerSpec, domes: Domes) -> Iterator[Issue]:
+    """Force linearities beside a law that has none."""
+    if FORCE_LINEARITY in domes.derivations:
+        return
+    given: dict[KeyPath, object] = {("finger", "lattice"): finger.lattice}
+    for units, override in (finger.overrides or {}).items():
+        given["finger", "overrides", units, "lattice"] = override and override.lattice
+    for path, section in given.items():
+        linearity = getattr(section, FORCE_LINEARITY.key, None)
+        if linearity is not None:
+            hint = "the shape of the curve is that of its calibration"
+            where = (*path, FORCE_LINEARITY.key)
+            yield Issue(where, f"none beside law: {finger.law}", number(linearity), hint)
+
+
 def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
     """The stiffness of the bars: given, or fitted."""
     if finger.linear_stiffness_N_per_mm is not None:
@@ -172,10 +189,13 @@ def _bars(finger: FingerSpec, base: Group) -> Value | Issue:
     return NO_BARS
 
 
-def _shares(spec: FingerSpec, values: dict[str, list[tuple[Group, Value]]]) -> Iterator[Share]:
+def _shares(spec: FingerSpec, resolution: Resolution) -> Iterator[Share]:
     """Standard errors of what comes from calibration files, unit by unit."""
-    for key, pairs in values.items():
+    calibrations = _calibrations(spec)
+    for key, pairs in resolution.values.items():
         for place in {v.file for _, v in pairs if v.file is not None and v.standard_error}:
+            if not resolution.domes.carries(key, calibrations[place]):
+                continue
             errors = [
                 (group, value._replace(value=value.standard_error or 0.0))
                 if value.file == place
