@@ -4,12 +4,14 @@ The residuals are those of states that are solved and certified at every trial; 
 are exact (`states.sensitivities`).
 """
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.choices import Loss, Target
@@ -23,6 +25,7 @@ from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import STEP, sensitivities
 from dpgcli.states.solve import Status, reach
 
+EDGE = 1e-3  # of a value: a fit that ends closer than this to where states end is none
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
 BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (10.0, 1e12)}
 
@@ -61,7 +64,7 @@ class FingerFit:
         nothing to fit to, and as `fits.fit` does.
         """
         self._check_start()
-        return fit(
+        found = fit(
             self._parameters,
             self._residual,
             self._jacobian,
@@ -71,6 +74,20 @@ class FingerFit:
             resamples=resamples,
             seed=seed,
         )
+        return replace(found, warnings=(*found.warnings, *self._edges(found)))
+
+    def _edges(self, found: Fit) -> Iterator[str]:
+        """Values next to which known states cease to exist: the search can go no further."""
+        for place, parameter in enumerate(found.parameters):
+            for step in (1.0 - EDGE, 1.0 + EDGE) if parameter.is_free else ():
+                values = found.values.copy()
+                values[place] *= step
+                if lost := _missing(self.known.patterns, self._states(values).status):
+                    yield (
+                        f"{parameter.key} ended at {found.values[place]:g}, next to where known "
+                        f"states cease to exist ({', '.join(lost)}): no value of it fits, and "
+                        "its errors mean nothing"
+                    )
 
     def compared(self, found: Fit | None) -> Comparison:
         """The states beside the known ones: as the finger is, or as it was fitted."""
@@ -157,13 +174,18 @@ class FingerFit:
         if not self._given.any():
             raise FitError(f"the data have no {self.target} to fit to")
         states = lattice_states(self.finger, self.known.patterns, self.frame)
-        missing = [
-            f"{pattern.decode()} is {Status(status).text}"
-            for pattern, status in zip(texts(self.known.patterns), states.status, strict=True)
-            if status != Status.STABLE
-        ]
+        missing = _missing(self.known.patterns, states.status)
         if missing:
             raise FitError(f"at the start not every known state exists: {', '.join(missing)}")
+
+
+def _missing(patterns: Flags, status: NDArray[np.uint8]) -> list[str]:
+    """Patterns that have no certified state, and why."""
+    return [
+        f"{pattern.decode()} is {Status(number).text}"
+        for pattern, number in zip(texts(patterns), status, strict=True)
+        if number != Status.STABLE
+    ]
 
 
 def _parameter(key: str, start: float, is_free: bool) -> Parameter:

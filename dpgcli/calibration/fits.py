@@ -194,6 +194,13 @@ def _warnings(found: Fit) -> tuple[str, ...]:
                 f"{parameter.key}: its standard error, {error:.2g}, is larger than the value: "
                 "the data hardly determine it"
             )
+    n_within = int((np.abs(found.residuals) <= found.loss_scale).sum())
+    if found.loss is not Loss.LINEAR and 2 * n_within < found.n_points:
+        said.append(
+            f"{n_within} of {found.n_points} residuals lie within the scale of the loss, "
+            f"{found.loss_scale:.3g}: it takes most points for outliers, and standard errors are "
+            "too small"
+        )
     if found.n_points == n_free:
         points = "1 point" if found.n_points == 1 else f"{found.n_points} points"
         said.append(f"{points} for as many free values: no error estimate")
@@ -205,11 +212,12 @@ def _bootstrapped(search: Search, found: Fit, free: Flags, resamples: int, seed:
 
     Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 6.2.4.
     """
-    draws = np.random.default_rng(seed).integers(found.n_points, size=(resamples, found.n_points))
+    random = np.random.default_rng(seed)
     fitted = []
-    for rows in draws:
+    for _ in range(resamples):
+        rows = random.integers(found.n_points, size=found.n_points)
         try:
-            again = replace(search, rows=np.asarray(rows, np.int64))
+            again = replace(search, rows=rows)
             fitted.append(again.solved(found.values, free, found.loss_scale)[0])
         except FitError:
             continue  # counted below

@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.places import Place, located
+from dpgcli.files.places import Place, in_order, located
 from dpgcli.files.sheet import Sheet, read_sheet
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -34,10 +34,13 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
     problems = [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
     if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
         problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
+    try:
+        _check_numbers(sheet, n_units)
+    except SpecError as error:
+        problems += error.problems
     if problems:
-        raise SpecError(tuple(problems))
-    _check_numbers(sheet, n_units)
-    return KnownStates(
+        raise SpecError(in_order(problems))
+    known = KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
         tip=_columns(sheet, TIP),
         angles=_angles(sheet, n_units),
@@ -48,17 +51,30 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
     )
+    problems = [
+        sheet.problem(row, SECONDS, "a time > 0", f"{known.seconds[row]:g}")
+        for row in np.flatnonzero(known.seconds <= 0.0).tolist()
+    ]
+    numbers = (known.tip, known.angles, known.openings, known.pushes)
+    if not known.shapes and not any(np.isfinite(values).any() for values in numbers):
+        problems.append(sheet.problem(None, "file", "something known of a state", "empty cells"))
+    if problems:
+        raise SpecError(in_order(problems))
+    return known
 
 
 def check_scale(file: Path, known: KnownStates, length: float) -> None:
-    """Raise SpecError for tips and angles that cannot be those of a finger this long (mm)."""
+    """Raise SpecError for what cannot be a finger this long (mm): tips, shapes and angles."""
     place, problems = Place(str(file)), []
-    reach = np.max(np.hypot(*known.tip), initial=0.0, where=np.isfinite(known.tip).all(axis=0))
-    if reach > 0.0 and not length / FARTHEST < reach < length * FARTHEST:
-        hint = "meters?" if reach < length else "micrometers?"
-        expected = f"tips of a finger {length:.4g} mm long, in mm"
-        found = f"the farthest at {reach:.3g} from the origin"
-        problems.append(located(place, "tip_x_mm", expected, found, hint))
+    points = [shape for shape in known.shapes if shape.size]
+    shapes = np.concatenate(points, axis=1) if points else np.zeros((2, 0))
+    for key, what, places in (("tip_x_mm", "tips", known.tip), ("x_mm", "shapes", shapes)):
+        reach = np.max(np.hypot(*places), initial=0.0, where=np.isfinite(places).all(axis=0))
+        if reach > 0.0 and not length / FARTHEST < reach < length * FARTHEST:
+            hint = "meters?" if reach < length else "micrometers?"
+            expected = f"{what} of a finger {length:.4g} mm long, in mm"
+            found = f"the farthest at {reach:.3g} from the origin"
+            problems.append(located(place, key, expected, found, hint))
     turn = np.max(np.abs(known.angles), initial=0.0, where=np.isfinite(known.angles))
     if turn > np.pi * len(known.patterns):  # a unit has two corners of less than 90 degrees
         expected = f"angles of {len(known.patterns)} units in rad"

@@ -10,9 +10,11 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.calibration.models import Values
 from dpgcli.files.places import in_order
 from dpgcli.files.sections import SMALLEST, Geometry, expected_of, unit_of
 from dpgcli.files.sheet import Sheet, read_sheet
+from dpgcli.files.source import MAX_NODES
 from dpgcli.mechanics.geometry import snap_pressure
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
@@ -40,6 +42,7 @@ USUAL = {  # largest values of a geometry, by the unit of its key, and what othe
     "mm": (0.05, 200.0, "meters?", "micrometers?"),
     "MPa": (1e-3, 1e4, "gigapascals?", "kPa or Pa?"),
 }
+MOST_NUMBERS = MAX_NODES * 9 // 10
 POSITIVE = f"a number > 0, at least {SMALLEST:g}, since logarithms are fitted"
 DOME = ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa")
 BEHIND = {"travel": DOME[:1], "energy": DOME, "force": DOME, "pressure": DOME}  # a range of its own
@@ -138,12 +141,20 @@ def read_table(path: Path) -> Table:
     """
     sheet = read_sheet(path)
     keys = [name for name in sheet.names if name in Geometry.model_fields]
-    others = [n for n in sheet.names if n not in keys and _is_numeric(sheet, n)]
+    others = [
+        name
+        for name in sheet.names
+        if name not in keys and (name in Values.model_fields or _is_numeric(sheet, name))
+    ]
     if not keys:
         raise SpecError((sheet.missing("of the geometry, such as dome_height_mm"),))
     if not others:
         raise SpecError((sheet.missing("of a quantity, such as bistable_stiffness_N_per_mm"),))
     columns = sheet.numbers([*keys, *others])
+    n_numbers = len(sheet.rows) * len(columns)
+    if n_numbers > MOST_NUMBERS:
+        expected = f"at most {MOST_NUMBERS:,} numbers, as many as a calibration file holds"
+        raise SpecError((sheet.problem(None, "file", expected, f"{n_numbers:,}"),))
     problems = [
         sheet.problem(row, name, POSITIVE, f"{values[row]:g}")
         for name, values in columns.items()

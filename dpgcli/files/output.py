@@ -14,16 +14,18 @@ from dpgcli.errors import OutputError, UsageError
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a temporary file beside `path`; sync it and rename it when all went well.
 
+    A link stays one: what it points to is written.
     Whatever interrupts the block leaves `path` as it was and no temporary file. Raises
     OutputError where the file cannot be written: no folder, no permission, no space.
     """
+    target = Path(os.path.realpath(path))
     try:
-        temporary = _beside(path)
+        temporary = _beside(target)
         try:
             yield temporary
             _sync(temporary, os.O_RDWR)
-            temporary.replace(path)
-            _sync(path.parent, os.O_RDONLY)
+            temporary.replace(target)
+            _sync(target.parent, os.O_RDONLY)
         except BaseException:
             with suppress(OSError):
                 temporary.unlink()
@@ -80,7 +82,7 @@ def check_writable(path: Path) -> None:
     try:
         if path.is_dir():
             raise IsADirectoryError(None, "is a folder")
-        _beside(path).unlink()
+        _beside(Path(os.path.realpath(path))).unlink()
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 

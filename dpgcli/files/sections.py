@@ -6,11 +6,15 @@ limit, may reach 1e18.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
+from dpgcli.mechanics.geometry import chamber_width
+
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
+AGREEMENT = 1e-6  # of a value given twice
 
 EXPECTED = {  # where it is not a length
     "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
@@ -26,6 +30,21 @@ UNITS = {
     "_MPa": "MPa",
     "_deg": "°",
 }
+
+
+def wrong_width(sizes: Mapping[str, float]) -> tuple[str, str, str, str] | None:
+    """Key, what is expected, found and why, where the widths of cell and chamber disagree."""
+    if "unit_cell_mm" not in sizes:
+        return None
+    cell = sizes["unit_cell_mm"]
+    derived = chamber_width(cell)
+    rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
+    if derived <= 0:
+        return "unit_cell_mm", "a length > 2 mm", f"{cell:.10g}", rule
+    given = sizes.get("chamber_width_mm", derived)
+    if math.isclose(given, derived, rel_tol=AGREEMENT):
+        return None
+    return "chamber_width_mm", f"{derived:.10g} as unit_cell_mm has it", f"{given:.10g}", rule
 
 
 def expected_of(key: str) -> str:

@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -14,6 +15,8 @@ from dpgcli.arrays import Array
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import LARGEST
+
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -48,9 +51,10 @@ class Sheet:
 
         Raises SpecError with every cell that holds no number.
         """
-        columns = {name: [_number(cell, may_lack) for cell in self.cells(name)] for name in names}
+        cells = {name: self.cells(name) for name in names}
+        columns = {name: [_number(cell, may_lack) for cell in cells[name]] for name in names}
         problems = [
-            self.problem(row, name, "a number", shown(self.cells(name)[row]))
+            self.problem(row, name, *_no_number(cells[name][row]))
             for name, values in columns.items()
             for row, value in enumerate(values)
             if value is None
@@ -68,8 +72,6 @@ class Sheet:
         """The problem that there is no column of any of these names."""
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else ""
-        if len(self.names) == 1 and (";" in self.names[0] or "\t" in self.names[0]):
-            hint = "separate columns with commas, and write decimal points"
         expected, found = f"a column {' or '.join(wanted)}", ", ".join(self.names)
         return located(Place(self.file), "header", expected, found, hint)
 
@@ -122,6 +124,10 @@ def _text(file: str, content: bytes) -> str:
 
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Place(sheet.file, header)
+    if len(sheet.names) == 1 and (foreign := [c for c in ";\t" if c in sheet.names[0]]):
+        hint = "and write decimal points"
+        yield located(top, "header", "columns separated by commas", shown(foreign[0]), hint)
+        return
     for name in dict.fromkeys(n for n in sheet.names if sheet.names.count(n) > 1):
         yield located(top, "header", "each column once", f"{shown(name)} again")
     for row, cells in enumerate(sheet.rows):
@@ -135,8 +141,15 @@ def _number(cell: str, may_lack: bool) -> float | None:
     """The number in a cell, None if there is none."""
     if may_lack and not cell:
         return math.nan
-    try:
-        value = float(cell)
-    except ValueError:
+    if not NUMBER.fullmatch(cell):
         return None
-    return value if abs(value) < LARGEST else None
+    value = float(cell)
+    return value if abs(value) <= LARGEST else None
+
+
+def _no_number(cell: str) -> tuple[str, str, str]:
+    """Expected, found and hint where there is no number."""
+    if NUMBER.fullmatch(cell):
+        return f"a number of at most {LARGEST:g}", shown(cell), "is the unit another one?"
+    is_comma = NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
+    return "a number", shown(cell), "write a decimal point" if is_comma else ""

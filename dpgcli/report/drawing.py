@@ -28,7 +28,8 @@ def figure_to(path: Path, width: float, height: float) -> Iterator[Any]:
 @contextmanager
 def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[Any]:
     """Axes to draw on; when all went well, an SVG or PNG file of that size in inches."""
+    title = str(axes.pop("title", "")).encode(errors="backslashreplace").decode()
     with figure_to(path, width, height) as figure:
-        drawn = figure.add_subplot(**axes)
+        drawn = figure.add_subplot(title=title, **axes)
         drawn.grid(visible=True, alpha=0.25)
         yield drawn

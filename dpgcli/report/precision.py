@@ -28,7 +28,8 @@ def points(rows: Sequence[Row]) -> list[Row]:
 
 def model_error(rows: Sequence[Row]) -> float | None:
     """Largest error of the lattice against given data (mm), if there are any."""
-    found = [max(row["max_tip_error_mm"], SMALLEST) for row in rows if row["group"] == "model"]
+    found = [row["max_tip_error_mm"] for row in rows if row["group"] == "model"]
+    found = [max(error, SMALLEST) for error in found if math.isfinite(error)]
     return found[0] if found else None
 
 

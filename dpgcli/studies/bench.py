@@ -161,13 +161,14 @@ class Bench:
     def _model_error(self, known: KnownStates) -> Row:
         """The lattice's own error: its states beside those that were given."""
         found = compare(self.finger, known, self.frame)
-        is_state = np.isfinite(found.distance)
+        is_state = np.isfinite(found.states.pose[0])
+        distance = found.distance[np.isfinite(found.distance)]
         angle = np.abs(found.tip_angle[np.isfinite(found.tip_angle)])
         return {
             **self._facts("model", "lattice against the data given", len(is_state)),
             "n_missing": int((~is_state).sum()),
-            "max_tip_error_mm": _largest(found.distance[is_state]),
-            "rms_tip_error_mm": _rms(found.distance[is_state]),
+            "max_tip_error_mm": _largest(distance),
+            "rms_tip_error_mm": _rms(distance),
             "max_angle_error_rad": _largest(angle),
             "rms_angle_error_rad": _rms(angle),
         }

@@ -65,6 +65,17 @@ def test_errors_are_those_of_noise_seen_again_and_again(reference_finger: Finger
     assert stated == pytest.approx(values.std(), rel=0.25)
 
 
+def test_a_fit_that_stops_where_states_end_says_so(reference_finger: Fingers) -> None:
+    """Tips that curl less than any state of this finger does: alpha runs to the fold."""
+    start = reference_finger(3, 1e4)
+    tips = np.array([[39.5, 40.2, 40.3], [-7.0, -3.0, -4.0]])
+    patterns = np.array([[True, False, True], [True, True, False], [True, True, False]])
+    study = FingerFit(start, KnownStates.of_tips(patterns, tips), Frame(), ("force_linearity",))
+    found = study.fit()
+    assert found.by_key["force_linearity"] == pytest.approx(0.0964682, abs=1e-5)
+    assert any("next to where known states cease to exist (" in text for text in found.warnings)
+
+
 def test_a_minimizer_without_derivatives_finds_the_same_lever() -> None:
     finger, known = finite_elements()
     study = FingerFit(finger, known, FRAME, ("segment_height_mm",))

@@ -187,6 +187,12 @@ def test_as_many_points_as_values_have_no_error_estimate() -> None:
     assert found.warnings == ("2 points for as many free values: no error estimate",)
 
 
+def test_a_scale_that_makes_outliers_of_most_points_is_said() -> None:
+    found = fitted(noisy(4), loss=Loss.CAUCHY, loss_scale=1e-4 * SIGMA)
+    assert any("residuals lie within the scale of the loss" in text for text in found.warnings)
+    assert not fitted(noisy(4), loss=Loss.CAUCHY).warnings
+
+
 def test_too_few_points() -> None:
     y = np.array([1.0])
     with pytest.raises(FitError, match="1 point for 2 free values"):

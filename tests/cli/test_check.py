@@ -61,6 +61,14 @@ def test_what_all_meet_is_0(call: Call, folder: Path, table: str) -> None:
     assert result.stdout == "met: area_mm2 < 5: all 5 designs\nmet: area_mm2 >= 0: all 5 designs\n"
 
 
+def test_a_summary_is_not_appended_to_the_table(call: Call, folder: Path, table: str) -> None:
+    before = (folder / table).read_bytes()
+    result = call("check", table, "--require", "n_stable >= 0", "--summary-file", table)
+    assert result.exit_code == ExitCode.USAGE
+    assert "is the spec or data that is read: give another name" in result.stderr
+    assert (folder / table).read_bytes() == before
+
+
 def test_an_unknown_column_names_the_nearest(call: Call, table: str) -> None:
     result = call("check", table, "--require", "aria_mm2 > 0")
     assert result.stdout == ""

@@ -112,6 +112,8 @@ def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, n_killed: int)
 def test_an_interrupt_on_a_cluster(cluster: Cluster, sweep: Path) -> None:
     """A plain message, a quick end, and the cluster is free for others."""
     address, _ = cluster
+    long = SWEEP.replace("to: 3, count: 30", "to: 3, count: 300")  # ten times as many designs
+    (sweep / "sweep.yaml").write_text(long)
     process = start(sweep, *on_dask(address))
     until(lambda: list((sweep / "out").rglob("*.part")))
     process.terminate()

@@ -190,6 +190,13 @@ def test_no_solver_but_a_deck(call: Any, folder: Path, monkeypatch: pytest.Monke
     assert files(folder) == {"hinge.inp"}
 
 
+def test_contradictory_widths(call: Any, folder: Path) -> None:
+    result = call(*HINGE, "-s", "finger.geometry.chamber_width_mm=50")
+    assert result.exit_code == ExitCode.USAGE
+    assert "chamber_width_mm: expected 20 as unit_cell_mm has it, found 50" in result.stderr
+    assert not (folder / "deck").exists()
+
+
 @pytest.mark.parametrize("name", ["hinge.inp", "hinge.csv", "hinge.log", "hinge.dat"])
 def test_files_of_somebody_else_are_not_touched(call: Any, folder: Path, name: str) -> None:
     (folder / "deck").mkdir()

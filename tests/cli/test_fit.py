@@ -245,7 +245,7 @@ def test_a_grid_for_people(fit: Any) -> None:
         (("bistable", PATH, *EQUAL, "--fix", "stroke=3"), "did you mean stroke_mm?"),
         (
             ("bistable", PATH, *EQUAL, "--fix", "stroke_mm=x"),
-            "--fix stroke_mm=x: expected a number > 0",
+            "--fix stroke_mm=x: expected a number from 1e-12 to 1e+12",
         ),
         (("bistable", PATH, *EQUAL, "--fix", "force_linearity=2"), "expected a number from 0 to 1"),
         (("bistable", PATH, *EQUAL, "--free", "stroke_mm"), "is not free: give its value, --fix"),
@@ -257,6 +257,22 @@ def test_a_grid_for_people(fit: Any) -> None:
         (("bistable", PATH, *EQUAL, "--loss-scale", "1"), "--loss-scale is for a robust loss"),
         (("bistable", PATH, *EQUAL, "--bootstrap", "1"), "one sample gives no interval"),
         (("grid", GRID, "-g", "dome_height_mm=3"), "the table has a column dome_height_mm"),
+        (
+            ("bistable", PATH, "--travel-to-opening", "proportional:1e-6"),
+            "is not from 1e-12 to 1e+12: is a unit, or the mapping, another one?",
+        ),
+        (
+            ("bistable", PATH, *EQUAL, "--fix", "stroke_mm=1e-300"),
+            "--fix stroke_mm=1e-300: expected a number from 1e-12 to 1e+12",
+        ),
+        (
+            ("hinge", HINGE, "-g", "unit_cell_mm=22", "-g", "chamber_width_mm=50"),
+            "--geometry: geometry.chamber_width_mm: expected 20 as unit_cell_mm has it, found 50",
+        ),
+        (
+            ("hinge", HINGE, "--loss", "huber", "--loss-scale", "1e-300"),
+            "--loss-scale 1e-300: expected a number > 0, from 1e-12",
+        ),
         (("bistable", PATH, *EQUAL, "-g", "dome_hight_mm=6.5"), "did you mean dome_height_mm?"),
         (("bistable", PATH, *EQUAL, "-g", "dome_height_mm=-1"), "expected a length > 0 in mm"),
         (("bistable", PATH, *EQUAL, "-g", "dome_height_mm"), "expected KEY=VALUE"),

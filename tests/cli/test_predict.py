@@ -14,6 +14,8 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from dpgcli.cli.exits import ExitCode
+
 Call = Callable[..., Any]
 FIRST = [
     "pattern",
@@ -366,6 +368,42 @@ def test_uncertainty_comes_on_request_and_last(call: Call, folder: Path) -> None
     assert table[UNCERTAIN].to_dict("records") == [{n: r[n] for n in UNCERTAIN} for r in alone]
     unit = pq.read_schema(folder / "u.parquet").field("tip_angle_uncertainty_rad").metadata
     assert unit[b"unit"] == b"rad"
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("predict", "-o", "fitted.yaml"),
+        ("bench", "--json", "fitted.yaml"),
+        ("stress", "--only", "mirror", "-o", "fitted.yaml"),
+        ("compare", "--plot", "link.svg"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_the_calibration_that_a_spec_names_is_no_output(
+    call: Call, folder: Path, command: tuple[str, ...]
+) -> None:
+    (folder / "link.svg").symlink_to("fitted.yaml")
+    (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n100,39,-10\n")
+    data = ("tips.csv",) if command[0] == "compare" else ()
+    result = call(command[0], "three_unit.yaml", *data, *BY_FILE, *command[1:])
+    assert result.exit_code == ExitCode.USAGE
+    assert "is the spec or data that is read: give another name" in result.stderr
+    assert (folder / "fitted.yaml").read_text() == FITTED
+
+
+def test_a_link_stays_a_link(call: Call, folder: Path) -> None:
+    (folder / "far").mkdir()
+    (folder / "states.parquet").symlink_to("far/away.parquet")
+    assert call("predict", "three_unit.yaml", "-q", "-o", "states.parquet").exit_code == 0
+    assert (folder / "states.parquet").is_symlink()
+    assert len(pd.read_parquet(folder / "far" / "away.parquet")) == 8
+    (folder / "one.svg").symlink_to("two.svg")
+    (folder / "two.svg").symlink_to("one.svg")
+    result = call("predict", "three_unit.yaml", "-q", "--plot", "one.svg")
+    assert result.exit_code in (ExitCode.DONE, ExitCode.USAGE)
+    assert "Traceback" not in result.stderr
 
 
 @pytest.mark.usefixtures("fitted")

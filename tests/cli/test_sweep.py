@@ -526,13 +526,14 @@ def test_a_depfile_lists_the_calibration(call: Any, domes: Path) -> None:
     assert "\ndome.yaml:\n" in text
 
 
+@pytest.mark.parametrize("option", ["--depfile", "--summary-file"])
 @pytest.mark.parametrize("name", ["domes.yaml", "base.yaml", "dome.yaml", "out/../dome.yaml"])
-def test_a_depfile_takes_the_place_of_no_file_that_is_read(
-    call: Any, domes: Path, name: str
+def test_an_output_takes_the_place_of_no_file_that_is_read(
+    call: Any, domes: Path, name: str, option: str
 ) -> None:
     (domes / "out").mkdir()
     before = (domes / name).read_bytes()
-    result = call("sweep", "domes.yaml", *SERIAL, "--depfile", name)
+    result = call("sweep", "domes.yaml", *SERIAL, option, name)
     assert result.exit_code == ExitCode.USAGE
     assert "is the spec or data that is read: give another name" in result.stderr
     assert (domes / name).read_bytes() == before

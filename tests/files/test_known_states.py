@@ -15,6 +15,7 @@ push2_N,pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,opening1
 1.1,01,27,-3,-0.002,-0.26,0.03,3.4,0.1,23.5
 0.2,10,26,-6,-0.25,-0.27,3.5,0.04,1.2,
 """
+SEMICOLONS = '1: header: expected columns separated by commas, found ";" (and write decimal points)'
 SHAPES = """\
 pattern,x_mm,y_mm
 10,0,0
@@ -126,14 +127,11 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
         ),
         (
             "pattern;tip_x_mm;tip_y_mm\n10;1,5;2\n",
-            ["2: row: expected 1 cells, found 2"],
+            [SEMICOLONS],
         ),
         (
             "pattern;tip_x_mm;tip_y_mm\n10;1;2\n",
-            [
-                "header: expected a column pattern, found pattern;tip_x_mm;tip_y_mm "
-                "(separate columns with commas, and write decimal points)"
-            ],
+            [SEMICOLONS],
         ),
         ("pattern\n10\n", [f"header: expected a column {TIPS}, found pattern"]),
         (
@@ -163,7 +161,8 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
             [
                 '2: tip_x_mm: expected a number, found "left"',
                 '2: tip_y_mm: expected a number, found "nan"',
-                '3: tip_x_mm: expected a number, found "1e300"',
+                '3: tip_x_mm: expected a number of at most 1e+12, found "1e300" '
+                "(is the unit another one?)",
                 '3: tip_y_mm: expected a number, found "inf"',
             ],
         ),
@@ -242,3 +241,30 @@ def test_tips_of_a_finger_pass_in_any_frame(write):
 def test_columns_that_are_not_used_are_named(write):
     text = "pattern,tip_x_mm,openning1_mm,tip_y_mm,opening3_mm\n11,26,3,-6,3\n"
     assert read_states(write(text), 2).unused == ("openning1_mm", "opening3_mm")
+
+
+def test_wrong_patterns_do_not_hide_wrong_numbers(problems):
+    found = problems("pattern,tip_x_mm,tip_y_mm\n12,1,2\n10,left,3\n")
+    assert [said.split(":")[1] for said in found] == ["2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("pattern,tip_x_mm,tip_y_mm\n10,,\n", "expected something known of a state, found empty"),
+        (
+            "pattern,tip_x_mm,tip_y_mm,seconds\n10,20,-3,0\n",
+            ":2: seconds: expected a time > 0, found 0",
+        ),
+    ],
+)
+def test_data_that_say_nothing(problems, text, said):
+    (found,) = problems(text)
+    assert said in found
+
+
+def test_shapes_in_another_unit(write):
+    tips = write("pattern,tip_x_mm,tip_y_mm\n10,26,-3\n")
+    shapes = write("pattern,x_mm,y_mm\n10,0,0\n10,0.026,-0.003\n", "shapes.csv")
+    with pytest.raises(SpecError, match=r"x_mm: expected shapes of a finger .* \(meters\?\)"):
+        check_scale(tips, read_states(tips, 2, shapes), 27.0)

@@ -73,8 +73,7 @@ def test_windows_line_ends(path: Path) -> None:
         ),
         (
             "travel_mm;energy_mJ\n0;1\n",
-            "header: expected a column pole_travel_mm or travel_mm, found travel_mm;energy_mJ "
-            "(separate columns with commas, and write decimal points)",
+            '1: header: expected columns separated by commas, found ";" (and write decimal points)',
         ),
         (
             "travel_mm,energy_mJ,energy_mJ\n0,1,1\n",
@@ -86,7 +85,17 @@ def test_windows_line_ends(path: Path) -> None:
         (GOOD + "14,nan\n", '5: energy_mJ: expected a number, found "nan"'),
         (GOOD + "inf,70\n", '5: travel_mm: expected a number, found "inf"'),
         (GOOD + "14,70 mJ\n", '5: energy_mJ: expected a number, found "70 mJ"'),
-        (GOOD + "1e300,1\n", '5: travel_mm: expected a number, found "1e300"'),
+        (
+            GOOD + "1e300,1\n",
+            '5: travel_mm: expected a number of at most 1e+12, found "1e300" '
+            "(is the unit another one?)",
+        ),
+        (
+            GOOD + '"14,5",1\n',
+            '5: travel_mm: expected a number, found "14,5" (write a decimal point)',
+        ),
+        (GOOD + "1_0,1\n", '5: travel_mm: expected a number, found "1_0"'),
+        (GOOD + "\uff11\uff14,1\n", '5: travel_mm: expected a number, found "\uff11\uff14"'),
         (
             "travel_mm,energy_mJ\n0,0\n-1,20\n-13,68\n",
             "travel_mm: expected travels that are positive towards inversion, found -13 to 0",

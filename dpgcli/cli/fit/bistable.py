@@ -163,15 +163,15 @@ def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
     from difflib import get_close_matches
 
     from dpgcli.errors import UsageError
+    from dpgcli.files.sections import LARGEST, SMALLEST
 
     fixed: dict[str, float] = {}
     for text in fix:
         key, _, value = (part.strip() for part in text.partition("="))
         number = _number(value)
-        is_possible = number is not None and (number <= 1.0 if key == LINEARITY else number > 0.0)
-        if key in LAW_KEYS and not is_possible:
-            bound = "from 0 to 1" if key == LINEARITY else "> 0"
-            raise UsageError(f"--fix {text}: expected a number {bound}")
+        low, high = (0.0, 1.0) if key == LINEARITY else (SMALLEST, LARGEST)
+        if key in LAW_KEYS and (number is None or not low <= number <= high):
+            raise UsageError(f"--fix {text}: expected a number from {low:g} to {high:g}")
         fixed[key] = number or 0.0
     for option, keys in (("--fix", list(fixed)), ("--free", free or [])):
         for key in keys:

@@ -82,9 +82,12 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
 def positive(option: str, value: float | None) -> float | None:
     """An option's number, if there is one, above zero."""
     from dpgcli.errors import UsageError
+    from dpgcli.files.sections import LARGEST, SMALLEST
 
-    if value is not None and not 0.0 < value < float("inf"):
-        raise UsageError(f"{option} {value:g}: expected a number > 0")
+    if value is not None and not SMALLEST <= value <= LARGEST:
+        raise UsageError(
+            f"{option} {value:g}: expected a number > 0, from {SMALLEST:g} to {LARGEST:g}"
+        )
     return value
 
 

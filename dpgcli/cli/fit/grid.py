@@ -52,6 +52,8 @@ def grid(
     _check_apart(geometry or (), (*read.over, *read.constant))
     shared = known(geometry_from(geometry, spec))
     law = Law(method, Points(read.over, read.geometry, read.quantities))
+    for key in read.quantities:
+        law.at(key, law.points.reference[None])  # a spec will ask for no less
     columns, rows = _rows(law)
     warnings = list(_warnings(law, read))
     elsewhere = {key: value for key, value in shared.items() if key not in read.over}
@@ -114,6 +116,8 @@ def _summary(law: "Law", table: "Table") -> list[str]:
 
 
 def _warnings(law: "Law", table: "Table") -> list[str]:
+    from difflib import get_close_matches
+
     import numpy as np
 
     from dpgcli.files.calibration import Values
@@ -121,9 +125,15 @@ def _warnings(law: "Law", table: "Table") -> list[str]:
     said = list(table.doubts)
     if table.ignored:
         said.append(f"columns not used, since they hold text: {', '.join(table.ignored)}")
-    unused = [key for key in table.quantities if key not in Values.model_fields]
-    if unused:
-        said.append(f"no key of a spec's lattice, fitted all the same: {', '.join(unused)}")
+    taken = [key for key in Values.model_fields if key != "linear_stiffness_N_per_mm"]
+    unused = {key: get_close_matches(key, taken, n=1) for key in table.quantities}
+    names = [
+        key + (f" (did you mean {close[0]}?)" if close else "")
+        for key, close in unused.items()
+        if key not in taken
+    ]
+    if names:
+        said.append(f"nothing that specs take from a grid, fitted all the same: {', '.join(names)}")
     if any(np.isnan(law.leave_one_out(key)[0]) for key in table.quantities):
         said.append(
             "too few points to leave one out: nothing is known about the error between them"

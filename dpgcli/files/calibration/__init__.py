@@ -28,7 +28,14 @@ from dpgcli.files.calibration.models import (
 )
 from dpgcli.files.output import whole_file
 from dpgcli.files.places import KeyPath, Place, in_order, located, shown
-from dpgcli.files.sections import Geometry, Section, UnitGeometry, expected_of
+from dpgcli.files.sections import (
+    AGREEMENT,
+    Geometry,
+    Section,
+    UnitGeometry,
+    expected_of,
+    wrong_width,
+)
 from dpgcli.files.source import Document, parse_value, read_document
 
 __all__ = [
@@ -49,7 +56,6 @@ __all__ = [
 ]
 
 VERSION = 1
-AGREEMENT = 1e-6  # of a written law and its points
 SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
 
@@ -115,6 +121,9 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
         document = Document(place.file, {}, {})
         located_errors = ({**e, "loc": ("geometry", *e["loc"])} for e in error.errors())
         problems += [_problem(document, e) for e in located_errors]
+    else:
+        if wrong := wrong_width(found.model_dump(exclude_none=True)):
+            problems.append(located(place, f"geometry.{wrong[0]}", *wrong[1:]))
     if problems:
         raise SpecError(in_order(problems))
     return found
@@ -129,6 +138,8 @@ def _problem(document: Document, error: Any) -> Problem:
         close = get_close_matches(str(path[-1]), known, n=1)
         hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
         return document.problem(path, "a known key", shown(path[-1]), hint)
+    if issubclass(section, Fitted) and path[-1] == "value":
+        description = expected_of(str(path[-2]))
     if issubclass(section, UnitGeometry):
         description = expected_of(str(path[-1]))
     found = "nothing" if error["type"] == "missing" else shown(error["input"])

@@ -9,6 +9,7 @@ from dpgcli.calibration.bistable import BistableFit
 from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
+from dpgcli.errors import FitError
 from dpgcli.files.calibration.models import (
     Curve,
     DataFile,
@@ -17,6 +18,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
+from dpgcli.files.sections import LARGEST, SMALLEST
 
 
 def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) -> dict[str, object]:
@@ -30,12 +32,21 @@ def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) ->
 
 
 def values_of(fit: Fit, *, only_free: bool) -> Values:
-    """Values, errors and intervals; `only_free` leaves out those that were held."""
+    """Values, errors and intervals; `only_free` leaves out those that were held.
+
+    Raises FitError for a value that no spec takes.
+    """
     said: dict[str, Any] = {}
     for place, parameter in enumerate(fit.parameters):
         if only_free and not parameter.is_free:
             continue
-        entry: dict[str, Any] = {"value": float(fit.values[place])}
+        value = float(fit.values[place])
+        if parameter.is_free and not (value == 0.0 or SMALLEST <= value <= LARGEST):
+            raise FitError(
+                f"{parameter.key} = {value:g} is not from {SMALLEST:g} to {LARGEST:g}: "
+                "is a unit, or the mapping, another one?"
+            )
+        entry: dict[str, Any] = {"value": value}
         if math.isfinite(error := float(fit.standard_errors[place])):
             entry["standard_error"] = error
         if fit.intervals is not None and np.isfinite(fit.intervals[place]).all():

@@ -26,7 +26,7 @@ from dpgcli.files.spec.models import (
     Spec,
     UnitOverride,
 )
-from dpgcli.files.spec.scenes import early_issues, issues, unit_range
+from dpgcli.files.spec.scenes import chamber_issues, early_issues, issues, unit_range
 
 SECTIONS: dict[KeyPath, type[Section]] = {
     (): Spec,
@@ -82,9 +82,14 @@ def checked(document: Document) -> Spec:
 
 
 def checked_keys(document: Document) -> Spec:
-    """The spec in a document, each of whose keys is right by itself; raises SpecError."""
+    """The spec in a document, each of whose keys is right by itself; raises SpecError.
+
+    Of the rules between keys, those of the geometry alone hold.
+    """
     spec, problems = _validated(document)
-    if spec is None or document.problems:
+    if spec is not None:
+        problems = [document.problem(*issue) for issue in chamber_issues(spec.finger)]
+    if spec is None or problems or document.problems:
         raise SpecError(in_order([*document.problems, *problems]))
     return spec
 

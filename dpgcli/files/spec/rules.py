@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.places import KeyPath
-from dpgcli.files.sections import LARGEST, SMALLEST, Geometry
+from dpgcli.files.sections import AGREEMENT, LARGEST, SMALLEST, Geometry
 from dpgcli.mechanics import geometry
 from dpgcli.mechanics.scene import Origin
 
-AGREEMENT = 1e-6
 PUBLISHED = "published"
 LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
 

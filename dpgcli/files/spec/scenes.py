@@ -12,6 +12,7 @@ from dpgcli.arrays import Array
 from dpgcli.errors import SpecError
 from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.places import KeyPath, Place, dotted, located
+from dpgcli.files.sections import wrong_width
 from dpgcli.files.spec.derivations import value_of
 from dpgcli.files.spec.domes import Domes, domes_of
 from dpgcli.files.spec.models import MAX_UNITS, UNIT_RANGE, FingerSpec, Spec
@@ -25,12 +26,10 @@ from dpgcli.files.spec.rules import (
     Group,
     Issue,
     Value,
-    agree,
     number,
     sizes_of,
 )
 from dpgcli.files.spec.uncertainty import Share, uncertainty_of
-from dpgcli.mechanics import geometry
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED as PUBLISHED_LAW
 from dpgcli.mechanics.scene import Gripper, Origin, Scene, Source
@@ -139,7 +138,7 @@ def unit_range(text: str) -> tuple[int, ...]:
 def _resolved(finger: FingerSpec) -> Resolution:
     resolution = Resolution()
     base = _base(finger)
-    resolution.issues += _chamber_issues(finger)
+    resolution.issues += chamber_issues(finger)
     domes = domes_of(finger.law, base.calibrations)
     if isinstance(domes, Issue):
         resolution.issues.append(domes)
@@ -241,21 +240,10 @@ def _given(section: Any) -> dict[str, float]:
     return {} if section is None else {k: v for k, v in vars(section).items() if v is not None}
 
 
-def _chamber_issues(finger: FingerSpec) -> Iterator[Issue]:
+def chamber_issues(finger: FingerSpec) -> Iterator[Issue]:
     """Contradictions between the widths of the unit cell and of the chamber."""
-    sizes = _given(finger.geometry)
-    if "unit_cell_mm" not in sizes:
-        return
-    derived = geometry.chamber_width(sizes["unit_cell_mm"])
-    rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
-    if derived <= 0:
-        path: KeyPath = ("finger", "geometry", "unit_cell_mm")
-        yield Issue(path, "a length > 2 mm", number(sizes["unit_cell_mm"]), rule)
-        return
-    given = sizes.get("chamber_width_mm", derived)
-    if not agree(given, derived):
-        path = ("finger", "geometry", "chamber_width_mm")
-        yield Issue(path, f"{number(derived)} as unit_cell_mm has it", number(given), rule)
+    if wrong := wrong_width(_given(finger.geometry)):
+        yield Issue(("finger", "geometry", wrong[0]), *wrong[1:])
 
 
 def _finger(spec: FingerSpec, resolution: Resolution) -> Finger:

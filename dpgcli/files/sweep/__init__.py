@@ -247,10 +247,19 @@ class _SpaceReader:
         except (OSError, ValueError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
             return None
+        if frame.empty:
+            self.wrong(path, "rows of finite numbers", "no rows")
+            return None
         columns = {str(key): frame[key].to_numpy() for key in frame.columns}
-        numeric = all(c.dtype.kind in "iuf" and np.isfinite(c).all() for c in columns.values())
-        if frame.empty or not numeric:
-            self.wrong(path, "rows of finite numbers", f"{len(frame)} rows", "no text, no gaps")
+        n_before = len(self.problems)
+        for key, column in columns.items():
+            numbers = pd.to_numeric(pd.Series(column), errors="coerce").to_numpy(np.float64)
+            wrong = np.flatnonzero(~np.isfinite(numbers))
+            if len(wrong) or column.dtype.kind not in "iuf":
+                row = int(wrong[0]) if len(wrong) else 0
+                found = f"{shown(str(column[row]))} in row {row + 1}"
+                self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")
+        if len(self.problems) > n_before:
             return None
         self.tables.append(table)
         return Axis(columns)

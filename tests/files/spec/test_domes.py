@@ -195,6 +195,25 @@ def test_a_stroke_fitted_elsewhere_comes_before_that_of_contact(scene):
     assert changed.domes.contact.item() == found.finger.domes.contact.item()
 
 
+@pytest.mark.parametrize("law", ["published", "tabulated", "push_only"])
+def test_what_measures_a_curve_is_no_uncertainty_of_the_finger(scene, law):
+    """k_b and d of the curve's own file cancel: with others the finger is the same."""
+    values = calibration()["values"]
+    off = {k: {"value": 1.3 * v["value"], "standard_error": 0.1} for k, v in values.items()}
+    one, other = (scene(law, dome=calibration(values=v)) for v in (values, off))
+    opening = np.linspace(0.5, 4.0, 8)
+    same = np.allclose(energies(one.finger, opening), energies(other.finger, opening), rtol=1e-12)
+    assert same == (law != "published")
+    assert (other.uncertainty is None) == (law != "published")
+
+
+@pytest.mark.parametrize("law", ["tabulated", "push_only"])
+@pytest.mark.parametrize("section", ["lattice", "overrides.2.lattice"])
+def test_a_curve_has_no_force_linearity(problem, law, section):
+    said = problem(law, f"finger.{section}.force_linearity=0.05")
+    assert f"finger.{section}.force_linearity: expected none beside law: {law}, found 0.05" in said
+
+
 def test_units_with_domes_of_their_own_push_each_in_its_way(scene):
     graded = scene("push_only", "finger.overrides.2.geometry.dome_height_mm=7.5")
     same = scene("push_only"), scene("push_only", "finger.geometry.dome_height_mm=7.5")

@@ -236,6 +236,27 @@ def test_a_misspelled_name_in_a_constraint_names_the_nearest(read: Read) -> None
     assert problem.endswith("(did you mean dome_height_mm?)")
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"{HEIGHT}\n6\n\n", None),
+        (f"{HEIGHT},finger.units\n6,3\n,4\n", f'column {HEIGHT}, found "nan" in row 2'),
+        (f"{HEIGHT}\n6\ntall\n", f'column {HEIGHT}, found "tall" in row 2'),
+        (f"{HEIGHT}\ntrue\n", f'column {HEIGHT}, found "True" in row 1'),
+        (f"{HEIGHT}\n", "expected rows of finite numbers, found no rows"),
+    ],
+)
+def test_a_table_says_where_it_has_no_number(
+    read: Read, tmp_path: Path, text: str, said: str | None
+) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    if said is None:
+        assert designs(read("table: t.csv"))[HEIGHT] == [6]
+        return
+    (problem,) = problems(read, "table: t.csv")
+    assert said in problem
+
+
 def test_a_short_name_of_two_keys_is_ambiguous(read: Read) -> None:
     keys = [f"finger.overrides.{unit}.geometry.dome_height_mm" for unit in (1, 2)]
     axes = [f"{{key: {key}, values: [6, 6.5]}}" for key in keys]
