@@ -175,7 +175,8 @@ def barriers(finger: Finger, wells: Wells) -> Array:
 def _rigid_energy(finger: Finger, extension: Array) -> Array:
     """Spring and hinge of a unit with rigid bars, E(x) + ½ k_θ φ² with x = 2H sin(φ/2)."""
     spring = finger.springs(extension)
-    turn = 2.0 * np.arcsin(extension / (2.0 * finger.segment_height))
+    sine = extension / (2.0 * finger.segment_height)
+    turn = 2.0 * np.arcsin(np.minimum(sine, 1.0))  # beyond the lever there is no well to ask for
     return spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
 
 
@@ -221,11 +222,12 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     chord, strut = (-gradient[row].reshape(units, designs) / stiffness for row in (0, 3))
     answers = [part.reshape(units, designs) for part in _corner_answers(band)]
     by_chord, by_near_strut, by_far_strut = answers
-    turn = 2.0 * (
-        np.abs(by_chord * chord)
-        + (np.abs(by_near_strut) + np.abs(by_far_strut)) * 2.0 * np.abs(strut).max(axis=0)
-    )
-    # `turn` is of both corners, and may be infinite
+    with np.errstate(invalid="ignore"):  # an infinite answer to no force
+        turn = 2.0 * (
+            np.abs(by_chord * chord)
+            + (np.abs(by_near_strut) + np.abs(by_far_strut)) * 2.0 * np.abs(strut).max(axis=0)
+        )
+    turn = np.where(np.isnan(turn), np.inf, turn)  # of both corners
     scale = np.minimum(1.0, 0.2 * rigid_angle / np.maximum(turn, np.finfo(float).tiny))
     scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
     by_chord, by_near_strut, by_far_strut = scaled
