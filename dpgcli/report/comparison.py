@@ -8,7 +8,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.comparison import Comparison
 from dpgcli.calibration.known import KnownStates
-from dpgcli.report.drawing import drawn_to
+from dpgcli.report.drawing import drawn_to, titled
 from dpgcli.states.patterns import texts
 
 
@@ -18,7 +18,7 @@ def draw_comparison(
     """Draw each state's limiting layer to its tip, and what is known, to an SVG or PNG file."""
     from matplotlib import colormaps
 
-    words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": name}
+    words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": titled(name)}
     with drawn_to(path, 9.0, 6.0, aspect="equal", **words) as axes:
         names = texts(known.patterns)
         for state, inverted in enumerate(known.patterns.T):

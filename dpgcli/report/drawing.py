@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.files.output import whole_file
+from dpgcli.files.places import shortened
+
+LONGEST_TITLE = 100
 
 
 @contextmanager
@@ -25,11 +28,19 @@ def figure_to(path: Path, width: float, height: float) -> Iterator[Any]:
             figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
 
 
+def titled(text: str) -> str:
+    """A text that may name a file, as a figure can show it: no formulas, no broken characters.
+
+    >>> titled("cost$a$.csv")
+    'cost\\\\$a\\\\$.csv'
+    """
+    return shortened(text, LONGEST_TITLE).replace("$", r"\$")
+
+
 @contextmanager
 def drawn_to(path: Path, width: float, height: float, **axes: Any) -> Iterator[Any]:
     """Axes to draw on; when all went well, an SVG or PNG file of that size in inches."""
-    title = str(axes.pop("title", "")).encode(errors="backslashreplace").decode()
     with figure_to(path, width, height) as figure:
-        drawn = figure.add_subplot(title=title, **axes)
+        drawn = figure.add_subplot(**axes)
         drawn.grid(visible=True, alpha=0.25)
         yield drawn

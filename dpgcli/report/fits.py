@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dpgcli.arrays import Array
-from dpgcli.report.drawing import figure_to
+from dpgcli.report.drawing import figure_to, titled
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def draw_fit(figure: FitFigure, path: Path) -> None:
         above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3, 1))
         above.plot(*figure.line, color="#440154", lw=1.5, label="fitted law", zorder=4)
         above.plot(figure.x, figure.observed, ".", color="#21918c", ms=5, label="data", zorder=3)
-        above.set(title=figure.title, ylabel=figure.y_label)
+        above.set(title=titled(figure.title), ylabel=figure.y_label)
         below.axhline(0.0, color="#440154", lw=1.0)
         below.plot(figure.x, figure.residuals, ".", color="#21918c", ms=4)
         below.set(xlabel=figure.x_label, ylabel=f"law - data ({figure.unit})")

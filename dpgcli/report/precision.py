@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dpgcli.report.drawing import drawn_to
+from dpgcli.report.drawing import drawn_to, titled
 
 Row = dict[str, Any]
 
@@ -94,7 +94,11 @@ def _place(value: float, first: float, last: float, size: int) -> int:
 
 def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
     """Draw the figure to an SVG or PNG file."""
-    words = {"xlabel": "wall time per state (s)", "ylabel": "largest tip error (mm)", "title": name}
+    words = {
+        "xlabel": "wall time per state (s)",
+        "ylabel": "largest tip error (mm)",
+        "title": titled(name),
+    }
     with drawn_to(path, 9.0, 5.5, xscale="log", yscale="log", **words) as axes:
         _draw_points(axes, points(rows))
         model = model_error(rows)

@@ -121,6 +121,17 @@ def test_a_bug_is_3_and_keeps_its_traceback(call: Call, monkeypatch: pytest.Monk
     assert "report" in result.stderr
 
 
+@pytest.mark.parametrize("name", [b"caf\xe9.csv", b"a$b$_^.csv"])
+def test_a_figure_of_a_file_with_an_odd_name(call: Call, folder: Path, name: bytes) -> None:
+    file = os.fsdecode(name)
+    try:
+        (folder / file).write_text("moment_N_mm,rotation_rad\n0,0\n2.4,0.1\n4.8,0.2\n")
+    except OSError:
+        pytest.skip("no such names on this file system")
+    result = call("fit", "hinge", file, "--plot", "h.svg", "-q")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
 def test_rigid_bars_have_no_node_coordinates(call: Call) -> None:
     rigid = "finger.linear_stiffness_N_per_mm=.inf"
     result = call("predict", "three_unit.yaml", "--formulation", "lattice", "-s", rigid)
