@@ -14,7 +14,7 @@ from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
 from dpgcli.files.sections import unit_of
 from dpgcli.files.spec import variant
-from dpgcli.files.sweep import flattened
+from dpgcli.files.sweep.space import flattened
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared

@@ -1,0 +1,171 @@
+"""The space of a sweep: axes from what its file says, and constraints over their keys."""
+
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dpgcli.errors import Problem
+from dpgcli.exploration.expressions import Expression, ExpressionError, expression
+from dpgcli.exploration.space import Axis, Range, linear, listed, logarithmic, sampled
+from dpgcli.files.places import KeyPath, shown
+from dpgcli.files.source import Document
+from dpgcli.files.spec.problems import unknown_key
+from dpgcli.files.sweep.models import MANY_KEYS, ONE_KEY, AxisSpec, Between, Sample
+
+UNITS = "finger.units"
+
+
+@dataclass
+class SpaceReader:
+    """Makes axes from what a file says; what is wrong gathers in `problems`."""
+
+    document: Document
+    folder: Path
+    has_gripper: bool
+
+    def __post_init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.tables: list[Path] = []
+        self.keys: set[str] = set()
+
+    def wrong(self, path: KeyPath, expected: str, found: str, hint: str = "") -> None:
+        self.problems.append(self.document.problem(path, expected, found, hint))
+
+    def axis(self, place: int, said: AxisSpec) -> Axis | None:
+        """The axis, or None with a problem."""
+        path: KeyPath = ("space", place)
+        kinds = [k for k in (*ONE_KEY, *MANY_KEYS) if getattr(said, k) is not None]
+        if len(kinds) != 1:
+            every = ", ".join((*ONE_KEY, *MANY_KEYS))
+            self.wrong(path, f"exactly one of {every}", ", ".join(kinds) or "none")
+            return None
+        if (kinds[0] in ONE_KEY) != (said.key is not None):
+            needs = "a key beside" if said.key is None else "no key beside"
+            self.wrong(path, f"{needs} {kinds[0]}", shown(said.key))
+            return None
+        made = self.made(path, said, kinds[0])
+        if made is not None:
+            self.check_keys((*path, "key" if said.key else kinds[0]), list(made.values))
+        return made
+
+    def made(self, path: KeyPath, said: AxisSpec, kind: str) -> Axis | None:
+        if said.key is not None and said.values is not None:
+            return listed(said.key, _numbers(said.key, said.values))
+        if said.key is not None and (between := said.linear or said.log):
+            return self.spaced((*path, kind), said.key, between, is_log=said.log is not None)
+        if said.paired is not None:
+            return self.paired((*path, kind), said.paired)
+        if said.sample is not None:
+            return self.sampled((*path, kind), said.sample)
+        return self.tabulated((*path, kind), said.table or "")
+
+    def spaced(self, path: KeyPath, key: str, between: Between, *, is_log: bool) -> Axis | None:
+        if is_log and min(between.first, between.last) <= 0:
+            self.wrong(path, "bounds above zero", f"{between.first:g} and {between.last:g}")
+            return None
+        make = logarithmic if is_log else linear
+        axis = make(key, between.first, between.last, between.count)
+        return Axis({key: _numbers(key, axis.values[key].tolist())})
+
+    def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
+        lengths = {key: len(values) for key, values in columns.items()}
+        if len(set(lengths.values())) > 1:
+            self.wrong(path, "lists of one length", ", ".join(map(str, lengths.values())))
+            return None
+        return Axis({key: _numbers(key, values) for key, values in columns.items()})
+
+    def sampled(self, path: KeyPath, sample: Sample) -> Axis | None:
+        for key, bounds in sample.ranges.items():
+            if bounds.scale == "log" and min(bounds.first, bounds.last) <= 0:
+                self.wrong((*path, "ranges", key), "bounds above zero", "zero or less")
+                return None
+        ranges = {k: Range(r.first, r.last, r.scale == "log") for k, r in sample.ranges.items()}
+        return sampled(sample.method, ranges, sample.count, sample.seed)
+
+    def tabulated(self, path: KeyPath, name: str) -> Axis | None:
+        """Columns of a CSV or Parquet file; pandas reads both."""
+        import pandas as pd
+
+        table = self.folder / name
+        try:
+            if table.suffix == ".parquet":
+                frame = pd.read_parquet(table)
+            else:
+                with warnings.catch_warnings():  # rows that do not fit the header
+                    warnings.simplefilter("error", pd.errors.ParserWarning)
+                    frame = pd.read_csv(table, index_col=False)
+        except (OSError, ValueError, pd.errors.ParserWarning) as error:
+            self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
+            return None
+        if frame.empty:
+            self.wrong(path, "rows of finite numbers", "no rows")
+            return None
+        columns = {str(key): frame[key].to_numpy() for key in frame.columns}
+        n_before = len(self.problems)
+        for key, column in columns.items():
+            numbers = pd.to_numeric(pd.Series(column), errors="coerce").to_numpy(np.float64)
+            wrong = np.flatnonzero(~np.isfinite(numbers))
+            if len(wrong) or column.dtype.kind not in "iuf":
+                row = int(wrong[0]) if len(wrong) else 0
+                found = f"{shown(str(column[row]))} in row {row + 1}"
+                self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")
+        if len(self.problems) > n_before:
+            return None
+        self.tables.append(table)
+        return Axis(columns)
+
+    def check_keys(self, path: KeyPath, keys: list[str]) -> None:
+        """Keys must be known to the spec, and vary on one axis only."""
+        for key in keys:
+            if unknown := unknown_key(tuple(key.split("."))):
+                self.wrong(path, *unknown)
+            elif key.startswith("gripper.") and not self.has_gripper:
+                self.wrong(path, "keys of a base that has them", key, "the base has no gripper")
+            if key in self.keys:
+                self.wrong(path, "each key on one axis", f"{key} again")
+            self.keys.add(key)
+
+    def constraint(self, place: int, text: str, data: dict[str, Any]) -> Expression | None:
+        """The rule, with names that are keys of the space or of the base spec."""
+        path: KeyPath = ("constraints", place)
+        try:
+            rule = expression(text)
+        except ExpressionError as error:
+            self.wrong(path, "an expression over keys", shown(text), str(error))
+            return None
+        if not rule.is_comparison:
+            self.wrong(path, "a comparison, such as dome_height_mm > 5", shown(text))
+        numbers = {k for k, v in flattened(data).items() if type(v) in (int, float)}
+        known = self.keys | numbers
+        last = Counter(name.rsplit(".", 1)[-1] for name in known)
+        short = {name for name, count in last.items() if count == 1}
+        if unknown := sorted(rule.names - known - short):
+            close = get_close_matches(unknown[0], [*known, *short], n=1)
+            hint = f"did you mean {close[0]}?" if close else ""
+            expected = "numeric keys, by their last part or, if two share that, in full"
+            self.wrong(path, expected, ", ".join(unknown), hint)
+        return rule
+
+
+def _numbers(key: str, values: Sequence[int | float]) -> Any:
+    """Values as an array: whole numbers stay whole, and those of units become so."""
+    whole = all(float(value).is_integer() and abs(value) < 2**53 for value in values)
+    counts = whole and (key == UNITS or all(isinstance(value, int) for value in values))
+    return np.array(values, np.int64 if counts else np.float64)
+
+
+def flattened(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested data by dotted key."""
+    flat: dict[str, Any] = {}
+    for key, value in data.items():
+        if isinstance(value, dict):
+            flat |= flattened(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat
