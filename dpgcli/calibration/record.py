@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.errors import FitError
@@ -232,6 +231,8 @@ def _reversals(record: Record) -> int:
     """How often the travel turns back while it is fast."""
     if record.time is None:
         return 0
+    from scipy.signal import find_peaks  # half of a fit's start, for records with time only
+
     speed, limit = speeds(record)
     fast = np.flatnonzero(speed > limit)
     if not len(fast):
