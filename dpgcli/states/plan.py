@@ -205,8 +205,9 @@ def _check(scene: Scene, request: Request) -> None:
 
 def _check_uncertainty(scene: Scene, request: Request) -> None:
     if scene.uncertainty is None:
+        cancels = " (those of the curve's own k_b and d cancel)" if scene.finger.law.curve else ""
         raise UsageError(
-            "--uncertainty: no value of the spec has a standard error; "
+            f"--uncertainty: no value of the spec has a standard error{cancels}; "
             "calibrate it by a file of dpg fit"
         )
     if request.formulation != "chain":
