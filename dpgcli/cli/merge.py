@@ -22,7 +22,7 @@ def merge(
     """Join shards into the tables of the whole sweep."""
     from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
-    from dpgcli.studies.sweep import assemble, drop_parts, stores
+    from dpgcli.studies.sweep import assemble, drop_half_written, drop_parts, stores
 
     found = []
     for folder in shards:
@@ -34,6 +34,7 @@ def merge(
             )
         found += here
     with sole_use(output):
+        drop_half_written(output)
         assemble(found, output)
         drop_parts(output)  # its own, if it was one of the shards
         designs, text = summarize(output, is_new=True)

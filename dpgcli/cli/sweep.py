@@ -86,7 +86,7 @@ def sweep(
         _start_fork_server_early()
     from dpgcli.errors import UsageError
     from dpgcli.files.output import check_appendable, sole_use
-    from dpgcli.studies.sweep import DESIGNS, STATES, drop_parts
+    from dpgcli.studies.sweep import DESIGNS, STATES, drop_half_written, drop_parts
 
     part = _shard(shard)
     _check_executor(executor, scheduler)
@@ -100,6 +100,7 @@ def sweep(
     if depfile is not None:
         write_depfile(depfile, study)
     with sole_use(output):
+        drop_half_written(output)
         is_new = restart or not study.is_up_to_date
         if is_new:
             _check_folder(study, restart=restart, force=force)

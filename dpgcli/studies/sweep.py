@@ -23,7 +23,8 @@ from dpgcli.studies.work import Work
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
-STATES, DESIGNS, RUN = "states.parquet", "designs.parquet", "run.json"
+STATES, DESIGNS = "states.parquet", "designs.parquet"
+RUN, REPORT = "run.json", "report.md"
 PARTS = ".parts"
 
 
@@ -179,8 +180,6 @@ class Study:
         for damaged in store.damaged():
             damaged.path.unlink()
         store.say(self.metadata)
-        for stale in self.folder.glob(".*.parquet.*.tmp"):  # of a run that was killed
-            stale.unlink()
         ranges = self.ranges(shard or Shard())
         missing = store.missing(ranges)
         n_designs = sum(stop - start for start, stop in ranges)
@@ -248,6 +247,13 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
 def drop_parts(folder: Path) -> None:
     """Remove what unfinished sweeps left in a folder."""
     shutil.rmtree(folder / PARTS, ignore_errors=True)
+
+
+def drop_half_written(folder: Path) -> None:
+    """Remove what a killed run was about to write; for who alone is at work in the folder."""
+    for name in (STATES, DESIGNS, RUN, REPORT):
+        for stale in folder.glob(f".{name}.*.tmp"):
+            stale.unlink()
 
 
 def stores(folder: Path) -> list[PartStore]:

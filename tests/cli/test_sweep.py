@@ -47,6 +47,21 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
 
 
+@pytest.mark.parametrize("is_done", [False, True])
+def test_what_a_killed_run_was_writing_goes(call: Any, sweep: Path, is_done: bool) -> None:
+    """Whatever file it was; nobody else's goes."""
+    out = sweep.parent / "out"
+    if is_done:
+        assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    out.mkdir(exist_ok=True)
+    names = ("states.parquet", "designs.parquet", "run.json", "report.md", "notes.txt")
+    for name in names:
+        (out / f".{name}.a1b2c3d4.tmp").write_text("half")
+    result = call("sweep", "sweep.yaml", *SERIAL, "-q")
+    assert result.exit_code == ExitCode.DONE
+    assert [path.name for path in out.glob(".*.tmp")] == [".notes.txt.a1b2c3d4.tmp"]
+
+
 def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL)
     assert result.exit_code == ExitCode.DONE
