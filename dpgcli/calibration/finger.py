@@ -85,8 +85,8 @@ class FingerFit:
                 if lost := _missing(self.known.patterns, self._states(values).status):
                     yield (
                         f"{parameter.key} ended at {found.values[place]:g}, next to where known "
-                        f"states cease to exist ({', '.join(lost)}): no value of it fits, and "
-                        "its errors mean nothing"
+                        f"states cease to exist ({', '.join(lost)}): the search can go no "
+                        "further, and its standard error may mean nothing"
                     )
 
     def compared(self, found: Fit | None) -> Comparison:

@@ -25,8 +25,6 @@ from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.known import KnownStates
-    from dpgcli.mechanics.finger import Finger
     from dpgcli.studies.bench import Row
 
 GROUPS = {
@@ -92,6 +90,7 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
+    from dpgcli.files.known_states import states_of
     from dpgcli.files.output import check_outputs, check_table_name
     from dpgcli.files.spec import canonical_json, checked, read_scene, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
@@ -108,7 +107,7 @@ def bench(
     content = checked(document)
     scene, said = scene_of(content), canonical_json(content)
     target = None if target_error is None else millimeters("--target-error", target_error)
-    known = None if against is None else _known(against, scene.finger)
+    known = None if against is None else states_of(scene.finger, against)
     then = None if compare is None else _recorded(compare, said)
     study = Bench(
         scene, repeats, tuple(keep or ()), target, known, frame_of(first_station, tip_offset)
@@ -122,15 +121,6 @@ def bench(
     findings = [] if target is None else [cheapest_way(rows, target)]
     for line in findings + ([] if then is None else _changes(then, rows)):
         _tell(printed_as, line)
-
-
-def _known(path: Path, finger: "Finger") -> "KnownStates":
-    from dpgcli.files.known_states import check_scale, read_states
-    from dpgcli.states.solve import reach
-
-    known = read_states(path, finger.n_units)
-    check_scale(path, known, float(reach(finger)[0]))
-    return known
 
 
 def _recorded(path: Path, said: str) -> "Sequence[Row]":

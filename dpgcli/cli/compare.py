@@ -54,15 +54,13 @@ def compare(
 ) -> None:
     """Hold predictions against finite elements or measurements."""
     from dpgcli.calibration.comparison import columns, compare, rows
-    from dpgcli.files.known_states import check_scale, read_states
+    from dpgcli.files.known_states import states_of
     from dpgcli.files.output import check_outputs
     from dpgcli.files.spec import checked, read_scene, recalibrated, scene_of
-    from dpgcli.states.solve import reach
 
     document = read_scene(spec, settings or ())
     finger, frame = scene_of(checked(document)).finger, frame_of(first_station, tip_offset)
-    known = read_states(data, finger.n_units, shapes)
-    check_scale(data, known, float(reach(finger)[0]))
+    known = states_of(finger, data, shapes)
     better = None
     if calibration is not None:
         better = scene_of(checked(recalibrated(document, calibration))).finger

@@ -11,6 +11,8 @@ from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, in_order, located
 from dpgcli.files.sheet import Sheet, read_sheet
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.solve import reach
 
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
@@ -63,17 +65,27 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
     return known
 
 
+def states_of(finger: Finger, path: Path, shapes: Path | None = None) -> KnownStates:
+    """Known states that can be those of this finger, in mm and rad.
+
+    Raises SpecError as `read_states` and `check_scale` do.
+    """
+    known = read_states(path, finger.n_units, shapes)
+    check_scale(path, known, float(reach(finger)[0]))
+    return known
+
+
 def check_scale(file: Path, known: KnownStates, length: float) -> None:
     """Raise SpecError for what cannot be a finger this long (mm): tips, shapes and angles."""
     place, problems = Place(str(file)), []
     points = [shape for shape in known.shapes if shape.size]
     shapes = np.concatenate(points, axis=1) if points else np.zeros((2, 0))
     for key, what, places in (("tip_x_mm", "tips", known.tip), ("x_mm", "shapes", shapes)):
-        reach = np.max(np.hypot(*places), initial=0.0, where=np.isfinite(places).all(axis=0))
-        if reach > 0.0 and not length / FARTHEST < reach < length * FARTHEST:
-            hint = "meters?" if reach < length else "micrometers?"
+        far = np.max(np.hypot(*places), initial=0.0, where=np.isfinite(places).all(axis=0))
+        if far > 0.0 and not length / FARTHEST < far < length * FARTHEST:
+            hint = "meters?" if far < length else "micrometers?"
             expected = f"{what} of a finger {length:.4g} mm long, in mm"
-            found = f"the farthest at {reach:.3g} from the origin"
+            found = f"the farthest at {far:.3g} from the origin"
             problems.append(located(place, key, expected, found, hint))
     turn = np.max(np.abs(known.angles), initial=0.0, where=np.isfinite(known.angles))
     if turn > np.pi * len(known.patterns):  # a unit has two corners of less than 90 degrees

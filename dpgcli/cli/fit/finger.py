@@ -67,10 +67,9 @@ def finger(
     from dpgcli.calibration.finger import FingerFit
     from dpgcli.files.calibration import DataFile, geometry_of
     from dpgcli.files.calibration.results import fitted
-    from dpgcli.files.known_states import check_scale, read_states
+    from dpgcli.files.known_states import states_of
     from dpgcli.files.spec import read_scene, scene_of
     from dpgcli.files.spec.problems import checked as checked_spec
-    from dpgcli.states.solve import reach
 
     check_files((spec, data), output, plot)
     document = read_scene(spec, settings or ())
@@ -79,8 +78,7 @@ def finger(
     where = checked.finger.geometry
     where = geometry_of(geometry, where) if geometry else where
     base = scene_of(checked).finger
-    known = read_states(data, base.n_units)
-    check_scale(data, known, float(reach(base)[0]))
+    known = states_of(base, data)
     frame = frame_of(first_station, tip_offset)
     size = scale_of(loss, loss_scale)
     study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss, size)
