@@ -31,7 +31,7 @@ def value_of(derivation: Derivation, group: Group, base: Group) -> Value | Issue
     for place, calibration in enumerate(group.calibrations):
         if calibration == PUBLISHED and derivation.origin is not None:
             return _derived_value(derivation, group)
-        if not isinstance(calibration, Calibration) or calibration is derivation.unlike:
+        if not isinstance(calibration, Calibration) or calibration is derivation.not_from:
             continue
         value = from_file(derivation, group, calibration)
         if isinstance(value, Value):

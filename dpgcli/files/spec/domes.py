@@ -99,7 +99,7 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
         STROKE,
         value=lambda height, separation: domes.travel_at(height) - height - separation,
         rule="travel of the inverted dome - dome height - unit separation (contact)",
-        unlike=calibration,
+        not_from=calibration,
     )
     rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
     return replace(domes, derivations=tuple(rules))

@@ -45,8 +45,8 @@ class Value(NamedTuple):
 class Derivation:
     """How geometry yields one lattice value; `origin` only where a calibration is behind it.
 
-    Calibration files may give the value instead, but not the one that `unlike` names: there the
-    key means something else.
+    Calibration files may give the value instead, but for `not_from`: there the key means something
+    else.
     """
 
     key: str
@@ -54,7 +54,7 @@ class Derivation:
     value: Callable[..., float]
     rule: str
     origin: Callable[..., Origin] | None = None
-    unlike: Calibration | None = None
+    not_from: Calibration | None = None
     bounds: tuple[float, float] = (SMALLEST, LARGEST)
 
 
