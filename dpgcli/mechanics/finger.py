@@ -105,7 +105,7 @@ class Finger:
 
     def changed(self, **arrays: Array) -> "Finger":
         """The finger with other arrays."""
-        return replace(self, **{**self.arrays(), **arrays})  # type: ignore[arg-type]
+        return replace(self, **{**self.arrays(), **arrays})  # type: ignore[arg-type]  # all arrays
 
     def with_values(self, values: Mapping[str, float]) -> "Finger":
         """The finger with other values, the same in all units, by the names in `KEYS`."""
@@ -114,7 +114,7 @@ class Finger:
     def with_units(self, places: Sequence[int]) -> "Finger":
         """A finger of some of the units, counted from 0; a unit may repeat."""
         picked = {k: v if len(v) == 1 else v[list(places)] for k, v in self.arrays().items()}
-        return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]
+        return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
 
     def with_bars(self, stiffness: float) -> "Finger":
         """The finger with bars of another stiffness k_L (N/mm); infinite makes them rigid."""
@@ -168,4 +168,4 @@ def uniform_finger(
     """
     values = {name: value for name, value in locals().items() if name != "n_units"}
     arrays = {name: np.array([[float(value)]]) for name, value in values.items()}
-    return Finger(n_units, **arrays)  # type: ignore[arg-type]
+    return Finger(n_units, **arrays)  # type: ignore[arg-type]  # all arrays

@@ -1,8 +1,9 @@
 """Least squares: exact answers, honest errors, bounds, outliers, and every way to fail."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import curve_fit
 
 from dpgcli.arrays import Array
@@ -85,8 +86,9 @@ def test_the_bootstrap_agrees_with_the_standard_errors() -> None:
 
 def test_a_seed_gives_the_same_intervals() -> None:
     first, again, other = (fitted(noisy(3), resamples=20, seed=s).intervals for s in (1, 1, 2))
-    assert np.array_equal(first, again)  # type: ignore[arg-type]
-    assert not np.array_equal(first, other)  # type: ignore[arg-type]
+    assert first is not None and again is not None and other is not None
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
 
 
 @pytest.mark.parametrize("loss", [Loss.SOFT_L1, Loss.HUBER, Loss.CAUCHY])
@@ -113,15 +115,17 @@ def test_a_huge_scale_is_plain_least_squares() -> None:
 def test_influence_is_the_slope_of_the_cost(loss: Loss) -> None:
     residuals, scale, step = np.array([-3.0, -0.4, 0.3, 2.5]), 0.8, 1e-3
 
-    def differences(function: object) -> NDArray[np.float64]:
+    def cost(r: Array) -> Array:
+        return 0.5 * scale**2 * growth(loss, (r / scale) ** 2)
+
+    def differences(function: Callable[[Array], Array]) -> Array:
         parts = [
             weight * function(residuals + k * step)
             for k, weight in zip((-2, -1, 1, 2), (1, -8, 8, -1), strict=True)
-        ]  # type: ignore[operator]
+        ]
         return np.asarray(sum(parts)) / (12 * step)
 
     pull, curvature = influence(loss, residuals, scale)
-    cost = lambda r: 0.5 * scale**2 * growth(loss, (r / scale) ** 2)  # noqa: E731
     assert pull == pytest.approx(differences(cost), rel=1e-7)
     assert curvature == pytest.approx(
         differences(lambda r: influence(loss, r, scale)[0]), rel=1e-7, abs=1e-10

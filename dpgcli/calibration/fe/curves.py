@@ -18,8 +18,8 @@ class DomeCurve(NamedTuple):
     """The way of a dome's pole towards inversion; the first row is the dome at rest."""
 
     pole_travel_mm: Array
-    energy_mJ: Array  # noqa: N815
-    pressure_MPa: Array  # noqa: N815
+    energy_mJ: Array
+    pressure_MPa: Array
     volume_mm3: Array
     time_s: Array
 
@@ -27,7 +27,7 @@ class DomeCurve(NamedTuple):
 class HingeCurve(NamedTuple):
     """Moments that open a gap, and by how much; the first row is the hinge at rest."""
 
-    moment_N_mm: Array  # noqa: N815
+    moment_N_mm: Array
     rotation_rad: Array
 
 

@@ -74,7 +74,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     """
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None  # leaves on one line, sections on several
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # typed None
     yaml.width = 110
     yaml.allow_unicode = True
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
