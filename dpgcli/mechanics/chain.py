@@ -20,7 +20,7 @@ import numpy as np
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal, Springs, Stations
+from dpgcli.mechanics.formulation import CellShape, Internal, Springs, Stations, impossible
 from dpgcli.mechanics.terms import Term
 
 
@@ -260,10 +260,14 @@ class Chain:
 
     def springs(self, coordinates: Array) -> Springs:
         cell = cells(self.finger, coordinates)
-        _, near, far, _ = internal(coordinates, self.finger.is_rigid)
-        turned = np.maximum(np.abs(near), np.abs(far)).max(axis=0)
-        ahead = np.minimum(cell.along_near, cell.along_far).min(axis=0)
-        return Springs(cell.extension, np.asarray((turned >= 0.5 * np.pi) | (ahead <= 0.0)))
+        chord, near, far, _ = internal(coordinates, self.finger.is_rigid)
+        length = self.finger.segment_length + chord
+        shape = CellShape(length, cell.far_strut, near, far, cell.along_near, cell.along_far)
+        return Springs(cell.extension, impossible(shape))
+
+    def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        _, near, far, _ = internal(gradient, self.finger.is_rigid)
+        return np.stack((near, far))
 
     def stations(self, coordinates: Array) -> Stations:
         pose = _pose(self.finger, coordinates)

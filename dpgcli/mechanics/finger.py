@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.mechanics.laws import PUBLISHED, Dome, Law, SpringResponse
+from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, Law, SpringResponse
 
 ARRAYS = (
     "segment_length",
@@ -125,6 +125,13 @@ class Finger:
         if not self.law.pushes_only:
             return self
         return self.changed(bistable_stiffness=self.bistable_stiffness * inverted)
+
+    def with_domes_held(self, inverted: Flags) -> "Finger":
+        """The finger whose inverted domes are held where each alone would rest, (unit, batch)."""
+        rest = self.law.rests(self.domes).well / self.stroke
+        share = np.where(np.isnan(rest), 1.0, rest) * inverted
+        held = self.with_pattern(inverted).changed(force_linearity=share)
+        return replace(held, law=HELD)
 
     def designs(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""

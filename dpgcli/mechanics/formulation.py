@@ -2,6 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Potential
@@ -21,14 +23,44 @@ class Internal(NamedTuple):
 
 
 class Springs(NamedTuple):
-    """Extension x (mm) of every bistable spring, (unit, batch), and what is no finger, (batch,).
-
-    Folded through is a unit with a corner turned by 90° or more, or whose strut's opening
-    would shorten the spring: minima of the equations, but struts and dome would have crossed.
-    """
+    """Extension x of every bistable spring (mm), (unit, batch); `impossible` shapes, (batch,)."""
 
     extension: Array
     is_folded: Flags
+
+
+class CellShape(NamedTuple):
+    """What decides whether a cell can exist, arrays that broadcast to (unit, batch).
+
+    Lengths of the chord and of the far strut (mm), the corner angles (rad), and the cosines
+    between the dome's spring and the ways in which the tops of its two struts swing as they
+    open (any positive factor will do).
+    """
+
+    chord: Array
+    strut: Array
+    near_angle: Array
+    far_angle: Array
+    near_swing: Array
+    far_swing: Array
+
+
+def impossible(cell: CellShape) -> Flags:
+    """Shapes that the equations allow and no finger takes, (batch,).
+
+    The energies know neither thickness nor contact, so their minima include
+
+    - bars of no or negative length, turned inside out through their own ends
+    - corners turned by 90° or more: a strut lies along the limiting layer or beyond it
+    - struts that have crossed: opening one would shorten the dome's spring
+
+    A cell without any of these is a quadrilateral whose sides do not cross (our derivation: both
+    tops are above the chord then, so that only the struts could).
+    """
+    shortest = np.minimum(cell.chord, cell.strut).min(axis=0)
+    turned = np.maximum(np.abs(cell.near_angle), np.abs(cell.far_angle)).max(axis=0)
+    swing = np.minimum(cell.near_swing, cell.far_swing).min(axis=0)
+    return np.asarray((shortest <= 0.0) | (turned >= 0.5 * np.pi) | (swing <= 0.0))
 
 
 class Stations(NamedTuple):
@@ -55,7 +87,14 @@ class Formulation(Potential, Protocol):
         """Extension x of every bistable spring, mm, (unit, batch)."""
 
     def springs(self, coordinates: Array) -> Springs:
-        """Extensions, and whether any unit is folded through."""
+        """Extensions, and whether any unit has an impossible shape."""
+
+    def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        """What the gradient does at the near and the far corners, N mm, (2, unit, batch).
+
+        The energy's slope as a corner opens and turns all that lies beyond it. Stiff bars do no
+        work in that, so that what rounding leaves of their forces drops out.
+        """
 
     def stations(self, coordinates: Array) -> Stations:
         """All node positions but the clamped ones, each (unit, batch)."""

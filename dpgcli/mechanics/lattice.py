@@ -21,7 +21,7 @@ from dpgcli.arrays import Array, Indices, total
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal, Springs, Stations
+from dpgcli.mechanics.formulation import CellShape, Internal, Springs, Stations, impossible
 from dpgcli.mechanics.terms import Term
 
 FINEST_TOLERANCE = 1e-12  # the relative residual that `Lattice.gradient_scale` keeps in reach
@@ -326,11 +326,21 @@ class Lattice:
 
     def springs(self, coordinates: Array) -> Springs:
         cell = vectors(self.finger, coordinates)
-        near, far = corners(cell)
-        turned = np.maximum(np.abs(near), np.abs(far)).max(axis=0)
-        ahead = np.minimum(_cross(cell.top, cell.near), _cross(cell.top, cell.far)).min(axis=0)
+        swings = _cross(cell.top, cell.near), _cross(cell.top, cell.far)
+        shape = CellShape(np.hypot(*cell.chord), np.hypot(*cell.far), *corners(cell), *swings)
         extension = _extension(cell.top, self.finger.segment_length, 0)
-        return Springs(extension, np.asarray((turned >= 0.5 * np.pi) | (ahead <= 0.0)))
+        return Springs(extension, impossible(shape))
+
+    def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        base, top = coordinates.reshape(-1, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)
+        on_base, on_top = gradient.reshape(-1, 2, 2, gradient.shape[1]).transpose(1, 2, 0, 3)
+        own = _cross(top - base, on_top)  # of each station's strut, about the station
+        beyond = np.cumsum((on_base + on_top)[:, ::-1], axis=1)[:, ::-1]
+        # about the station before: beyond it all forces act at the next station, as it were
+        chord = np.diff(base, axis=1, prepend=0.0)
+        about_near = np.cumsum((own + _cross(chord, beyond))[::-1], axis=0)[::-1]
+        about_far = about_near - _cross(chord, beyond)
+        return -np.stack((about_near, about_far))
 
     def stations(self, coordinates: Array) -> Stations:
         return Stations(*(coordinates[k::4] for k in range(4)))

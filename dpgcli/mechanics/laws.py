@@ -186,4 +186,25 @@ class PushOnly:
         return self.law.rests(dome)
 
 
-PUBLISHED = Published()
+class Held:
+    """A dome held about some opening: a linear spring that rests at `linearity` strokes.
+
+    No dome does that; a search that holds domes open until bars and hinges have settled, and
+    then lets go, finds wells that the domes' own softening would let it miss.
+    """
+
+    description = "domes held"
+    pushes_only = False
+    curve = None
+
+    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+        """As of a linear spring of the dome's stiffness."""
+        return quadratic(extension - dome.linearity * dome.stroke, dome.stiffness)
+
+    def rests(self, dome: Dome) -> Rests:
+        """None: there is one well only."""
+        nowhere = np.full_like(dome.stroke, np.nan)
+        return Rests(nowhere, nowhere)
+
+
+PUBLISHED, HELD = Published(), Held()
