@@ -20,7 +20,12 @@ from dpgcli.accuracy.extended_energy import (
     cross,
     measured,
 )
-from dpgcli.accuracy.extended_units import Unit, Well, extended_units, inverted_well
+from dpgcli.accuracy.extended_units import (
+    Unit,
+    extended_units,
+    inverted_angle,
+    spring_barrier,
+)
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 
@@ -46,7 +51,7 @@ class ExtendedStates:
     `min_eigenvalue` of the Hessian in node coordinates (N/mm) and `condition`, in the 2-norm,
     of the Hessian in the unknowns are NaN where it is not positive definite. `is_minimum`:
     converged, and the Hessian is positive definite. `in_pattern`: every unit is on its
-    pattern's side of the barrier that it has with rigid bars, no corner is turned by 90° or
+    pattern's side of where its dome's spring turns over, no corner is turned by 90° or
     more, and no strut's opening would shorten its spring. All numbers of a state that did not
     converge are NaN.
     """
@@ -89,18 +94,18 @@ def extended_states(
     lost = _digits_lost(finger)
     with mpmath.workdps(digits + lost):
         units = extended_units(finger)
-        well_of = {unit: inverted_well(unit) for unit in set(units)}
-        wells = [well_of[unit] for unit in units]
+        angle_of = {unit: inverted_angle(unit) for unit in set(units)}
+        angles = [angle_of[unit] for unit in units]
         bars = RigidBars(units) if finger.is_rigid else ElasticBars(units)
         tolerance = mpmath.mpf(10) ** -(digits // 2 + 5)
         smallest = tolerance / mpmath.mpf(10) ** lost
         rows = []
         for state, pattern in enumerate(inverted.T):
-            start = _starting_nodes(wells, units, pattern)
+            start = _starting_nodes(angles, units, pattern)
             if nodes is not None:
                 start = [mpmath.mpf(value) for value in nodes[:, state].tolist()]
             found = _minimum(bars, start, tolerance, smallest)
-            rows.append(_missing(n) if found is None else _row(found, wells, pattern))
+            rows.append(_missing(n) if found is None else _row(found, pattern))
     return ExtendedStates(*(np.stack(column, axis=-1) for column in zip(*rows, strict=True)))
 
 
@@ -111,10 +116,10 @@ def _digits_lost(finger: Finger) -> int:
     return max(0, ceil(log10(finger.linear_stiffness.max() / finger.bistable_stiffness.min())))
 
 
-def _starting_nodes(wells: list[Well], units: list[Unit], pattern: Flags) -> list["mpf"]:
+def _starting_nodes(angles: list["mpf"], units: list[Unit], pattern: Flags) -> list["mpf"]:
     """The nodes of the pattern with rigid bars."""
-    angles = [well.angle * int(on) for well, on in zip(wells, pattern, strict=True)]
-    return RigidBars(units).nodes([angle for angle in angles for _ in "ab"])
+    opened = [angle * int(on) for angle, on in zip(angles, pattern, strict=True)]
+    return RigidBars(units).nodes([angle for angle in opened for _ in "ab"])
 
 
 class Factorization(NamedTuple):
@@ -232,7 +237,7 @@ def _further(
     return None
 
 
-def _row(found: Stationary, wells: list[Well], pattern: Flags) -> tuple[Any, ...]:
+def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     """One state of `ExtendedStates`."""
     bars, unknowns, expansion, factorization = found
     nodes = bars.nodes(unknowns)
@@ -240,7 +245,7 @@ def _row(found: Stationary, wells: list[Well], pattern: Flags) -> tuple[Any, ...
     angles = [angle for cell in shape for angle in corners(cell)]
     units = zip(shape, bars.units, strict=True)
     openings = [measured(cell.top)[0] - unit.length for cell, unit in units]
-    sides = [x > well.barrier for x, well in zip(openings, wells, strict=True)]
+    sides = [x > spring_barrier(u) for x, u in zip(openings, bars.units, strict=True)]
     is_ahead = [cross(cell.top, strut) > 0 for cell in shape for strut in (cell.near, cell.far)]
     is_upright = max(map(abs, angles)) < np.pi / 2
     return (

@@ -34,22 +34,13 @@ def extended_units(finger: Finger) -> list[Unit]:
     return [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
 
 
-class Well(NamedTuple):
-    """Corner angle m (rad) in the second well, and the opening (mm) at the barrier before it.
+def inverted_angle(unit: Unit) -> "mpf":
+    """Where a unit with rigid bars rests in its second well: both corners are open by this m, rad.
 
-    Without a second well they are those of the full stroke and of 3/4 of it.
-    """
-
-    angle: "mpf"
-    barrier: "mpf"
-
-
-def inverted_well(unit: Unit) -> Well:
-    """Find the second well of a unit with rigid bars, which opens both corners by m.
-
-    With x = 2H sin m its moment is 2 H² k_b times sin 2m P(u) + 2κm, where u = x/d, β = 1−α,
-    P = 1 + β(2u² − 3u) and κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots
-    are between, and they are told apart where P + 2κm/sin 2m is smallest (our derivation).
+    Without a second well it is that of the full stroke. With x = 2H sin m the unit's moment is
+    2 H² k_b times sin 2m P(u) + 2κm, where u = x/d, β = 1−α, P = 1 + β(2u² − 3u) and
+    κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots are between, and they are
+    told apart where P + 2κm/sin 2m is smallest (our derivation).
     """
     from mpmath import asin, cos, sin
 
@@ -71,9 +62,22 @@ def inverted_well(unit: Unit) -> Well:
 
     least = _bisected(trend, opened(0.25), opened(0.75))
     if not moment(least) < 0:
-        return Well(opened(1.0), 0.75 * unit.stroke)
-    barrier = _bisected(lambda m: -moment(m), opened(0.25), least)
-    return Well(_bisected(moment, least, opened(1.25)), 2 * unit.height * sin(barrier))
+        return opened(1.0)
+    return _bisected(moment, least, opened(1.25))
+
+
+def spring_barrier(unit: Unit) -> "mpf":
+    """The opening (mm) at which the dome's spring alone turns over; 3/4 stroke if it never does.
+
+    A root of 1 + β(2u² − 3u) with β = 1 − α. Bars and hinges pull an open unit back, so that it
+    rests inverted only beyond.
+    """
+    from mpmath import sqrt
+
+    beta = 1 - unit.linearity
+    squared = 9 * beta**2 - 8 * beta
+    share = (3 * beta - sqrt(squared)) / (4 * beta) if squared > 0 else 0.75
+    return share * unit.stroke
 
 
 def _bisected(function: Callable[["mpf"], "mpf"], low: "mpf", high: "mpf") -> "mpf":

@@ -21,6 +21,8 @@ GRADED = 4  # units
 LONG = 30  # units: of longer fingers one pattern has to do, since extended precision is slow
 BISECTIONS = 54
 FOLDING = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
+CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
+CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
 TURNED = {  # near and far corner (rad), and the pattern that the dome's opening looks like
     "straight": ((0.0, 0.0), "0"),
     "inverted": ((0.15, 0.15), "1"),
@@ -236,9 +238,33 @@ def _last_linearity(unit: Finger) -> float:
         middle = 0.5 * (low + high)
         units = Units.of(changed(unit, force_linearity=middle))
         batch = solve(units, Chain, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
-        is_stable = certify(batch, units.wells, DEFAULT_TOLERANCE)[0] == Status.STABLE
+        is_stable = certify(batch, units, DEFAULT_TOLERANCE)[0] == Status.STABLE
         low, high = (middle, high) if is_stable else (low, middle)
     return low
+
+
+def _crossed(base: Finger) -> Iterator[Variant]:
+    """Every unit as near to its loss of bistability, between bars from soft to very stiff."""
+    grades = np.linspace(0.7, 1.4, GRADED)
+    uniform, graded = repeated(base, GRADED), repeated(base.with_units([0]), GRADED)
+    fingers = {
+        "1 unit": base.with_units([0]),
+        "1 unit of short stroke": changed(
+            base.with_units([0]), stroke=0.07 * base.segment_height[0]
+        ),
+        f"{GRADED} units": uniform,
+        f"{GRADED} graded units": changed(
+            graded,
+            stroke=grades * graded.stroke[0],
+            bistable_stiffness=grades[::-1] * graded.bistable_stiffness[0],
+        ),
+    }
+    for (label, finger), distance in product(fingers.items(), CROSSED_DISTANCES):
+        near = changed(finger, force_linearity=limits(finger).force_linearity * (1.0 - distance))
+        side = f"{label}, α at fold {'−' if distance > 0.0 else '+'} {abs(distance):g}"
+        for ratio in CROSSED_RATIOS:
+            yield Variant(f"{side}, k_L/k_b = {ratio:g}", _with_bars(near, ratio))
+        yield Variant(f"{side}, k_L = ∞", rigid(near))
 
 
 def _mirror(base: Finger) -> Iterator[Variant]:
@@ -260,5 +286,6 @@ FAMILIES = (
     Family("wells", "two wells of nearly the same energy", _wells),
     Family("guess", "searches that begin at 0.5 to 2 strokes", _guess),
     Family("fold", "α, k_θ and d at the loss of bistability, to 1e-12 of it", _fold),
+    Family("crossed", "k_L, the distance to the fold, units and grading at once", _crossed),
     Family("mirror", "searches that begin folded through or mirrored", _mirror),
 )

@@ -108,7 +108,7 @@ def _solver(
     def run() -> Found:
         units = Units.of(finger)
         batch = solve(units, formulate, inverted, tolerance)
-        is_stable = certify(batch, units.wells, tolerance) == Status.STABLE
+        is_stable = certify(batch, units, tolerance) == Status.STABLE
         pose = tip(batch, with_compliance=False).pose
         energy = np.asarray(sum(batch.equilibrium.energies.values()))
         return Found(np.where(is_stable, pose, np.nan), np.where(is_stable, energy, np.nan))

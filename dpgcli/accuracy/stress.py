@@ -13,13 +13,12 @@ import numpy as np
 from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.gauntlet import Case
 from dpgcli.arrays import Array, Flags
-from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Internal
 from dpgcli.mechanics.terms import evaluate
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import Batch, Status, Units, certify, solve, tip
+from dpgcli.states.solve import Batch, Status, Units, certify, search, solve, tip
 from dpgcli.states.wells import inverted_wells
 
 AT_FOLD = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
@@ -116,7 +115,7 @@ def answered(case: Case) -> Answer:
     stations = batch.formulation.stations(batch.equilibrium.coordinates)
     floor, condition = _numerics(batch.formulation, batch.equilibrium.coordinates)
     return Answer(
-        status=Status(certify(batch, units.wells, DEFAULT_TOLERANCE)[0]),
+        status=Status(certify(batch, units, DEFAULT_TOLERANCE)[0]),
         reached=batch.reached,
         nodes=np.stack(stations, axis=1).reshape(-1, 1) / scale,
         pose=at_tip.pose[:, 0] / np.array([scale, scale, 1.0]),
@@ -149,10 +148,8 @@ def _batch(case: Case, units: Units) -> Batch:
     rest = np.zeros((1, 1))
     near, far = (np.full((1, 1), angle) for angle in start.corners)
     guess = Internal(rest, near, far, rest)
-    found = minimize(formulation, formulation.coordinates(guess), DEFAULT_TOLERANCE)
-    springs = formulation.springs(found.coordinates)
-    reached = springs.extension > units.wells.barrier
-    return Batch(formulation, found, case.inverted, reached, springs.is_folded)
+    at = formulation.coordinates(guess)
+    return search(units, formulation, case.inverted, at, DEFAULT_TOLERANCE)
 
 
 def _numerics(formulation: Formulation, coordinates: Array) -> tuple[float, float]:

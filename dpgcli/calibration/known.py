@@ -105,7 +105,7 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     """
     units = Units.of(finger)
     batch = solve(units, Chain, patterns, DEFAULT_TOLERANCE)
-    status = certify(batch, units.wells, DEFAULT_TOLERANCE)
+    status = certify(batch, units, DEFAULT_TOLERANCE)
     is_state = status == Status.STABLE
     coordinates = batch.equilibrium.coordinates
     _, near, far, _ = internal(coordinates, finger.is_rigid)

@@ -7,6 +7,7 @@ other: a lane's result is the same, bit for bit, in any batch.
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,22 @@ class Equilibrium:
     relative_residual: Array
     curvature: Array
     iterations: Indices
+
+    def with_lanes(self, lanes: Indices, others: "Equilibrium", taken: Indices) -> "Equilibrium":
+        """These lanes replaced by those at `taken` of other equilibria of the same potential."""
+
+        def put(own: Any, other: Any) -> Any:
+            if isinstance(own, dict):
+                return {key: put(own[key], other[key]) for key in own}
+            if isinstance(own, Factorization):
+                pair = put(own.lower, other.lower), put(own.pivots, other.pivots)
+                return Factorization(*pair, own.reach)
+            changed = own.copy()
+            changed[..., lanes] = other[..., taken]
+            return changed
+
+        parts = ((getattr(self, f.name), getattr(others, f.name)) for f in fields(self))
+        return Equilibrium(*(put(own, other) for own, other in parts))
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # a lane's own trouble

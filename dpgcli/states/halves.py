@@ -101,6 +101,12 @@ class Split:
         return self.n_units - self.n_inner
 
     @property
+    def weakest(self) -> float:
+        """What the weakest unit bears in its weaker well, N; see `solve.is_balanced`."""
+        wells = self.units.wells
+        return float(np.minimum(np.abs(wells.reset_force), wells.snap_force).min())
+
+    @property
     def n_solves(self) -> int:
         """Half-fingers solved for both tables."""
         return (1 << self.n_inner + self.context) + (1 << self.n_outer + self.context)
@@ -122,7 +128,7 @@ class Split:
         units = Units.of(self.units.finger.units(first, stop))
         for codes in chunks(2 ** (stop - first), lanes_at_once(stop - first)):
             batch = solve(units, Chain, inverted_units(codes, stop - first), self.tolerance)
-            yield batch, certify(batch, units.wells, self.tolerance, own)
+            yield batch, certify(batch, units, self.tolerance, own)
 
     def _cut(self, first: int, stop: int) -> Chain:
         return Chain(self.units.finger.units(first, stop))

@@ -11,7 +11,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.solve import MARGINAL_CURVATURE, States, Status
+from dpgcli.states.solve import MARGINAL_CURVATURE, SMALL_SHARE, States, Status
 
 STATES_AT_ONCE = 2**16
 
@@ -78,7 +78,8 @@ def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
     fit = _fit(split, inner, outer, block)
     status = np.maximum(block.inner(inner.status), block.outer(outer.status))
     status = np.where(fit.is_convex, status, np.maximum(status, Status.MARGINAL))
-    fits = fit.relative_residual <= split.tolerance
+    is_small = fit.residual <= SMALL_SHARE * split.weakest
+    fits = (fit.relative_residual <= split.tolerance) & is_small
     status = np.where(fits, status, np.uint8(Status.NOT_CONVERGED))
     codes = (block.patterns[:, None] << split.n_outer) + np.arange(2**split.n_outer)
     reached = (block.flat(block.inner(inner.reached)), block.flat(block.outer(outer.reached)))

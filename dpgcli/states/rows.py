@@ -88,7 +88,7 @@ def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
     The units have one design, or one for each state.
     """
     batch = solve(units, wanted.formulate, inverted, wanted.tolerance)
-    status = certify(batch, units.wells, wanted.tolerance)
+    status = certify(batch, units, wanted.tolerance)
     at_tip = tip(batch, with_compliance=Group.STIFFNESS in wanted.groups)
     states = States(
         inverted,

@@ -25,7 +25,6 @@ from dpgcli.states.solve import TIP_ROUNDING, Units, reach
 from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
-LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are too soft for a bound
 SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-14, 1e-3  # below, rounding decides
 DEFAULT_TOLERANCE = 1e-12
 
@@ -77,7 +76,7 @@ def error_bounds(units: Units) -> Array:
         + (dropped_bars(units) if rung.drops_bars else 0.0)
         for rung in RUNGS
     ]
-    return np.where(_is_bounded(units), np.stack(bounds), np.inf)
+    return np.where(units.has_soft_bars, np.inf, np.stack(bounds))
 
 
 def cheapest(bounds: Array, target: float) -> Indices:
@@ -127,11 +126,3 @@ def _corner_stiffness(units: Units) -> Array:
         band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
     return np.where(least > 0.0, least, 0.0).reshape(shape)
-
-
-def _is_bounded(units: Units) -> Array:
-    """Where single units show what the finger does, shape (design,)."""
-    unit = units.first_order
-    with np.errstate(invalid="ignore"):
-        soft = unit.turn > LARGEST_TURN * units.wells.angle
-    return np.asarray(~soft.any(axis=0))

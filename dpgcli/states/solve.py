@@ -1,7 +1,7 @@
 """From patterns to certified states of one batch of fingers, and what is known of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -23,6 +23,11 @@ from dpgcli.states.wells import (
 
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))
 TIP_ROUNDING = 8.0 * np.finfo(float).eps
+SMALL_SHARE = 0.1  # of what a unit bears: a residual below it cannot decide whether it holds
+LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are soft
+LARGEST_CURVATURE = 1.0  # a shape of more than that is far from any fold
+FINEST_BALANCE, FINEST_TOLERANCE = 1e-13, 1e-15  # of the forces in play: rounding's
+WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twice the height
 CANCELLED = 1e-3  # of the product: below it the determinant is found without cancellation
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
 COMPLIANCE_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
@@ -52,8 +57,9 @@ _MEANINGS = {
     Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
     Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
     Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
-    Status.FOLDED: "a minimum of the equations with a corner turned by 90° or more",
-    Status.NOT_CONVERGED: "the residual did not reach its tolerance",
+    Status.FOLDED: "a minimum of the equations whose shape no finger can take",
+    Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
+    "bears before it leaves its well",
 }
 
 
@@ -96,6 +102,32 @@ class Units:
     wells: Wells
     first_order: FirstOrder
 
+    @property
+    def has_soft_bars(self) -> Flags:
+        """Where units with rigid bars do not show what the finger does, shape (design,).
+
+        Bars turn a unit too far, or its stroke leads to where only bars that give way can follow.
+        """
+        if self.finger.is_rigid:
+            return np.zeros(1, bool)
+        with np.errstate(invalid="ignore"):
+            is_turned = self.first_order.turn > LARGEST_TURN * self.wells.angle
+        is_beyond = ~self.wells.exists & (self.wells.angle > WIDE_ANGLE)
+        return np.asarray((is_turned | is_beyond).any(axis=0))
+
+    @property
+    def are_not_bistable(self) -> Flags:
+        """Units that certainly have no second well, (unit, design).
+
+        Between soft bars one may exist where there is none between rigid ones, unless the dome
+        by itself has none.
+        """
+        has_none = ~self.wells.exists
+        soft = self.has_soft_bars
+        if soft.any():
+            has_none = has_none & (~soft | np.isnan(self.finger.law.rests(self.finger.domes).well))
+        return has_none
+
     @classmethod
     def of(cls, finger: Finger) -> "Units":
         wells = inverted_wells(finger)
@@ -119,43 +151,126 @@ def solve(
     """Minimize from each pattern's geometric guess; what was found is yet to be certified.
 
     `inverted` has shape (unit, batch); the finger has one design, or one for each lane.
-    The guess puts each unit into its own rigid well, or opens it by `strokes` strokes.
+    The guess puts each unit into its own rigid well, or opens it by `strokes` strokes. What soft
+    bars let go astray from there is looked for once more, with domes held open first.
     """
     formulation = formulate(units.finger.with_pattern(inverted))
-    if strokes is None:
-        guess = geometric_guess(units.finger, inverted, units.first_order)
-    else:
+    if strokes is not None:
         guess = stroke_guess(units.finger, inverted, strokes)
-    equilibrium = minimize(formulation, formulation.coordinates(guess), tolerance)
+        return search(units, formulation, inverted, formulation.coordinates(guess), tolerance)
+    guess = geometric_guess(units.finger, inverted, units.first_order)
+    batch = search(units, formulation, inverted, formulation.coordinates(guess), tolerance)
+    if not units.has_soft_bars.any():
+        return batch
+    missed = certify(batch, units, tolerance) != Status.STABLE
+    lanes = np.flatnonzero(missed & units.has_soft_bars)
+    return _searched_again(units, formulate, batch, tolerance, lanes) if len(lanes) else batch
+
+
+def search(
+    units: Units, formulation: Formulation, inverted: Flags, start: Array, tolerance: float
+) -> Batch:
+    """Walk from coordinates, (size, batch), and see which wells the units end in.
+
+    Near a fold the tolerance may not do: there the walk goes on to where rounding ends it.
+    """
+    batch = _reached(units, formulation, inverted, minimize(formulation, start, tolerance))
+    is_close = batch.equilibrium.relative_residual <= tolerance
+    lanes = np.flatnonzero(is_close & ~is_balanced(batch, units.wells))
+    if not len(lanes):
+        return batch
+    few = formulation.designs(lanes)
+    here = np.take(batch.equilibrium.coordinates, lanes, axis=1)
+    further = minimize(few, here, FINEST_TOLERANCE)
+    everywhere = np.arange(len(lanes))
+    equilibrium = batch.equilibrium.with_lanes(lanes, further, everywhere)
+    return _reached(units, formulation, inverted, equilibrium)
+
+
+def _reached(
+    units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
+) -> Batch:
     springs = formulation.springs(equilibrium.coordinates)
-    reached = springs.extension > units.wells.barrier
+    reached = springs.extension > units.wells.spring_barrier
     if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
         reached = reached & inverted
     return Batch(formulation, equilibrium, inverted, reached, springs.is_folded)
 
 
+def _searched_again(
+    units: Units,
+    formulate: Callable[[Finger], Formulation],
+    batch: Batch,
+    tolerance: float,
+    lanes: Indices,
+) -> Batch:
+    """Search some lanes with domes held open until bars and hinges have settled, then let go.
+
+    What is let go walks down from beyond its well, and meets the well before its barrier. A lane
+    is replaced if that finds its state.
+    """
+    few, inverted = units.designs(lanes), np.take(batch.inverted, lanes, axis=1)
+    guess = stroke_guess(few.finger, inverted, 1.0)
+    held = formulate(few.finger.with_domes_held(inverted))
+    settled = minimize(held, held.coordinates(guess), tolerance).coordinates
+    formulation = formulate(few.finger.with_pattern(inverted))
+    again = search(few, formulation, inverted, settled, tolerance)
+    found = np.flatnonzero(certify(again, few, tolerance) == Status.STABLE)
+    reached, is_folded = batch.reached.copy(), batch.is_folded.copy()
+    reached[:, lanes[found]] = again.reached[:, found]
+    is_folded[lanes[found]] = again.is_folded[found]
+    equilibrium = batch.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
+    return replace(batch, equilibrium=equilibrium, reached=reached, is_folded=is_folded)
+
+
 def certify(
-    batch: "Batch", wells: Wells, tolerance: float, own: slice = slice(None)
+    batch: Batch, units: Units, tolerance: float, own: slice = slice(None)
 ) -> NDArray[np.uint8]:
     """The gravest reason why a lane is not a certified state of its pattern.
 
-    `own` are the units that must have reached their wells; `wells` are those of all units.
+    `own` are the units that must have reached their wells; `units` are all.
     """
     equilibrium = batch.equilibrium
     inverted, reached = batch.inverted[own], batch.reached[own]
-    exists = np.broadcast_to(wells.exists, (len(batch.inverted), wells.exists.shape[1]))[own]
     elsewhere = (reached != inverted).any(axis=0)
+    has_none = np.broadcast_to(units.are_not_bistable, batch.inverted.shape)[own]
+    is_curved = equilibrium.curvature > MARGINAL_CURVATURE
     checks = (
-        (~(equilibrium.curvature > MARGINAL_CURVATURE), Status.MARGINAL),
+        (~is_curved, Status.MARGINAL),
         (elsewhere, Status.ANOTHER_PATTERN),
-        (elsewhere & (inverted & ~exists).any(axis=0), Status.NOT_BISTABLE),
+        (elsewhere & (inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
         (batch.is_folded, Status.FOLDED),
+        (is_curved & ~is_balanced(batch, units.wells), Status.NOT_CONVERGED),
         (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),
     )
     status = np.full(inverted.shape[1], Status.STABLE, np.uint8)
     for failed, reason in checks:
         status[failed] = reason
     return status
+
+
+def is_balanced(batch: Batch, wells: Wells) -> Flags:
+    """Whether what is left of the forces is too small to decide that there is a state, (batch,).
+
+    The moment about a unit's corners, over its lever H, has to be small against
+
+    - what the unit bears, or lacks for a second well, between rigid bars: more could hold it
+      where it does not rest
+    - what a fold as near as the curvature κ allows would bear: where the opening has a stiffness λ
+      whose slope is c, a minimum bears a force of λ²/2c; for equal corners λ = κ k/4, and near
+      the spring's inflection c = 3 k/d, k being k_b + k_θ/H² (our derivation). A low curvature
+      may come from a faint hinge as well, so that rounding is always allowed.
+
+    The residual would not do: stiff bars leave rounding in it that does not move a corner.
+    """
+    formulation, equilibrium = batch.formulation, batch.equilibrium
+    finger = formulation.finger
+    moments = formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient)
+    unbalance = np.abs(moments).max(axis=0) / finger.segment_height
+    borne = np.where(batch.reached, np.abs(wells.reset_force), wells.snap_force)
+    curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
+    by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
+    return np.asarray((unbalance <= SMALL_SHARE * np.minimum(borne, by_fold)).all(axis=0))
 
 
 @dataclass(frozen=True)
@@ -186,8 +301,8 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     finger = batch.formulation.finger
     pose, jacobian = batch.formulation.tip(equilibrium.coordinates)
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
-    sides = forward(equilibrium.factorization, sides)
     with np.errstate(divide="ignore", invalid="ignore"):  # a mechanism has zero pivots
+        sides = forward(equilibrium.factorization, sides)
         scaled = sides * (1.0 / equilibrium.factorization.pivots)[:, None]
         step = [total(sides[:, p] * scaled[:, 3]) for p in range(3)]
         slenderness = (finger.stroke / finger.segment_height).max(axis=0)

@@ -21,6 +21,8 @@ from dpgcli.mechanics.terms import evaluate
 
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
 SEARCHED = 512  # extensions at which the slope of a tabulated law is looked at
+WIDEST = 1.5  # strokes: beyond it no well is looked for, unless a curve says more
+INFLECTION_BISECTIONS = 24
 BISECTIONS = 48  # of one 512th of the range: down to rounding
 
 
@@ -41,12 +43,21 @@ class Wells(ByDesign):
     `exists` says whether there is one; `angle` is its corner angle m (rad), `extension` its
     x (mm) and `barrier` the x at the top between the wells. Where there is none, `angle` is
     that of the full stroke and `barrier` the middle, so that a search can still begin.
+
+    `spring_barrier` is the x (mm) at which the dome's spring alone turns over. With any bars and
+    hinges a unit rests inverted only beyond it, since what holds the unit straight pulls back;
+    the unit's own barrier lies between it and the well. `snap_force` and `reset_force` (N, on
+    the opening) are what a unit bears in its ground and in its inverted well; where there is no
+    second well, `reset_force` is negative, what would have to help.
     """
 
     exists: Flags
     extension: Array
     barrier: Array
     angle: Array
+    spring_barrier: Array
+    snap_force: Array
+    reset_force: Array
 
 
 def inverted_wells(finger: Finger) -> Wells:
@@ -64,17 +75,42 @@ def inverted_wells(finger: Finger) -> Wells:
     half_height = finger.stroke / (2.0 * finger.segment_height)
     hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
     half_height, hinge, linearity = np.broadcast_arrays(half_height, hinge, finger.force_linearity)
-    widest = np.minimum(1.5, (1.0 - 1e-9) / half_height)
+    widest = np.minimum(WIDEST, (1.0 - 1e-9) / half_height)
     (well, barrier), exists = _roots(widest, half_height, hinge, linearity)
     exists &= barrier < well
     stroke = np.broadcast_to(finger.stroke, exists.shape)
-    extension = np.where(exists, well, np.minimum(1.0, widest)) * stroke
+    full = np.minimum(1.0, widest)
+    extension = np.where(exists, well, full) * stroke
+    snap, reset = _extreme_slopes(finger, np.stack((0.0 * full, full)) * stroke)
     return Wells(
         exists,
         extension,
         np.where(exists, barrier, MIDDLE) * stroke,
         np.arcsin(extension / (2.0 * finger.segment_height)),
+        _spring_barrier(finger, MIDDLE * stroke),
+        snap,
+        -reset,
     )
+
+
+def _spring_barrier(finger: Finger, otherwise: Array) -> Array:
+    """Where the dome's spring alone turns over, mm; `otherwise` where it has no second well."""
+    top = finger.law.rests(finger.domes).top
+    return np.asarray(np.where(top > 0.0, top, otherwise))
+
+
+def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
+    """The forces (N) where de/dx turns between `stiff` extensions (mm) and half a stroke.
+
+    Half a stroke is where the spring is softest. A place is known to 1e-7 of it, and the force to
+    the square of that.
+    """
+    soft = np.minimum(0.5 * finger.stroke, stiff.max(axis=0)) + 0.0 * stiff
+    for _ in range(INFLECTION_BISECTIONS):
+        middle = 0.5 * (stiff + soft)
+        rises = _rigid_stiffness(finger, middle) >= 0.0
+        stiff, soft = np.where(rises, middle, stiff), np.where(rises, soft, middle)
+    return _rigid_slope(finger, stiff)
 
 
 def _searched_wells(finger: Finger) -> Wells:
@@ -82,12 +118,14 @@ def _searched_wells(finger: Finger) -> Wells:
     lever = 2.0 * finger.segment_height
     domes = finger.domes
     whole = domes.stroke + domes.contact
-    widest = np.minimum(1.5 * whole - domes.contact, (1.0 - 1e-9) * lever)
+    known = max(WIDEST, float(finger.law.curve.knots[-1])) if finger.law.curve else WIDEST
+    widest = np.minimum(known * whole - domes.contact, (1.0 - 1e-9) * lever)
     lowest = finger.law.rests(domes).top if finger.law.pushes_only else 0.0 * widest
     lowest = np.where(np.isnan(lowest), 0.0, lowest)
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
     grid = lowest + (widest - lowest) * shares
-    pulls = _rigid_slope(finger, grid) >= 0.0
+    slope = _rigid_slope(finger, grid)
+    pulls = slope >= 0.0
     energy = _rigid_energy(finger, grid)[:-1]
     places = np.arange(SEARCHED - 1)[:, None, None]
     is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
@@ -103,7 +141,20 @@ def _searched_wells(finger: Finger) -> Wells:
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     extension = np.where(exists, well, np.minimum(stroke, widest))
     barrier = np.where(exists, np.where(tops >= 0, top, lowest), MIDDLE * stroke)
-    return Wells(exists, extension, barrier, np.arcsin(extension / lever))
+    return Wells(
+        exists,
+        extension,
+        barrier,
+        np.arcsin(extension / lever),
+        _spring_barrier(finger, barrier),
+        _largest(slope, grid <= barrier),
+        _largest(-slope, (grid >= barrier) & (grid <= extension)),
+    )
+
+
+def _largest(values: Array, at: Flags) -> Array:
+    """The largest of some values by unit, (place, unit, design); infinite where there are none."""
+    return np.where(at.any(axis=0), np.where(at, values, -np.inf).max(axis=0), np.inf)
 
 
 def _rigid_slope(finger: Finger, extension: Array) -> Array:
@@ -111,6 +162,14 @@ def _rigid_slope(finger: Finger, extension: Array) -> Array:
     half_turn = np.arcsin(extension / (2.0 * finger.segment_height))
     hinge = 2.0 * finger.hinge_stiffness * half_turn
     return finger.springs(extension).force + hinge / (finger.segment_height * np.cos(half_turn))
+
+
+def _rigid_stiffness(finger: Finger, extension: Array) -> Array:
+    """d²e/dx² of a unit with rigid bars, N/mm: with x = 2H sin m, dm/dx = 1/(2H cos m)."""
+    half_turn = np.arcsin(extension / (2.0 * finger.segment_height))
+    cosine, sine = np.cos(half_turn), np.sin(half_turn)
+    hinge = finger.hinge_stiffness / (finger.segment_height * cosine) ** 2
+    return finger.springs(extension).stiffness + hinge * (1.0 + half_turn * sine / cosine)
 
 
 def _bisected(finger: Finger, grid: Array, places: Indices, *, rises: bool) -> Array:

@@ -201,7 +201,7 @@ class Bench:
             def whole(finger: Finger = finger, lanes: Any = lanes, on: Flags = inverted) -> None:
                 units = Units.of(finger).designs(lanes)
                 batch = solve(units, Chain, on, DEFAULT_TOLERANCE)
-                certify(batch, units.wells, DEFAULT_TOLERANCE)
+                certify(batch, units, DEFAULT_TOLERANCE)
                 tip(batch, with_compliance=True)
 
             yield {

@@ -14,11 +14,12 @@ from dpgcli.accuracy import extended, extended_energy
 from dpgcli.accuracy import extended_units as units_module
 from dpgcli.accuracy.extended import ExtendedStates, extended_states
 from dpgcli.accuracy.extended_energy import ElasticBars, RigidBars
-from dpgcli.accuracy.extended_units import Unit, extended_units, inverted_well
+from dpgcli.accuracy.extended_units import Unit, extended_units, inverted_angle, spring_barrier
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import ARRAYS, Finger, uniform_finger
 from dpgcli.mechanics.finger import STUDY as REFERENCE
+from dpgcli.mechanics.laws import bistable
 from dpgcli.states.solve import Units, min_eigenvalues, solve, tip
 
 FOLD = 0.0964682337467354  # α at which the reference unit with rigid bars loses its second well
@@ -75,7 +76,9 @@ def test_a_single_unit_with_rigid_bars() -> None:
     assert -np.degrees(float(states.pose[2, 0])) == pytest.approx(17.36175941, abs=5.1e-9)
     assert float(states.energy[0]) == pytest.approx(4.3613588754, abs=5.1e-11)
     (unit,) = extended_units(finger_of(1))
-    assert float(inverted_well(unit).barrier) == pytest.approx(2.0041742418, abs=5.1e-11)
+    alone = bistable(*(np.array(float(v)) for v in (spring_barrier(unit), 12.84, 0.043, 3.5)))
+    assert abs(alone.force) < 1e-13
+    assert alone.stiffness < 0.0, "the barrier's, not the well's"
 
 
 def energy_in_complex_numbers(units: list[Unit], nodes: list[mpmath.mpf]) -> mpmath.mpf:
@@ -183,7 +186,7 @@ def test_condition_and_smallest_eigenvalue_of_a_single_unit() -> None:
     (unit,) = extended_units(finger)
     with mpmath.workdps(40):
         bars, h = RigidBars([unit]), mpmath.mpf("1e-12")
-        angles = [inverted_well(unit).angle] * 2
+        angles = [inverted_angle(unit)] * 2
         (corner,), (_, mixed) = (map(float, row) for row in bars.at(angles).band)
         steps = ([0, 0], [h, 0], [0, h])
         rest, *moved = np.array([bars.nodes(bars.moved(angles, step)) for step in steps])
@@ -226,7 +229,7 @@ def test_another_patterns_state_is_not_in_the_pattern() -> None:
 def test_a_folded_state_is_not_in_the_pattern(linear_stiffness: float) -> None:
     finger = finger_of(1, linear_stiffness, hinge_stiffness=1e-3)
     units = extended_units(finger)
-    folded = RigidBars(units).nodes([np.pi - inverted_well(units[0]).angle] * 2)
+    folded = RigidBars(units).nodes([np.pi - inverted_angle(units[0])] * 2)
     states = extended_states(finger, units_of("1"), np.array([folded], float).T)
     assert states.is_minimum.all() and states.openings[0, 0] > 3.0
     assert not states.in_pattern.any()

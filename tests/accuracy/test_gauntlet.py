@@ -123,7 +123,7 @@ def test_the_fold_is_that_of_the_users_weakest_unit() -> None:
 def test_a_rigid_finger_gets_no_lattice_but_with_bars_of_the_gauntlets_own() -> None:
     cases = list(cases_of(rigid(study_finger())))
     elastic = {case.family for case in cases if case.formulation == "lattice"}
-    assert elastic == {"stiffness", "guess", "fold"}
+    assert elastic == {"stiffness", "guess", "fold", "crossed"}
     assert len(set(keys(cases))) == len(cases)
 
 
@@ -146,4 +146,4 @@ def test_a_finger_graded_in_its_lengths_alone_can_be_solved() -> None:
     finger: Finger = changed(study_finger(), segment_length=np.array([13.5, 10.0, 20.0]))
     inverted = np.array([[True], [False], [True]])
     batch = solve(Units.of(finger), Chain, inverted, 1e-12)
-    assert certify(batch, Units.of(finger).wells, 1e-12).tolist() == [Status.STABLE]
+    assert certify(batch, Units.of(finger), 1e-12).tolist() == [Status.STABLE]

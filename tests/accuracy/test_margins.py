@@ -116,7 +116,7 @@ def test_the_solver_finds_the_state_up_to_the_limit(name: str, factor: float, st
     limit = float(limit_of(limits_of(unit), name)[0])
     units = Units.of(unit(**{name: limit * (1.0 + factor)}))
     batch = solve(units, Chain, np.ones((1, 1), bool), 1e-12)
-    assert certify(batch, units.wells, 1e-12).tolist() == [Status[status]]
+    assert certify(batch, units, 1e-12).tolist() == [Status[status]]
 
 
 @pytest.mark.parametrize("name", NAMES)

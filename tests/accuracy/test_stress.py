@@ -11,7 +11,6 @@ from dpgcli.accuracy.margins import limits
 from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows, summarized
 from dpgcli.accuracy.stress import Verdict, answered, judged, scaled, stress
 from dpgcli.arrays import Array
-from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
@@ -19,7 +18,7 @@ from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.terms import evaluate
 from dpgcli.states.columns import Kind
 from dpgcli.states.plan import FORMULATIONS
-from dpgcli.states.solve import MARGINAL_CURVATURE, Batch, Status, Units, certify, solve
+from dpgcli.states.solve import MARGINAL_CURVATURE, Status, Units, certify, search, solve
 
 UNIT = rigid(study_finger().with_units([0]))
 
@@ -156,13 +155,10 @@ def test_from_anywhere_one_unit_ends_in_one_of_six_minima_and_two_are_certified(
     angles = np.linspace(-3.0, 3.0, 25)
     guess = np.stack(np.meshgrid(angles, angles)).reshape(2, -1)
     chain, units = Chain(UNIT), Units.of(UNIT)
-    found = minimize(chain, guess, 1e-12)
-    springs = chain.springs(found.coordinates)
-    reached = springs.extension > units.wells.barrier
-    stable = []
-    for pattern in (np.zeros_like(reached), np.ones_like(reached)):
-        batch = Batch(chain, found, pattern, reached, springs.is_folded)
-        stable.append(certify(batch, units.wells, 1e-12) == Status.STABLE)
+    ground = np.zeros((1, guess.shape[1]), bool)
+    batches = [search(units, chain, pattern, guess, 1e-12) for pattern in (ground, ~ground)]
+    stable = [certify(batch, units, 1e-12) == Status.STABLE for batch in batches]
+    found = batches[0].equilibrium
     is_minimum = (found.relative_residual <= 1e-12) & (found.curvature > MARGINAL_CURVATURE)
     assert len(np.unique(found.coordinates[:, is_minimum].round(6), axis=1).T) == 6
     certified = found.coordinates[:, stable[0] | stable[1]]

@@ -36,7 +36,7 @@ def varied_designs(n_units: int, n_designs: int) -> Finger:
 
 def certified(units: Units, inverted: Any, formulation: Any) -> None:
     batch = solve(units, formulation, inverted, 1e-12)
-    status = certify(batch, units.wells, 1e-12)
+    status = certify(batch, units, 1e-12)
     tip(batch, with_compliance=True)
     assert (status == Status.STABLE).all()
 

@@ -13,19 +13,14 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Batch, Status, Units, certify, solve
+from dpgcli.states.solve import Batch, Status, Units, certify, search, solve
 
 Fingers = Callable[..., Finger]
 
 
 def certified(finger: Finger, guess: Array, inverted: Flags) -> NDArray[np.uint8]:
     units = Units.of(finger)
-    chain = Chain(finger)
-    equilibrium = minimize(chain, guess, 1e-12)
-    springs = chain.springs(equilibrium.coordinates)
-    reached = springs.extension > units.wells.barrier
-    batch = Batch(chain, equilibrium, inverted, reached, springs.is_folded)
-    return certify(batch, units.wells, 1e-12)
+    return certify(search(units, Chain(finger), inverted, guess, 1e-12), units, 1e-12)
 
 
 @pytest.mark.parametrize("linear_stiffness", [1e3, 1e6, np.inf])
@@ -64,7 +59,7 @@ def test_a_finger_without_hinges_is_a_mechanism(
     with np.errstate(invalid="ignore", divide="ignore"):
         finger = reference_finger(3, linear_stiffness, hinge_stiffness=0.0)
         batch = solve(Units.of(finger), Chain, np.zeros((3, 1), bool), 1e-12)
-        status = certify(batch, Units.of(finger).wells, 1e-12)
+        status = certify(batch, Units.of(finger), 1e-12)
     assert status.tolist() == [Status.MARGINAL]
 
 
@@ -82,7 +77,7 @@ def test_one_hingeless_unit_leaves_the_search_finite(reference_finger: Fingers) 
     with np.errstate(invalid="ignore", divide="ignore"):
         units = Units.of(finger)
         batch = solve(units, Chain, np.zeros((3, 1), bool), 1e-12)
-        assert certify(batch, units.wells, 1e-12).tolist() == [Status.MARGINAL]
+        assert certify(batch, units, 1e-12).tolist() == [Status.MARGINAL]
 
 
 def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:
@@ -92,7 +87,7 @@ def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:
     at_barrier = minimize(chain, np.full((2, 1), half), 1e-3, max_iterations=1)
     reached = np.ones((1, 1), bool)
     batch = Batch(chain, at_barrier, reached, reached, np.zeros(1, bool))
-    assert certify(batch, units.wells, 1e-3).tolist() == [Status.MARGINAL]
+    assert certify(batch, units, 1e-3).tolist() == [Status.MARGINAL]
 
 
 def test_a_minimum_beyond_a_right_angle_is_called_folded(reference_finger: Fingers) -> None:
@@ -114,8 +109,8 @@ def test_an_unreachable_tolerance_is_not_converged(graded_finger: Fingers) -> No
     units = Units.of(graded_finger(4, 42, 1e4))
     inverted = np.ones((4, 1), bool)
     batch = solve(units, Chain, inverted, 1e-30)
-    assert certify(batch, units.wells, 1e-30).tolist() == [Status.NOT_CONVERGED]
-    assert certify(batch, units.wells, 1e-12).tolist() == [Status.STABLE]
+    assert certify(batch, units, 1e-30).tolist() == [Status.NOT_CONVERGED]
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
 @pytest.mark.parametrize("margin", [1e-3, 1e-6, 1e-10])
@@ -129,14 +124,14 @@ def test_near_the_loss_of_bistability_elastic_fingers_keep_their_states(
     linearity = 0.0964682337467354 - margin
     units = Units.of(reference_finger(3, linear_stiffness, force_linearity=linearity))
     batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
-    assert certify(batch, units.wells, 1e-12).tolist() == [Status.STABLE]
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
 def test_at_the_rigid_fold_elastic_fingers_keep_their_states(reference_finger: Fingers) -> None:
     linearity = 0.0964682337467354 - 1e-12
     units = Units.of(reference_finger(3, 50.0, force_linearity=linearity))
     batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
-    assert certify(batch, units.wells, 1e-12).tolist() == [Status.STABLE]
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
 @pytest.mark.parametrize(("n_units", "linear_stiffness"), [(1, 1e8), (64, 1e6)])
@@ -155,7 +150,7 @@ def test_with_soft_bars_patterns_are_distinct_minima(
     """k_L down to k_b: the wells the pattern names are told apart by the rigid barrier."""
     units = Units.of(reference_finger(5, 12.84 * relative_stiffness))
     batch = solve(units, Chain, all_patterns(5), 1e-12)
-    assert (certify(batch, units.wells, 1e-12) == Status.STABLE).all()
+    assert (certify(batch, units, 1e-12) == Status.STABLE).all()
     openings = batch.formulation.openings(batch.equilibrium.coordinates)
     assert openings[batch.inverted].min() > 0.85 * 3.5
     assert openings[~batch.inverted].max() < 0.1 * 3.5

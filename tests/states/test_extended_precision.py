@@ -26,7 +26,7 @@ def true_and_stated_errors(
 ) -> tuple[float, float]:
     units = Units.of(finger)
     batch = solve(units, formulate, inverted, 1e-12)
-    assert certify(batch, units.wells, 1e-12).tolist() == [Status.STABLE]
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     at_tip = tip(batch, with_compliance=False)
     stations = batch.formulation.stations(batch.equilibrium.coordinates)
     nodes = np.stack(stations, axis=1).reshape(-1)

@@ -24,7 +24,7 @@ def test_chain_and_lattice_agree_on_every_node_of_every_state(
     nodes = []
     for formulate in (Chain, Lattice):
         batch = solve(units, formulate, inverted, TOLERANCE)
-        assert (certify(batch, units.wells, TOLERANCE) == Status.STABLE).all()
+        assert (certify(batch, units, TOLERANCE) == Status.STABLE).all()
         nodes.append(np.stack(batch.formulation.stations(batch.equilibrium.coordinates)))
     assert np.abs(nodes[0] - nodes[1]).max() < 1e-9  # mm
 

@@ -50,7 +50,7 @@ def test_states_do_not_depend_on_the_units_of_measure(
     for f, unit in ((finger, 1.0), (scaled, 10.0**length)):
         units = Units.of(f)
         batch = solve(units, Chain, all_patterns(3), 1e-12)
-        statuses.append(certify(batch, units.wells, 1e-12))
+        statuses.append(certify(batch, units, 1e-12))
         poses.append(tip(batch, with_compliance=False).pose / np.array([[unit], [unit], [1.0]]))
         reached.append(batch.reached)
     np.testing.assert_array_equal(*statuses)

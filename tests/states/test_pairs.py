@@ -31,7 +31,7 @@ def assert_like_direct(split: Split, inverted: Flags, tolerance: float) -> float
     """All pairs that fit against direct solves; the share that fits."""
     pairs = all_pairs(split)
     batch = solve(split.units, Chain, inverted, 1e-13)
-    status = certify(batch, split.units.wells, 1e-12)
+    status = certify(batch, split.units, 1e-12)
     direct = tip(batch, with_compliance=False)
     fits = pairs.status != Status.NOT_CONVERGED
     assert (pairs.inverted == inverted).all()

@@ -50,13 +50,13 @@ def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
     bounds = error_bounds(units)
     exact = solve(units, Chain, inverted, 1e-14)
     truth = tip(exact, with_compliance=False)
-    is_state = certify(exact, units.wells, 1e-12) == Status.STABLE
+    is_state = certify(exact, units, 1e-12) == Status.STABLE
     rigid = Units.of(finger.with_bars(np.inf))
     n_checked = []
     for rung, bound in zip(RUNGS, bounds, strict=True):
         own = rigid if rung.drops_bars else units
         batch = solve(own, Chain, inverted, rung.tolerance)
-        says_stable = certify(batch, own.wells, rung.tolerance) == Status.STABLE
+        says_stable = certify(batch, own, rung.tolerance) == Status.STABLE
         bounded = np.isfinite(bound)
         assert not (says_stable & ~is_state & bounded).any(), "stable only where it is"
         both = says_stable & is_state & bounded

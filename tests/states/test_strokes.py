@@ -22,7 +22,7 @@ def test_the_chain_finds_every_pattern_of_its_own(
 ) -> None:
     units = Units.of(reference_finger(5, linear_stiffness))
     batch = solve(units, Chain, all_patterns(5), 1e-12, strokes=strokes)
-    assert (certify(batch, units.wells, 1e-12) == Status.STABLE).all()
+    assert (certify(batch, units, 1e-12) == Status.STABLE).all()
     assert (batch.reached == batch.inverted).all()
 
 
@@ -32,7 +32,7 @@ def test_the_lattice_finds_every_pattern_from_nearby(
 ) -> None:
     units = Units.of(reference_finger(5, 1e4))
     batch = solve(units, Lattice, all_patterns(5), 1e-12, strokes=strokes)
-    assert (certify(batch, units.wells, 1e-12) == Status.STABLE).all()
+    assert (certify(batch, units, 1e-12) == Status.STABLE).all()
 
 
 @pytest.mark.parametrize("strokes", [0.65, 2.0, 3.0])
@@ -42,7 +42,7 @@ def test_from_afar_the_lattice_says_which_pattern_it_fell_into(
     units = Units.of(reference_finger(5, 1e4))
     own = solve(units, Lattice, all_patterns(5), 1e-12).equilibrium.coordinates
     batch = solve(units, Lattice, all_patterns(5), 1e-12, strokes=strokes)
-    status = certify(batch, units.wells, 1e-12)
+    status = certify(batch, units, 1e-12)
     assert {Status.STABLE, Status.ANOTHER_PATTERN} == set(status)
     code = (batch.reached * 2 ** np.arange(4, -1, -1)[:, None]).sum(axis=0)
     np.testing.assert_allclose(batch.equilibrium.coordinates, own[:, code], rtol=0, atol=1e-7)
@@ -54,6 +54,6 @@ def test_below_the_barrier_every_pattern_relaxes_to_the_ground_state(
 ) -> None:
     units = Units.of(reference_finger(5, 1e4))
     batch = solve(units, Chain, all_patterns(5), 1e-12, strokes=0.5)
-    status = certify(batch, units.wells, 1e-12)
+    status = certify(batch, units, 1e-12)
     assert status.tolist() == [Status.STABLE] + 31 * [Status.ANOTHER_PATTERN]
     assert not batch.reached.any()
