@@ -193,9 +193,10 @@ class Study:
             if done is None:
                 progress.failures.append(chunk.start)
                 tables = evaluation.failed(chunk.start, space.designs(chunk.start, chunk.stop))
-                done = work.stored(chunk, tables, 0.0)
+                done = work.stored(chunk, [tables])
             if done.content is not None:
-                store.write(chunk.start, chunk.stop, done.content)
+                with store.part(chunk.start, chunk.stop) as file:
+                    file.write(done.content)
             progress.n_states += done.n_states
             progress.core_seconds += done.core_seconds
             progress.writing_seconds += done.writing_seconds
