@@ -19,6 +19,7 @@ from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_t
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.differences import differences
 from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
+from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
@@ -90,6 +91,7 @@ class Study:
             "dpg.schema_version": str(SCHEMA_VERSION),
             "dpg.law": scene_of(self.sweep.base).finger.law.description,
             "dpg.versions": versions(),
+            "dpg.code": HERE.code,
         }
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
         return {**said, "dpg.fingerprint": digest}
@@ -177,6 +179,7 @@ class Study:
     ) -> Progress:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
+        check_workers(workplace)
         for damaged in store.damaged():
             damaged.path.unlink()
         store.say(self.metadata)
@@ -186,7 +189,7 @@ class Study:
         n_resumed = n_designs - sum(stop - start for start, stop in missing)
         progress = Progress(n_designs, n_resumed, n_resumed, workplace.n_workers)
         work = Work(evaluation, store if workplace.is_local else None)
-        runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop)))
+        runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop), HERE))
         began = perf_counter()
         for result in runner.run(chunked(missing, self.chunk_size)):
             chunk, done = result.chunk, result.value

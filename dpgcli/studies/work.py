@@ -9,6 +9,7 @@ from typing import IO, NamedTuple
 from dpgcli.exploration.executors import Chunk
 from dpgcli.files.parts import PartStore, write_part
 from dpgcli.studies.evaluation import Evaluation, Numbers, Tables
+from dpgcli.studies.maker import Maker, check_maker
 
 
 class Done(NamedTuple):
@@ -31,8 +32,9 @@ class Work:
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers]) -> Done:
-        """Evaluate a chunk's designs, with these values by key, into a part."""
+    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> Done:
+        """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
+        check_maker(maker)
         return self.stored(chunk, self.evaluation(chunk.start, values))
 
     def stored(self, chunk: Chunk, blocks: Iterable[Tables]) -> Done:
