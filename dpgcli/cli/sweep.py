@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard, Study
 
 MOST_NAMED = 20
+LONG = 30.0  # s of one core: what takes longer is said before
 
 
 class ExecutorName(StrEnum):
@@ -103,7 +104,10 @@ def sweep(
         drop_half_written(output)
         is_new = restart or not study.is_up_to_date
         if is_new:
+            study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
             _check_folder(study, restart=restart, force=force)
+            if not quiet:
+                _say_before(study)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)
         else:
@@ -142,6 +146,20 @@ def _study(
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target)
     return Study(read_sweep(spec, settings), output, exactness, target)
+
+
+def _say_before(study: "Study") -> None:
+    """What a long sweep takes."""
+    from dpgcli.studies.extent import size_text
+
+    extent = study.extent
+    if extent.seconds > LONG:
+        say(
+            f"{study.folder}: {study.sweep.space.size:,} designs of up to {extent.n_states:,} "
+            f"states: about {extent.seconds / 60:,.1f} min of one core, "
+            f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
+            "memory (rough: a factor of two either way)"
+        )
 
 
 def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:

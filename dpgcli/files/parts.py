@@ -99,10 +99,17 @@ class PartStore:
     @contextmanager
     def part(self, start: int, stop: int) -> Iterator[IO[bytes]]:
         """A file to write the bytes of a part to; stored whole or not at all."""
-        nameless = self.folder / f"{start:010d}-{stop:010d}.nameless"
-        with whole_file(nameless) as temporary, temporary.open("wb") as file:
-            yield file
-        nameless.replace(nameless.with_name(f"{nameless.stem}-{_digest(nameless)}.part"))
+        scratch = self.folder / f".{start:010d}-{stop:010d}.tmp"
+        try:
+            with scratch.open("wb") as file:
+                yield file
+            name = f"{start:010d}-{stop:010d}-{_digest(scratch)}.part"
+            with whole_file(self.folder / name) as temporary:
+                scratch.replace(temporary)
+        except OSError as error:
+            raise OutputError(f"cannot write {scratch}: {error.strerror or error}") from error
+        finally:
+            scratch.unlink(missing_ok=True)
 
     def say(self, said: dict[str, str]) -> None:
         """Keep what the sweep is about beside its parts."""

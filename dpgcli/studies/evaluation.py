@@ -101,7 +101,7 @@ class Evaluation:
         n_designs = len(next(iter(values.values())))
         scenes: dict[int, Scene] = {}
         reasons: dict[int, str] = {}
-        allowed = self._allowed(values, n_designs)
+        allowed = self.allowed(values)
         for place in np.flatnonzero(allowed).tolist():
             changes = {key: column[place].item() for key, column in values.items()}
             try:
@@ -139,8 +139,9 @@ class Evaluation:
         numbers = np.arange(start, start + len(next(iter(values.values()))))
         return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
 
-    def _allowed(self, values: Mapping[str, Numbers], n_designs: int) -> NDArray[np.bool_]:
+    def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
+        n_designs = len(next(iter(values.values())))
         known: dict[str, Any] = flattened(dict(self.base_data)) | dict(values)
         short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
         allowed = np.ones(n_designs, bool)

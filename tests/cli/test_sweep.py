@@ -22,6 +22,7 @@ from dpgcli.exploration.executors import Chunk
 from dpgcli.files.output import sole_use
 from dpgcli.files.sweep import read_sweep
 from dpgcli.files.tables import read_metadata
+from dpgcli.studies.maker import HERE
 from dpgcli.studies.sweep import Study
 from dpgcli.studies.work import Work
 
@@ -352,7 +353,7 @@ def test_what_a_worker_sends_is_less_than_a_pipe_takes_at_once(sweep: Path) -> N
     study = Study(read_sweep(sweep), sweep.parent / "out")
     study.store.say({})
     values = study.sweep.space.designs(0, 6)
-    done = Work(study.evaluation, study.store)(Chunk(0, 6), values)
+    done = Work(study.evaluation, study.store)(Chunk(0, 6), values, HERE)
     assert done.n_states == 5 * 8
     assert len(pickle.dumps(done)) < select.PIPE_BUF / 4
     assert Work(study.evaluation, None)(Chunk(0, 6), values).content is not None

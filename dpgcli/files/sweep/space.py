@@ -16,7 +16,16 @@ from dpgcli.exploration.space import Axis, Range, linear, listed, logarithmic, s
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
 from dpgcli.files.spec.problems import unknown_key
-from dpgcli.files.sweep.models import MANY_KEYS, ONE_KEY, AxisSpec, Between, Sample
+from dpgcli.files.sweep.models import (
+    MANY_KEYS,
+    MOST_BYTES,
+    MOST_KEYS,
+    MOST_NUMBERS,
+    ONE_KEY,
+    AxisSpec,
+    Between,
+    Sample,
+)
 
 UNITS = "finger.units"
 
@@ -33,9 +42,21 @@ class SpaceReader:
         self.problems: list[Problem] = []
         self.tables: list[Path] = []
         self.keys: set[str] = set()
+        self.n_numbers = self.n_keys = 0
 
     def wrong(self, path: KeyPath, expected: str, found: str, hint: str = "") -> None:
         self.problems.append(self.document.problem(path, expected, found, hint))
+
+    def has_room(self, path: KeyPath, n_points: int, n_keys: int) -> bool:
+        """Count an axis in, before it is made; False, with a problem, where it is too large."""
+        self.n_numbers += n_points * n_keys
+        self.n_keys += n_keys
+        has_room = self.n_numbers <= MOST_NUMBERS and self.n_keys <= MOST_KEYS
+        if not has_room:
+            expected = f"at most {MOST_NUMBERS:,} numbers of {MOST_KEYS} keys in all axes"
+            found = f"{self.n_numbers:,} numbers of {self.n_keys:,} keys up to here"
+            self.wrong(path, expected, found, "take fewer points or keys, or several sweeps")
+        return has_room
 
     def axis(self, place: int, said: AxisSpec) -> Axis | None:
         """The axis, or None with a problem."""
@@ -49,7 +70,7 @@ class SpaceReader:
             needs = "a key beside" if said.key is None else "no key beside"
             self.wrong(path, f"{needs} {kinds[0]}", shown(said.key))
             return None
-        made = self.made(path, said, kinds[0])
+        made = self.made(path, said, kinds[0]) if self.has_room(path, *_size(said)) else None
         if made is not None:
             self.check_keys((*path, "key" if said.key else kinds[0]), list(made.values))
         return made
@@ -71,7 +92,9 @@ class SpaceReader:
             return None
         make = logarithmic if is_log else linear
         axis = make(key, between.first, between.last, between.count)
-        return Axis({key: _numbers(key, axis.values[key].tolist())})
+        values = axis.values[key]
+        is_count = key == UNITS and bool((values == np.rint(values)).all())
+        return Axis({key: values.astype(np.int64)}) if is_count else axis
 
     def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
         lengths = {key: len(values) for key, values in columns.items()}
@@ -91,15 +114,26 @@ class SpaceReader:
     def tabulated(self, path: KeyPath, name: str) -> Axis | None:
         """Columns of a CSV or Parquet file; pandas reads both."""
         import pandas as pd
+        import pyarrow.parquet as pq
 
         table = self.folder / name
         try:
             if table.suffix == ".parquet":
+                with table.open("rb") as stream:
+                    facts = pq.read_metadata(stream)
+                if not self.has_room(path, facts.num_rows, facts.num_columns):
+                    return None
                 frame = pd.read_parquet(table)
             else:
+                if (n_bytes := table.stat().st_size) > MOST_BYTES:
+                    expected = f"at most {MOST_BYTES // 2**20} MiB of CSV"
+                    self.wrong(path, expected, f"{n_bytes // 2**20:,} MiB", "write Parquet")
+                    return None
                 with warnings.catch_warnings():  # rows that do not fit the header
                     warnings.simplefilter("error", pd.errors.ParserWarning)
                     frame = pd.read_csv(table, index_col=False)
+                if not self.has_room(path, *frame.shape):
+                    return None
         except (OSError, ValueError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
             return None
@@ -151,6 +185,16 @@ class SpaceReader:
             expected = "numeric keys, by their last part or, if two share that, in full"
             self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
+
+
+def _size(said: AxisSpec) -> tuple[int, int]:
+    """Points and keys of an axis, as far as they are known before it is made."""
+    if said.sample is not None:
+        return said.sample.count, len(said.sample.ranges)
+    if said.paired is not None:
+        return max(map(len, said.paired.values())), len(said.paired)
+    between = said.linear or said.log
+    return (between.count if between else len(said.values or ())), int(said.key is not None)
 
 
 def _numbers(key: str, values: Sequence[int | float]) -> Any:
