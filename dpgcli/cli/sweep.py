@@ -13,7 +13,7 @@ import typer
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated
-from dpgcli.cli.options import MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
+from dpgcli.cli.options import LONG, MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
 from dpgcli.cli.run import check_failed, run_facts, run_summary
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard, Study
 
 MOST_NAMED = 20
-LONG = 30.0  # s of one core: what takes longer is said before
 
 
 class ExecutorName(StrEnum):
@@ -154,9 +153,10 @@ def _say_before(study: "Study") -> None:
 
     extent = study.extent
     if extent.seconds > LONG:
+        less = ", less what constraints exclude" if study.sweep.constraints else ""
         say(
-            f"{study.folder}: {study.sweep.space.size:,} designs of up to {extent.n_states:,} "
-            f"states: about {extent.seconds / 60:,.1f} min of one core, "
+            f"{study.folder}: {study.sweep.space.size:,} designs, {extent.n_states:,} states"
+            f"{less}: about {extent.seconds / 60:,.1f} min of one core, "
             f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
             "memory (rough: a factor of two either way)"
         )

@@ -18,7 +18,7 @@ from dpgcli.states.patterns import MOST_SELECTED
 
 DESIGN_SECONDS = 3e-4  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
-PROCESS_BYTES, BYTES_PER_DESIGN = 400 * 2**20, 400  # in memory; measured
+PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
 MOST_DESIGNS = 10**10 - 1  # as the names of parts count them
 MOST_CHUNKS = 10**7  # a month of work
 MOST_SENT = 2**22  # states of a design, about 250 MB
@@ -64,8 +64,10 @@ class Extent:
 
         Workers hold one block of states each, a third of that.
         """
-        numbers = sum(len(axis) * len(axis.values) for axis in self.sweep.space.axes)
-        return PROCESS_BYTES + 8 * numbers + BYTES_PER_DESIGN * self.sweep.space.size
+        space = self.sweep.space
+        numbers = sum(len(axis) * len(axis.values) for axis in space.axes)
+        of_designs = space.size * (DESIGN_BYTES + VALUE_BYTES * len(space.keys))
+        return PROCESS_BYTES + 8 * numbers + of_designs
 
     @property
     def seconds(self) -> float:

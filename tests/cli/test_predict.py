@@ -541,3 +541,15 @@ def test_a_file_of_domes_can_be_predicted_from_its_table(call: Call, folder: Pat
     again = rows_of(call, "kept.json", "--uncertainty")
     (folder / "fitted.yaml").write_text(FITTED)
     assert again == rows_of(call, "three_unit.yaml", *BY_FILE, "--uncertainty")
+
+
+@pytest.mark.parametrize(("patterns", "is_long"), [((), False), (("--pattern", "00*"), True)])
+def test_what_takes_long_is_said_before(
+    call: Call, monkeypatch: pytest.MonkeyPatch, patterns: tuple[str, ...], is_long: bool
+) -> None:
+    """The work itself is left out; `-q` says nothing."""
+    monkeypatch.setattr("dpgcli.states.predict.Prediction.blocks", lambda _: iter(()))
+    columns = ("twenty_unit.yaml", "--columns", "min_eigenvalue_N_per_mm", *patterns)
+    said = call("predict", *columns, "--format", "csv").stderr.splitlines()
+    assert said[0].startswith("262,144 states: about ") == is_long
+    assert call("predict", "-q", *columns, "--format", "csv").stderr == ""

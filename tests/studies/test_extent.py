@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dpgcli.cli.sweep import LONG
+from dpgcli.cli.options import LONG
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import serial
 from dpgcli.states import designs, metrics
 from dpgcli.studies import sweep as studies
-from dpgcli.studies.extent import BYTES_PER_DESIGN, MOST_CHUNKS, PROCESS_BYTES
+from dpgcli.studies.extent import MOST_CHUNKS, PROCESS_BYTES
 
 UNITS = "{key: finger.units, values: [2, 3, 30]}"
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7]}"
@@ -92,7 +92,7 @@ def test_more_than_the_memory_of_the_machine_is_refused(
     study: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = study(axis("dome_height_mm", 1_000_000))
-    needed = PROCESS_BYTES + (BYTES_PER_DESIGN + 8) * 1_000_000
+    needed = PROCESS_BYTES + (350 + 24 + 8) * 1_000_000
     assert made.extent.bytes_in_memory == needed
     for memory, is_enough in ((needed, True), (needed - 1, False)):
         pages = {"SC_PAGE_SIZE": 1, "SC_PHYS_PAGES": memory}
@@ -100,7 +100,7 @@ def test_more_than_the_memory_of_the_machine_is_refused(
         if is_enough:
             made.check_room()
         else:
-            with pytest.raises(UsageError, match="789 MiB"):
+            with pytest.raises(UsageError, match="764 MiB"):
                 made.check_room()
 
 

@@ -114,28 +114,21 @@ class SpaceReader:
     def tabulated(self, path: KeyPath, name: str) -> Axis | None:
         """Columns of a CSV or Parquet file; pandas reads both."""
         import pandas as pd
-        import pyarrow.parquet as pq
 
         table = self.folder / name
         try:
+            if not self.table_has_room(path, table):
+                return None
             if table.suffix == ".parquet":
-                with table.open("rb") as stream:
-                    facts = pq.read_metadata(stream)
-                if not self.has_room(path, facts.num_rows, facts.num_columns):
-                    return None
                 frame = pd.read_parquet(table)
             else:
-                if (n_bytes := table.stat().st_size) > MOST_BYTES:
-                    expected = f"at most {MOST_BYTES // 2**20} MiB of CSV"
-                    self.wrong(path, expected, f"{n_bytes // 2**20:,} MiB", "write Parquet")
-                    return None
                 with warnings.catch_warnings():  # rows that do not fit the header
                     warnings.simplefilter("error", pd.errors.ParserWarning)
                     frame = pd.read_csv(table, index_col=False)
-                if not self.has_room(path, *frame.shape):
-                    return None
         except (OSError, ValueError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
+            return None
+        if not self.has_room(path, *frame.shape):
             return None
         if frame.empty:
             self.wrong(path, "rows of finite numbers", "no rows")
@@ -153,6 +146,28 @@ class SpaceReader:
             return None
         self.tables.append(table)
         return Axis(columns)
+
+    def table_has_room(self, path: KeyPath, table: Path) -> bool:
+        """Whether a table can be read; False, with a problem, where it is too large for that.
+
+        Raises OSError and ValueError for what is no table.
+        """
+        import pyarrow.parquet as pq
+
+        if table.suffix == ".parquet":
+            with table.open("rb") as stream:
+                facts = pq.read_metadata(stream)
+            n_numbers, n_keys = facts.num_rows * facts.num_columns, facts.num_columns
+            if n_numbers > MOST_NUMBERS or n_keys > MOST_KEYS:
+                return self.has_room(path, facts.num_rows, n_keys)
+        elif (n_bytes := table.stat().st_size) > MOST_BYTES:
+            expected, found = (
+                f"at most {MOST_BYTES // 2**20} MiB of CSV",
+                f"{n_bytes // 2**20:,} MiB",
+            )
+            self.wrong(path, expected, found, "write Parquet, or several sweeps")
+            return False
+        return True
 
     def check_keys(self, path: KeyPath, keys: list[str]) -> None:
         """Keys must be known to the spec, and vary on one axis only."""
