@@ -51,7 +51,7 @@ def test_impossible_numbers_of_units_do_not_count(study: Any) -> None:
 
 def test_long_fingers_that_a_constraint_excludes_do_not_count(study: Any, tables: Any) -> None:
     made = study(UNITS, HEIGHTS, rules="[units < 9]")
-    assert made.extent.most_units == 3
+    assert (made.extent.most_units, made.extent.n_states) == (3, 2 * (4 + 8))
     assert made.chunk_size == 64 >> 3
     made.extent.check(made.chunk_size, is_sent=True)
     _, found = tables(made)
@@ -83,9 +83,15 @@ def test_more_designs_than_anybody_can_wait_for_are_refused(study: Any, n_axes: 
 
 def test_many_small_chunks_are_refused_where_they_are_too_many(study: Any) -> None:
     made = study(axis("dome_height_mm", 10_000), axis("dome_thickness_mm", 9_000))
-    made.extent.check(9, is_sent=False)
+    made.extent.check(90, is_sent=False)
     with pytest.raises(UsageError, match=f"{MOST_CHUNKS:,}"):
-        made.extent.check(8, is_sent=False)
+        made.extent.check(89, is_sent=False)
+
+
+def test_more_designs_than_parts_can_name_are_refused_in_chunks_of_any_size(study: Any) -> None:
+    made = study(axis("dome_height_mm", 100_000), axis("dome_thickness_mm", 100_000))
+    with pytest.raises(UsageError, match=r"10,000,000,000 designs .* at most 9,999,999,999"):
+        made.extent.check(2**15, is_sent=False)
 
 
 def test_more_than_the_memory_of_the_machine_is_refused(

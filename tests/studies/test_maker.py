@@ -118,6 +118,13 @@ def test_a_mixed_cluster_is_refused_before_the_work(answer: Any, named: str) -> 
     assert str(HERE) in str(refused.value)
 
 
+def test_all_workers_are_asked_before_a_sweep_is_begun(study: Any) -> None:
+    mixed = Workplace("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: {"a": OTHER})
+    with pytest.raises(WorkplaceError, match="worker a of the cluster has"):
+        study(HEIGHTS).compute(mixed, lambda _: None)
+    assert not study(HEIGHTS).store.folder.exists()
+
+
 def test_a_cluster_of_one_kind_passes() -> None:
     asked: list[Any] = []
 
