@@ -12,6 +12,7 @@ from dpgcli.states.patterns import texts
 from dpgcli.states.rows import Columns
 from dpgcli.states.solve import reach
 
+POINTS_AT_ONCE = 2**12
 STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight finger
 
 
@@ -86,7 +87,11 @@ def _shape_errors(layer: Array, shapes: tuple[Array, ...]) -> Array:
     errors = np.full((2, layer.shape[2]), np.nan)
     for state, points in enumerate(shapes):
         if points.size and np.isfinite(layer[:, :, state]).all():
-            apart = distances(points, layer[:, :, state])
+            parts = range(0, points.shape[1], POINTS_AT_ONCE)
+            line = layer[:, :, state]
+            apart = np.concatenate(
+                [distances(points[:, i : i + POINTS_AT_ONCE], line) for i in parts]
+            )
             errors[:, state] = apart.max(), np.sqrt((apart**2).mean())
     return errors
 

@@ -27,7 +27,7 @@ from dpgcli.states.solve import Status, reach
 
 EDGE = 1e-3  # of a value: a fit that ends closer than this to where states end is none
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
-BOUNDS = {"force_linearity": (0.0, 1.0), "linear_stiffness_N_per_mm": (10.0, 1e12)}
+BARS = (1.0, 1e11)  # times the stiffest bistable spring: bounds of the bars' stiffness
 
 
 @dataclass(frozen=True)
@@ -126,8 +126,9 @@ class FingerFit:
     def _parameters(self) -> tuple[Parameter, ...]:
         """Values that all units share, the infinite ones left out."""
         values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
+        stiffest = float(self.finger.bistable_stiffness.max())
         return tuple(
-            _parameter(key, float(value[0, 0]), key in self.free)
+            _parameter(key, float(value[0, 0]), key in self.free, stiffest)
             for key, value in values.items()
             if value.size == 1 and np.isfinite(value).all() and self._has(key)
         )
@@ -188,6 +189,10 @@ def _missing(patterns: Flags, status: NDArray[np.uint8]) -> list[str]:
     ]
 
 
-def _parameter(key: str, start: float, is_free: bool) -> Parameter:
-    lower, upper = BOUNDS.get(key, (start / WIDEST, start * WIDEST))
+def _parameter(key: str, start: float, is_free: bool, stiffest: float) -> Parameter:
+    bounds = {
+        "force_linearity": (0.0, 1.0),
+        "linear_stiffness_N_per_mm": (BARS[0] * stiffest, BARS[1] * stiffest),
+    }
+    lower, upper = bounds.get(key, (start / WIDEST, start * WIDEST))
     return Parameter(key, start, min(lower, start), max(upper, start), is_free)

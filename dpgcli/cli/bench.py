@@ -50,7 +50,7 @@ SHOWN = {
 SLOWER = 2.0  # times its recorded ratio: more than the noise of a shared machine
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, help="Times each way is timed")]
+Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),

@@ -126,9 +126,16 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         "Error and cost",
         f"  {_bar_error(plan)}",
         f"  {_bound(plan)}",
-        f"  about {plan.expected_seconds:.1f} s on one core and "
-        f"{plan.expected_bytes / 2**20:.0f} MiB (rough: a factor of two either way)",
+        f"  {expected(plan)}",
     ]
+
+
+def expected(plan: "Plan") -> str:
+    """What the work takes, before it is done."""
+    return (
+        f"about {plan.expected_seconds:,.1f} s on one core and "
+        f"{plan.expected_bytes / 2**20:,.0f} MiB (rough: a factor of two either way)"
+    )
 
 
 def _error(source: "Source") -> str:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dpgcli.cli.explain import expected
 from dpgcli.cli.options import (
+    LONG,
     ColumnNames,
     FormulationName,
     FormulationOption,
@@ -71,6 +73,8 @@ def predict(
         check_plot(plot)
         _check_drawable(prediction.plan.n_states)
     _check_outputs((spec, *document.files), output, plot)
+    if prediction.plan.expected_seconds > LONG and not quiet:
+        say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:
         principal = columns == "default" and not nodes

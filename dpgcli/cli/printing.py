@@ -33,6 +33,7 @@ PRINCIPAL = (
     "tip_error_mm",
 )
 DROPPED_FIRST = ("min_eigenvalue_N_per_mm", "residual_N", "tip_error_mm")
+TOO_SMALL = 1e-3  # for fixed decimals: such as the tips of a finger of micrometers
 ROUNDED = {
     "residual_N": ".1e",
     "tip_error_mm": ".1e",
@@ -95,7 +96,7 @@ def table_printer(*, principal: bool) -> Printer:
             strays |= principal and bool((block["status"] != 0).any())
             yield block
         shown = {
-            column.name: [_shown(column, row[place]) for row in first]
+            column.name: _shown(column, [row[place] for row in first])
             for place, column in enumerate(columns)
             if not principal
             or column.name in PRINCIPAL
@@ -172,11 +173,18 @@ def _drop_to_fit(heads: dict[str, str], texts: dict[str, list[str]]) -> None:
         print(f"no room for {', '.join(dropped)}", file=sys.stderr)
 
 
-def _shown(column: Column, value: Any) -> str:
+def _shown(column: Column, values: list[Any]) -> list[str]:
+    """The texts of a column."""
     if column.kind is Kind.FLAG:
-        return "yes" if value else "no"
+        return ["yes" if value else "no" for value in values]
     if column.kind is not Kind.NUMBER:
-        return str(value)
-    if math.isnan(value):
-        return "-"
-    return format(value, ROUNDED.get(column.name) or ROUNDED.get(column.unit, ".6g"))
+        return list(map(str, values))
+    rounded = _rounded(column, values)
+    return ["-" if math.isnan(value) else format(value, rounded) for value in values]
+
+
+def _rounded(column: Column, values: list[float]) -> str:
+    """Decimals for the sizes that the unit is usual for; as many digits for much smaller ones."""
+    rounded = ROUNDED.get(column.name) or ROUNDED.get(column.unit, ".6g")
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    return ".5e" if rounded.endswith("f") and 0.0 < largest < TOO_SMALL else rounded

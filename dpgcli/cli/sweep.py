@@ -13,7 +13,7 @@ import typer
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated
-from dpgcli.cli.options import MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
+from dpgcli.cli.options import LONG, MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
 from dpgcli.cli.run import check_failed, run_facts, run_summary
@@ -103,7 +103,10 @@ def sweep(
         drop_half_written(output)
         is_new = restart or not study.is_up_to_date
         if is_new:
+            study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
             _check_folder(study, restart=restart, force=force)
+            if not quiet:
+                _say_before(study)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)
         else:
@@ -142,6 +145,21 @@ def _study(
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target)
     return Study(read_sweep(spec, settings), output, exactness, target)
+
+
+def _say_before(study: "Study") -> None:
+    """What a long sweep takes."""
+    from dpgcli.studies.extent import size_text
+
+    extent = study.extent
+    if extent.seconds > LONG:
+        less = ", less what constraints exclude" if study.sweep.constraints else ""
+        say(
+            f"{study.folder}: {study.sweep.space.size:,} designs, {extent.n_states:,} states"
+            f"{less}: about {extent.seconds / 60:,.1f} min of one core, "
+            f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
+            "memory (rough: a factor of two either way)"
+        )
 
 
 def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:

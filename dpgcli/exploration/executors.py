@@ -184,7 +184,8 @@ class Workplace:
     """Where to run: how to make an executor of n workers, and how many.
 
     `is_local` says that workers see this machine's files. `broken` is what an executor raises
-    when a worker dies, `lost` when there is nobody left to ask.
+    when a worker dies, `lost` when there is nobody left to ask. `ask` calls a function in each
+    worker that may be of another installation: what it returns or raises, by the worker's name.
     """
 
     name: str
@@ -193,6 +194,7 @@ class Workplace:
     is_local: bool = True
     broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
     lost: tuple[type[BaseException], ...] = ()
+    ask: Callable[[Callable[[], Any]], dict[str, Any]] = lambda _: {}
 
 
 def serial() -> Workplace:
@@ -224,6 +226,7 @@ def dask_cluster(scheduler: str) -> Workplace:
         is_local=False,
         broken=(BrokenExecutor, KilledWorker),
         lost=(CancelledError, CommClosedError),
+        ask=lambda function: client.run(function, on_error="return"),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numbers = NDArray[Any]
+SAMPLES_AT_ONCE = 2**16
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,12 @@ def sampled(method: str, ranges: Mapping[str, Range], count: int, seed: int) -> 
 
     engines = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}
     engine = engines[method](d=len(ranges), rng=np.random.default_rng(seed))
-    if method == "sobol":  # balanced only in powers of two: draw those, keep the first
-        fractions = engine.random_base2(max(count - 1, 1).bit_length())[:count]
-    else:
-        fractions = engine.random(count)
-    columns = zip(ranges.items(), fractions.T, strict=True)
-    return Axis({key: bounds.at(fraction) for (key, bounds), fraction in columns})
+    size = SAMPLES_AT_ONCE if method == "sobol" else count
+    columns = {key: np.empty(count) for key in ranges}
+    for first in range(0, count, size):
+        n = min(size, count - first)
+        drawn = 2 ** (n - 1).bit_length() if method == "sobol" else n  # balanced in powers of two
+        fractions = engine.random(drawn)[:n]
+        for (key, bounds), fraction in zip(ranges.items(), fractions.T, strict=True):
+            columns[key][first : first + n] = bounds.at(fraction)
+    return Axis(columns)

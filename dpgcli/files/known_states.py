@@ -19,6 +19,7 @@ TIP_ANGLE = "tip_angle_rad"
 SECONDS = "seconds"
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
+MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
 FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
@@ -32,6 +33,10 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
     """
     sheet = read_sheet(path)
     sheet.check_names(("pattern",))
+    if len(sheet.rows) * n_units > MOST_UNITS:
+        expected = f"at most {MOST_UNITS // n_units:,} states of {n_units} units"
+        wrong = sheet.problem(None, "file", expected, f"{len(sheet.rows):,}", "a part at a time")
+        raise SpecError((wrong,))
     patterns = sheet.cells("pattern")
     problems = [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
     if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
@@ -110,10 +115,11 @@ def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
 
 
 def _repeated(sheet: Sheet, patterns: Sequence[str]) -> list[Problem]:
+    first = {pattern: row for row, pattern in reversed(list(enumerate(patterns)))}
     return [
         sheet.problem(row, "pattern", "each pattern once", f"{pattern} for the second time")
         for row, pattern in enumerate(patterns)
-        if pattern in patterns[:row]
+        if row > first[pattern]
     ]
 
 
@@ -157,16 +163,19 @@ def _read_shapes(path: Path, patterns: Sequence[str], n_units: int) -> tuple[Arr
     sheet.check_names(("pattern", *POINT))
     problems = _pattern_problems(sheet, n_units)
     points = sheet.numbers(POINT)
-    of_row = np.array(sheet.cells("pattern"))
-    for pattern in () if problems else dict.fromkeys(of_row.tolist()):
-        if pattern not in patterns:
-            row = int(np.argmax(of_row == pattern))
+    rows: dict[str, list[int]] = {}
+    for row, pattern in enumerate(sheet.cells("pattern")):
+        rows.setdefault(pattern, []).append(row)
+    known = set(patterns)
+    for pattern, of_pattern in () if problems else rows.items():
+        if pattern not in known:
             expected = "a pattern of the known states"
-            problems.append(sheet.problem(row, "pattern", expected, repr(pattern)))
-        elif (of_row == pattern).sum() < FEWEST_POINTS:
-            row = int(np.argmax(of_row == pattern))
-            problems.append(sheet.problem(row, "pattern", "2 points or more of it", "one"))
+            problems.append(sheet.problem(of_pattern[0], "pattern", expected, repr(pattern)))
+        elif len(of_pattern) < FEWEST_POINTS:
+            problems.append(
+                sheet.problem(of_pattern[0], "pattern", "2 points or more of it", "one")
+            )
     if problems:
         raise SpecError(tuple(problems))
     together = np.stack([points[name] for name in POINT])
-    return tuple(together[:, of_row == pattern] for pattern in patterns)
+    return tuple(together[:, rows.get(pattern, [])] for pattern in patterns)

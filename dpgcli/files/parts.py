@@ -1,23 +1,27 @@
 """Results of chunks on disk, so that an interrupted sweep can go on.
 
-A part holds the states and the designs of a range of designs as two Arrow streams. Its name is
-its range and the SHA-256 of its bytes: a part that does not match its name does not count.
+A part holds the states and the designs of a range of designs as two Arrow streams, and at its end
+where the second begins. Its name is its range and the SHA-256 of its bytes: a part that does not
+match its name does not count.
 """
 
 import hashlib
 import json
+import os
 import re
 import struct
+from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import pyarrow as pa
 
 from dpgcli.errors import OutputError
 from dpgcli.files.output import whole_file
-from dpgcli.files.tables import record_batch
+from dpgcli.files.tables import record_batch, schema
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import Columns
 
@@ -26,24 +30,35 @@ LENGTH = struct.Struct("<Q")
 SAID = "sweep.json"
 
 
-def encoded(
+def write_part(
+    sink: IO[bytes],
     state_columns: tuple[Column, ...],
-    states: Columns,
     design_columns: tuple[Column, ...],
-    designs: Columns,
-) -> bytes:
-    """The bytes of a part."""
-    first = _stream(record_batch(state_columns, states))
-    return LENGTH.pack(len(first)) + first + _stream(record_batch(design_columns, designs))
+    blocks: Iterable[tuple[Columns, Columns]],
+) -> int:
+    """Write a part as its blocks of states and of designs come; the number of its states.
+
+    At its end stands where the designs begin: known only when all states are written.
+    """
+    designs = []
+    n_states = 0
+    with _stream(sink, state_columns) as stream:
+        for of_states, of_designs in blocks:
+            batch = record_batch(state_columns, of_states)
+            n_states += batch.num_rows
+            stream.write_batch(batch)
+            designs.append(record_batch(design_columns, of_designs))
+    middle = sink.tell()
+    with _stream(sink, design_columns) as stream:
+        for batch in designs:
+            stream.write_batch(batch)
+    sink.write(LENGTH.pack(middle))
+    return n_states
 
 
-def _stream(batch: Any) -> bytes:
-    sink = pa.BufferOutputStream()
+def _stream(sink: IO[bytes], columns: tuple[Column, ...]) -> Any:
     options = pa.ipc.IpcWriteOptions(compression="zstd")
-    with pa.ipc.new_stream(sink, batch.schema, options=options) as writer:
-        writer.write_batch(batch)
-    content: bytes = sink.getvalue().to_pybytes()
-    return content
+    return pa.ipc.new_stream(sink, schema(columns), options=options)
 
 
 class Part(NamedTuple):
@@ -62,10 +77,17 @@ class Part(NamedTuple):
         return self._stream(which).schema
 
     def _stream(self, which: int) -> Any:
-        content = self.path.read_bytes()
-        (length,) = LENGTH.unpack_from(content)
-        middle = LENGTH.size + length
-        return pa.ipc.open_stream(content[LENGTH.size : middle] if which == 0 else content[middle:])
+        file = pa.OSFile(os.fspath(self.path))
+        if which == 1:
+            file.seek(file.size() - LENGTH.size)
+            (middle,) = LENGTH.unpack(file.read(LENGTH.size))
+            file.seek(middle)
+        return pa.ipc.open_stream(file)
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether its bytes do not match its name."""
+        return _digest(self.path) not in self.path.name
 
 
 @dataclass(frozen=True)
@@ -74,11 +96,20 @@ class PartStore:
 
     folder: Path
 
-    def write(self, start: int, stop: int, content: bytes) -> None:
-        """Store a part, whole or not at all."""
-        digest = hashlib.sha256(content).hexdigest()[:16]
-        with whole_file(self.folder / f"{start:010d}-{stop:010d}-{digest}.part") as temporary:
-            temporary.write_bytes(content)
+    @contextmanager
+    def part(self, start: int, stop: int) -> Iterator[IO[bytes]]:
+        """A file to write the bytes of a part to; stored whole or not at all."""
+        scratch = self.folder / f".{start:010d}-{stop:010d}.tmp"
+        try:
+            with scratch.open("wb") as file:
+                yield file
+            name = f"{start:010d}-{stop:010d}-{_digest(scratch)}.part"
+            with whole_file(self.folder / name) as temporary:
+                scratch.replace(temporary)
+        except OSError as error:
+            raise OutputError(f"cannot write {scratch}: {error.strerror or error}") from error
+        finally:
+            scratch.unlink(missing_ok=True)
 
     def say(self, said: dict[str, str]) -> None:
         """Keep what the sweep is about beside its parts."""
@@ -105,22 +136,25 @@ class PartStore:
 
     def damaged(self) -> list[Part]:
         """Parts whose bytes do not match their name."""
-        return [
-            part
-            for part in self.parts()
-            if hashlib.sha256(part.path.read_bytes()).hexdigest()[:16] not in part.path.name
-        ]
+        return [part for part in self.parts() if part.is_damaged]
 
     def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-        """What of these ranges no part covers."""
-        parts, gaps = self.parts(), []
+        """What of these ranges, in their order, no part covers."""
+        waiting, gaps = deque(self.parts()), []
         for start, stop in ranges:
             here = start
-            for part in parts:
-                if here < part.stop and part.start < stop:
-                    if part.start > here:
-                        gaps.append((here, part.start))
-                    here = part.stop
+            while waiting and waiting[0].start < stop:
+                if waiting[0].start > here:
+                    gaps.append((here, waiting[0].start))
+                here = max(here, waiting[0].stop)
+                if here > stop:
+                    break  # it goes on into the next range
+                waiting.popleft()
             if here < stop:
                 gaps.append((here, stop))
         return gaps
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]

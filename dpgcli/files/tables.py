@@ -19,6 +19,7 @@ from dpgcli import __version__
 from dpgcli.files.output import whole_file
 from dpgcli.files.spec import spelled
 from dpgcli.states.columns import Column, Kind
+from dpgcli.states.costs import rows_at_once
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 from dpgcli.states.rows import Columns
@@ -26,7 +27,6 @@ from dpgcli.states.solve import Status
 
 SCHEMA_VERSION = 1
 DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten
-ROWS_PER_GROUP = 2**17
 TYPES = {
     Kind.PATTERN: pa.string(),
     Kind.STATUS: pa.string(),
@@ -98,7 +98,7 @@ def write_table(
         ) as writer,
     ):
         for group in _ahead(groups) if in_thread else groups:
-            writer.write_batch(group, row_group_size=ROWS_PER_GROUP)
+            writer.write_batch(group, row_group_size=rows_at_once(len(described)))
         writer.add_key_value_metadata({"dpg.content_sha256": digest.hexdigest()})
 
 
@@ -143,15 +143,15 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
 def _row_groups(batches: Iterable[Any], described: Any) -> Iterator[Any]:
     """Batches joined and cut to row groups of one size; small groups cost time and space."""
     waiting: list[Any] = []
-    n_waiting = 0
+    n_waiting, size = 0, rows_at_once(len(described))
     for batch in batches:
         waiting.append(batch)
         n_waiting += batch.num_rows
-        while n_waiting >= ROWS_PER_GROUP:
+        while n_waiting >= size:
             joined = pa.Table.from_batches(waiting, described)
-            yield _one_batch(joined.slice(0, ROWS_PER_GROUP), described)
-            waiting = joined.slice(ROWS_PER_GROUP).to_batches()
-            n_waiting -= ROWS_PER_GROUP
+            yield _one_batch(joined.slice(0, size), described)
+            waiting = joined.slice(size).to_batches()
+            n_waiting -= size
     yield _one_batch(pa.Table.from_batches(waiting, described), described)
 
 

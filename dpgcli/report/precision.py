@@ -10,7 +10,7 @@ from dpgcli.report.drawing import drawn_to, titled
 Row = dict[str, Any]
 
 WIDTH, HEIGHT = 64, 18
-SMALLEST = 1e-16  # mm: what is exact is drawn here
+EXACT = 0.1  # of the smallest error: what is exact is drawn there
 MARKS = "abcdefghijklmnopqrstuvwxyz"
 COLORS = {"ladder": "#0072B2", "one finger": "#56B4E9", "peer": "#D55E00"}  # Okabe and Ito
 MARKERS = {"ladder": "o", "one finger": "s", "peer": "^"}
@@ -29,8 +29,14 @@ def points(rows: Sequence[Row]) -> list[Row]:
 def model_error(rows: Sequence[Row]) -> float | None:
     """Largest error of the lattice against given data (mm), if there are any."""
     found = [row["max_tip_error_mm"] for row in rows if row["group"] == "model"]
-    found = [max(error, SMALLEST) for error in found if math.isfinite(error)]
-    return found[0] if found else None
+    found = [error for error in found if math.isfinite(error)]
+    return max(found[0], _least_drawn(rows)) if found else None
+
+
+def _least_drawn(rows: Sequence[Row]) -> float:
+    """Where errors of zero go (mm) on axes that have no zero."""
+    errors = [row["max_tip_error_mm"] for row in points(rows)]
+    return EXACT * min((error for error in errors if error > 0.0), default=1.0)
 
 
 def cheapest_way(rows: Sequence[Row], target: float) -> str:
@@ -55,7 +61,8 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     if not shown:
         return []
     across = [math.log10(row["seconds_per_state"]) for row in shown]
-    up = [math.log10(max(row["max_tip_error_mm"], SMALLEST)) for row in shown]
+    least = _least_drawn(rows)
+    up = [math.log10(max(row["max_tip_error_mm"], least)) for row in shown]
     model = model_error(rows)
     top = max(up) if model is None else max(*up, math.log10(model))
     left, right = math.floor(min(across)), math.ceil(max(across))
@@ -110,8 +117,9 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
 
 def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
     """Numbered marks, named in the legend: names beside them would overlap."""
+    least = _least_drawn(shown)
     for number, row in enumerate(shown, start=1):
-        x, y = row["seconds_per_state"], max(row["max_tip_error_mm"], SMALLEST)
+        x, y = row["seconds_per_state"], max(row["max_tip_error_mm"], least)
         group = row["group"]
         axes.errorbar(
             x,

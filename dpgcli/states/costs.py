@@ -9,6 +9,9 @@ UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
 PAIR_SECONDS = 1.0e-6
 EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
 START_SECONDS = 0.3
+LIBRARIES = 96 * 2**20  # bytes
+ROWS_WRITTEN, COPIES_WRITTEN = 2**17, 4  # of a table, at once; fewer rows of more columns
+COLUMNS_WRITTEN = 32
 
 
 def seconds(
@@ -23,10 +26,15 @@ def seconds(
     return START_SECONDS + n_states * (n * per_unit + eigenvalue)
 
 
+def rows_at_once(n_columns: int) -> int:
+    """Rows of a table that are gathered before they are written: a wide one's are fewer."""
+    return ROWS_WRITTEN * COLUMNS_WRITTEN // max(n_columns, COLUMNS_WRITTEN)
+
+
 def peak_bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> int:
-    """Interpreter and libraries, one batch with its temporaries, tables and a block of rows."""
+    """Interpreter and libraries, one batch with its temporaries, tables and rows to be written."""
     batch = min(lanes_at_once(n), n_states) * n * 8 * 150
     row = n_columns * 8 + 4 * n
-    if split is None:
-        return 64 * 2**20 + batch + lanes_at_once(n) * row
-    return 128 * 2**20 + batch + split.n_solves * 8 * 24 + 2**16 * row * 4
+    written = min(n_states, rows_at_once(n_columns)) * row * COPIES_WRITTEN
+    halves = 0 if split is None else split.n_solves * 8 * 24
+    return LIBRARIES + batch + written + halves

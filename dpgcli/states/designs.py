@@ -1,44 +1,23 @@
-"""Many designs at once: all states of each, and what they come to for a design."""
+"""Many designs at once: all states of each in bounded blocks, and their metrics."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Codes, Indices
 from dpgcli.mechanics.finger import ARRAYS, Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.scene import Gripper, Scene
-from dpgcli.states.columns import Column, Group, Kind
-from dpgcli.states.patterns import inverted_units
+from dpgcli.states.columns import Group
+from dpgcli.states.metrics import Metrics
+from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.rows import Columns, Wanted, solved_rows
 from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
-from dpgcli.states.solve import Status, Units, lanes_at_once
-from dpgcli.states.wells import barriers
+from dpgcli.states.solve import Units, lanes_at_once
 
-SAME_TIP = 0.01  # mm: tips are told apart on a grid of this width
-
-DESIGN_COLUMNS = (
-    Column("n_units", "", "number of units", Group.STATES, Kind.COUNT),
-    Column("n_states", "", "number of patterns", Group.STATES, Kind.COUNT),
-    Column("n_stable", "", "number of certified states", Group.STATES, Kind.COUNT),
-    Column("n_distinct_tips", "", "tips that differ by 0.01 mm", Group.STATES, Kind.COUNT),
-    Column("workspace_area_mm2", "mm²", "area of the tips' convex hull", Group.STATES),
-    Column("reach_min_mm", "mm", "smallest distance of a tip from the base", Group.STATES),
-    Column("reach_max_mm", "mm", "largest distance of a tip from the base", Group.STATES),
-    Column("aperture_min_mm", "mm", "smallest aperture of the gripper", Group.GRIPPER),
-    Column("aperture_max_mm", "mm", "largest aperture of the gripper", Group.GRIPPER),
-    Column("stiffness_min_N_per_mm", "N/mm", "softest tip direction of any state", Group.STATES),
-    Column("stiffness_max_N_per_mm", "N/mm", "stiffest tip direction of any state", Group.STATES),
-    Column(
-        "min_barrier_mJ",
-        "mJ",
-        "smallest barrier of a unit to snap or reset, bars taken as rigid",
-        Group.STATES,
-    ),
-    Column("max_residual_N", "N", "largest unbalanced force of any state", Group.STATES),
-    Column("max_tip_error_mm", "mm", "largest numerical error of any tip", Group.STATES),
-)
+ROWS_AT_ONCE = 2**15  # of one design
 
 
 @dataclass(frozen=True)
@@ -62,6 +41,17 @@ def choices(scenes: Sequence[Scene], target_error: float) -> Iterator[Choice]:
         yield Choice(RUNGS[index], places, bounds[index, places])
 
 
+class Block(NamedTuple):
+    """Rows of states of the designs at some places, equally many of each, design by design.
+
+    `metrics` has a row for each of these designs, and comes with their last states.
+    """
+
+    places: Indices
+    rows: Columns
+    metrics: Columns | None
+
+
 def design_states(
     scenes: Sequence[Scene],
     formulate: Callable[[Finger], Formulation],
@@ -69,31 +59,49 @@ def design_states(
     groups: frozenset[Group],
     *,
     drops_bars: bool = False,
-) -> tuple[Columns, Columns]:
-    """All states of some designs, design by design, and one row of metrics for each design.
+) -> Iterator[Block]:
+    """All states of some designs, design by design, in blocks.
 
-    The scenes agree in the number of units, in having rigid bars and in being grippers. If it
-    drops the bars, the error of the tips includes what that costs.
+    A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
+    depends on its number of units alone. The scenes agree in that, in having rigid bars and in
+    being grippers. If it drops the bars, the error of the tips includes what that costs.
     """
     units = Units.of(_stacked([scene.finger for scene in scenes]))
     dropped = np.zeros(len(scenes))
     if drops_bars:
         dropped = bar_flexibility(units)
         units = Units.of(units.finger.with_bars(np.inf))
+
+    def solved(designs: Indices, codes: Codes) -> Columns:
+        lanes = np.repeat(designs, len(codes))
+        inverted = np.tile(inverted_units(codes, n_units), len(designs))
+        wanted = Wanted(formulate, tolerance, groups, *_placement(scenes, lanes), dropped[lanes])
+        return solved_rows(_designs(units, lanes), inverted, wanted)
+
     n_units = units.finger.n_units
-    patterns = inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units)
-    blocks = []
+    size = lanes_at_once(n_units)
     for designs in _design_batches(len(scenes), n_units):
-        lanes = np.repeat(designs, patterns.shape[1])
-        inverted = np.tile(patterns, len(designs))
-        placement = _placement(scenes, lanes)
-        wanted = Wanted(formulate, tolerance, groups, *placement, dropped[lanes])
-        of_lanes = units.designs(lanes) if len(scenes) > 1 else units
-        blocks.append(solved_rows(of_lanes, inverted, wanted))
-    rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    if drops_bars:  # without them stiffness would be wrong
+        metrics = Metrics(_designs(units, designs), len(designs))
+        for first in range(0, 2**n_units, ROWS_AT_ONCE):
+            n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
+            parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
+            rows = _joined(parts, drops_bars=drops_bars)
+            metrics.add(rows)
+            is_last = first + n_codes == 2**n_units
+            yield Block(designs, rows, metrics.columns() if is_last else None)
+
+
+def _designs(units: Units, index: Indices) -> Units:
+    """Units of the designs at `index`; what there is one design of stays one."""
+    return units.designs(index) if units.wells.exists.shape[1] > 1 else units
+
+
+def _joined(parts: Sequence[Columns], *, drops_bars: bool) -> Columns:
+    """Rows below each other; without bars stiffness would be wrong."""
+    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    if drops_bars:
         rows |= {name: np.full_like(v, np.nan) for name, v in rows.items() if _is_stiffness(name)}
-    return rows, _metrics(rows, units, len(scenes))
+    return rows
 
 
 def _is_stiffness(name: str) -> bool:
@@ -127,55 +135,3 @@ def _placement(scenes: Sequence[Scene], lanes: Indices) -> tuple[Gripper | None,
     spacing = np.array([gripper.base_spacing for gripper in grippers])[lanes]
     angle = np.array([gripper.mounting_angle for gripper in grippers])[lanes]
     return Gripper(spacing, angle), thickness
-
-
-def _metrics(rows: Columns, units: Units, n_designs: int) -> Columns:
-    """One row per design from the rows of its states; NaN where it has no stable state."""
-    table = {name: values.reshape(n_designs, -1) for name, values in rows.items()}
-    stable = table["status"] == Status.STABLE
-    x, y = table["tip_x_mm"], table["tip_y_mm"]
-    reach = np.hypot(x, y)
-    n_tips, area = _workspace(x, y, stable)
-    metrics = {
-        "n_units": np.full(n_designs, units.finger.n_units),
-        "n_states": np.full(n_designs, stable.shape[1]),
-        "n_stable": stable.sum(axis=1),
-        "n_distinct_tips": n_tips,
-        "workspace_area_mm2": area,
-        "reach_min_mm": _least(reach, stable),
-        "reach_max_mm": _most(reach, stable),
-        "stiffness_min_N_per_mm": _least(table["tip_stiffness_min_N_per_mm"], stable),
-        "stiffness_max_N_per_mm": _most(table["tip_stiffness_max_N_per_mm"], stable),
-        "min_barrier_mJ": np.broadcast_to(barriers(units.finger, units.wells), n_designs),
-        "max_residual_N": _most(table["residual_N"], stable),
-        "max_tip_error_mm": _most(table["tip_error_mm"], stable),
-    }
-    if "aperture_mm" in table:
-        metrics["aperture_min_mm"] = _least(table["aperture_mm"], stable)
-        metrics["aperture_max_mm"] = _most(table["aperture_mm"], stable)
-    return metrics
-
-
-def _least(values: Array, stable: Flags) -> Array:
-    least = np.where(stable, values, np.inf).min(axis=1)
-    return np.where(stable.any(axis=1), least, np.nan)
-
-
-def _most(values: Array, stable: Flags) -> Array:
-    return -_least(-values, stable)
-
-
-def _workspace(x: Array, y: Array, stable: Flags) -> tuple[Indices, Array]:
-    """Number of tips told apart, and the area of their convex hull (mm²), of each design."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    n_tips, area = np.zeros(len(x), np.int64), np.zeros(len(x))
-    for design, is_stable in enumerate(stable):
-        tips = np.column_stack((x[design, is_stable], y[design, is_stable]))
-        n_tips[design] = len(set(map(tuple, np.rint(tips / SAME_TIP).tolist())))
-        if n_tips[design] > 2:
-            try:
-                area[design] = ConvexHull(tips).volume  # of a plane figure: its area
-            except QhullError:  # all in a line
-                area[design] = 0.0
-    return n_tips, area

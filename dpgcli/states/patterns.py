@@ -4,15 +4,21 @@ A code is the pattern read as a binary number, unit 1 the most significant bit, 
 sort as the texts do.
 """
 
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import reduce
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Codes, Flags
 from dpgcli.errors import NothingSelectedError, UsageError
 
 MOST_SELECTED = 2**26
+MOST_COUNTED = np.uint64(2**62)  # so that the sum of two is a number of 64 bits
+MOST_WAYS, MOST_BITS = 10_000, 10**9  # states of the automaton that matches: at most 10 s
 
 
 def chunks(n_codes: int, size: int) -> Iterator[Codes]:
@@ -46,46 +52,134 @@ def texts(inverted: Flags) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
     return digits.view(f"S{len(inverted)}").ravel()
 
 
-def select(globs: Sequence[str], n_units: int) -> Codes:
-    """Codes of all patterns that match any glob, sorted; `*` is any run, `?` either digit.
+def select(globs: Sequence[str], n_units: int) -> "Selection":
+    """All patterns that match any glob; `*` is any run, `?` either digit.
 
-    Raises UsageError for a glob that is none, or where too many patterns match, and
-    NothingSelectedError where none does.
+    Raises UsageError for a glob that is none, or where too many patterns match or there are too
+    many ways to match, and NothingSelectedError where none does.
 
-    >>> select(["1*1"], 4).tolist()
+    >>> select(["1*1"], 4).codes(0, 4).tolist()
     [9, 11, 13, 15]
     """
     for glob in globs:
         if not glob or set(glob) - set("01*?"):
             raise UsageError(
-                f"--pattern {glob!r}: expected digits 0 and 1 with wildcards * and ?, "
+                f"--pattern {shortened(glob)!r}: expected digits 0 and 1 with wildcards * and ?, "
                 f"such as {'1' * n_units} or 1*"
             )
-    found = np.unique(np.concatenate([_matches(glob, n_units) for glob in globs]))
-    if not len(found):
-        raise NothingSelectedError(f"no pattern of {n_units} units matches {', '.join(globs)}")
-    return found
+    selection = Selection(_transitions(_Globs.of(globs, n_units), n_units))
+    if not len(selection):
+        named = shortened(", ".join(globs))
+        raise NothingSelectedError(f"no pattern of {n_units} units matches {named}")
+    if len(selection) > MOST_SELECTED:
+        raise UsageError(too_many(n_units, "--pattern selects"))
+    return selection
 
 
-def _matches(glob: str, n_units: int) -> Codes:
-    """Walk the glob's automaton unit by unit; each state is a set of positions in the glob."""
-    possible = _completable(glob, n_units)
-    partial: dict[frozenset[int], Codes] = {}
-    start = _closure(glob, {0})
-    if start & possible[0]:
-        partial[start] = np.zeros(1, np.uint64)
-    for unit in range(n_units):
-        reached: dict[frozenset[int], list[Codes]] = {}
-        for positions, codes in partial.items():
-            for digit in "01":
-                after = _step(glob, positions, digit)
-                if after & possible[unit + 1]:
-                    longer = (codes << np.uint64(1)) | np.uint64(digit == "1")
-                    reached.setdefault(after, []).append(longer)
-        partial = {after: np.concatenate(parts) for after, parts in reached.items()}
-        if sum(map(len, partial.values())) > MOST_SELECTED:
-            raise UsageError(too_many(n_units, f"--pattern {glob} matches"))
-    return np.concatenate([np.empty(0, np.uint64), *partial.values()])
+class Selection:
+    """Patterns in order, made from their places when they are asked for.
+
+    `steps` has for each unit the state of an automaton that each of its states goes to by 0 and
+    by 1, −1 where nothing can match any more; the states after the last unit all match.
+    """
+
+    def __init__(self, steps: Sequence[NDArray[np.int64]]) -> None:
+        counts = [np.ones(1 + steps[-1].max(initial=-1), np.uint64)]
+        for step in reversed(steps):  # how many patterns go on from each state, none from −1
+            after = np.append(counts[-1], np.uint64(0))[step].sum(axis=1)
+            counts.append(np.minimum(after, MOST_COUNTED))
+        self.steps, self.counts = steps, [np.append(n, np.uint64(0)) for n in counts[::-1]]
+
+    def __len__(self) -> int:
+        return int(self.counts[0].sum())
+
+    def codes(self, first: int, stop: int) -> Codes:
+        """Codes of the patterns at the places first … stop − 1."""
+        place = np.arange(first, stop, dtype=np.uint64)
+        state = np.zeros(len(place), np.int64)
+        codes = np.zeros(len(place), np.uint64)
+        for step, counts in zip(self.steps, self.counts[1:], strict=True):
+            with_zero = counts[step[state, 0]]
+            is_one = place >= with_zero
+            place -= np.where(is_one, with_zero, np.uint64(0))
+            state = step[state, is_one.astype(np.int64)]
+            codes = (codes << np.uint64(1)) | is_one
+        return codes
+
+
+@dataclass(frozen=True)
+class _Globs:
+    """All globs side by side as one row of bits, a bit for each symbol and one for each end.
+
+    The set bits say where in the globs one may be; `zero` and `one` are the symbols that take
+    a digit, `star` those that take any.
+    """
+
+    start: int
+    zero: int
+    one: int
+    star: int
+    end: int
+
+    @classmethod
+    def of(cls, globs: Sequence[str], n_units: int) -> Self:
+        """Globs that differ and can match so many digits; a run of stars is one."""
+        plain = dict.fromkeys(re.sub(r"\*+", "*", glob) for glob in globs)
+        fitting = [glob for glob in plain if len(glob) - glob.count("*") <= n_units]
+        symbols = "".join(f"{glob}$" for glob in fitting)[::-1]
+
+        def at(wanted: str) -> int:
+            return int("0" + "".join("01"[symbol in wanted] for symbol in symbols), 2)
+
+        ends = at("$")
+        start = (ends << 1 | 1) & ((1 << len(symbols)) - 1)
+        return cls(start, at("0?"), at("1?"), at("*"), ends)
+
+    def without_digit(self, places: int) -> int:
+        """The places, and those behind a star that takes nothing."""
+        return places | (places & self.star) << 1
+
+    def after(self, places: int, digit: int) -> int:
+        """Where one may be after a digit."""
+        taking = self.one if digit else self.zero
+        return self.without_digit((places & taking) << 1 | (places & self.star))
+
+    def before(self, places: int) -> int:
+        """From where some digit leads to these places."""
+        found = (places >> 1) & (self.zero | self.one) | (places & self.star)
+        return found | (found >> 1) & self.star
+
+
+def _transitions(globs: _Globs, n_units: int) -> list[NDArray[np.int64]]:
+    """The automaton of `Selection`, whose states are sets of places in the globs."""
+    hopeful = [globs.end | (globs.end >> 1) & globs.star]  # from where the rest can match
+    for _ in range(n_units):
+        hopeful.append(globs.before(hopeful[-1]))
+    states = {globs.without_digit(globs.start) & hopeful.pop(): 0}
+    steps = []
+    for _ in range(n_units):
+        can_match = hopeful.pop()
+        after: dict[int, int] = {0: -1}
+        step = [
+            after.setdefault(globs.after(places, digit) & can_match, len(after) - 1)
+            for places in states
+            for digit in (0, 1)
+        ]
+        del after[0]
+        n_symbols = globs.end.bit_length()
+        if len(after) > MOST_WAYS or len(after) * n_symbols > MOST_BITS:
+            raise UsageError(
+                f"--pattern: globs of {n_symbols:,} symbols that match in {len(after):,} ways or "
+                "more: give fewer at a time, or simpler ones"
+            )
+        steps.append(np.array(step, np.int64).reshape(-1, 2))
+        states = after
+    return steps
+
+
+def shortened(text: str) -> str:
+    """A text of any length as far as a message has room for it."""
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def too_many(n_units: int, what: str) -> str:
@@ -93,42 +187,3 @@ def too_many(n_units: int, what: str) -> str:
     return (
         f"{what} more than {MOST_SELECTED:,} of the 2^{n_units} states: select fewer with --pattern"
     )
-
-
-def _closure(glob: str, positions: set[int]) -> frozenset[int]:
-    """Positions reachable without a digit: `*` may be empty."""
-    closed = set(positions)
-    for position in sorted(positions):
-        while position < len(glob) and glob[position] == "*":
-            position += 1
-            closed.add(position)
-    return frozenset(closed)
-
-
-def _step(glob: str, positions: frozenset[int], digit: str) -> frozenset[int]:
-    after = set()
-    for position in positions:
-        if position < len(glob):
-            symbol = glob[position]
-            if symbol == "*":
-                after.add(position)
-            elif symbol in ("?", digit):
-                after.add(position + 1)
-    return _closure(glob, after)
-
-
-def _completable(glob: str, n_units: int) -> list[frozenset[int]]:
-    """Per number of digits read, the positions from which the rest can still match."""
-    possible = [frozenset({len(glob)})]
-    stars = [len(glob)]
-    while stars[-1] > 0 and glob[stars[-1] - 1] == "*":
-        stars.append(stars[-1] - 1)
-    possible = [frozenset(stars)]
-    for _ in range(n_units):
-        before = frozenset(
-            position
-            for position in range(len(glob) + 1)
-            if any(_step(glob, _closure(glob, {position}), d) & possible[0] for d in "01")
-        )
-        possible.insert(0, before)
-    return possible

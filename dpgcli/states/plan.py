@@ -6,7 +6,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from dpgcli.arrays import Codes
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
@@ -17,7 +16,7 @@ from dpgcli.states.columns import Column, Group, declared, named
 from dpgcli.states.costs import peak_bytes, seconds
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
-from dpgcli.states.patterns import MOST_SELECTED, select, too_many
+from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.rows import Wanted
 from dpgcli.states.rungs import (
     DEFAULT_TOLERANCE,
@@ -78,7 +77,7 @@ class Omission:
 class Plan:
     """Decisions for one scene and request, and what they cost.
 
-    `codes` is None where all states are wanted. `residual_limit` (N) is the largest residual
+    `selection` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
     bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
     `rung` was chosen for the target error, if there is one; `error_bound` (mm) is what it
@@ -90,7 +89,7 @@ class Plan:
     units: Units
     method: Method
     split: Split | None
-    codes: Codes | None
+    selection: Selection | None
     n_states: int
     terms: tuple[str, ...]
     unknowns: int
@@ -144,8 +143,8 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         request = replace(request, tolerance=rung.tolerance)
         units = Units.of(scene.finger.with_bars(np.inf)) if rung.drops_bars else units
     finger = units.finger
-    codes = select(request.patterns, n) if request.patterns else None
-    n_states = 2**n if codes is None else len(codes)
+    selection = select(request.patterns, n) if request.patterns else None
+    n_states = 2**n if selection is None else len(selection)
     if n_states > MOST_SELECTED:
         raise UsageError(too_many(n, "the finger has"))
     formulation = FORMULATIONS[request.formulation](finger)
@@ -155,7 +154,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     dropped = rung is not None and rung.drops_bars
     columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
     groups = {column.group for column in columns}
-    split = _split(units, request, codes is None, n_states, groups)
+    split = _split(units, request, selection is None, n_states, groups)
     n_solves = n_states if split is None else split.n_solves
     return Plan(
         scene=scene,
@@ -163,7 +162,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         units=units,
         method=Method.DIRECT if split is None else Method.PAIRS,
         split=split,
-        codes=codes,
+        selection=selection,
         n_states=n_states,
         terms=terms,
         unknowns=len(formulation.reach),

@@ -109,11 +109,11 @@ def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
 
 def _batches(plan: Plan) -> Iterator[Codes]:
     size = lanes_at_once(plan.n_units)
-    if plan.codes is None:
+    if plan.selection is None:
         yield from chunks(plan.n_states, size)
         return
     for first in range(0, plan.n_states, size):
-        yield plan.codes[first : first + size]
+        yield plan.selection.codes(first, min(first + size, plan.n_states))
 
 
 def _solved(plan: Plan, codes: Codes, summary: Summary) -> Columns:

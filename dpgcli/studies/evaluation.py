@@ -18,7 +18,8 @@ from dpgcli.files.sweep.space import flattened
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared
-from dpgcli.states.designs import DESIGN_COLUMNS, choices, design_states
+from dpgcli.states.designs import choices, design_states
+from dpgcli.states.metrics import DESIGN_COLUMNS
 from dpgcli.states.rows import Columns
 
 Numbers = NDArray[Any]
@@ -91,27 +92,36 @@ class Evaluation:
         rung = () if self.target_error is None else RUNG_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
 
-    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Tables:
-        """Rows of designs numbered from `start` on, with these values by key."""
+    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Iterator[Tables]:
+        """Rows of designs numbered from `start` on, with these values by key.
+
+        One design comes in blocks of its states, the row of the design with the last.
+        """
         keep_freed_memory()
         n_designs = len(next(iter(values.values())))
         scenes: dict[int, Scene] = {}
         reasons: dict[int, str] = {}
-        allowed = self._allowed(values, n_designs)
+        allowed = self.allowed(values)
         for place in np.flatnonzero(allowed).tolist():
             changes = {key: column[place].item() for key, column in values.items()}
             try:
                 scenes[place] = variant(self.base_data, changes)
             except SpecError as error:
                 reasons[place] = "; ".join(map(_reason, error.problems))
-        solved = [part for places in _alike(scenes) for part in self._solved(places, scenes)]
         described = {
             **self._described(start, values),
             "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)], "S"),
         }
-        return Tables(
-            self._state_rows(described, solved),
-            self._design_rows(described, solved, allowed, reasons),
+        solved = (part for places in _alike(scenes) for part in self._solved(places, scenes))
+        waiting: list[_Solved] = []
+        for part in solved:
+            if part.metrics is None and n_designs == 1:
+                yield Tables(self._state_rows(described, [part]), self._no_designs)
+            else:
+                waiting.append(part)
+        yield Tables(
+            self._state_rows(described, waiting),
+            self._design_rows(described, waiting, allowed, reasons),
         )
 
     def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
@@ -121,12 +131,17 @@ class Evaluation:
         rows["status"] = np.array([DesignStatus.FAILED.value])
         return Tables(self._state_rows(described, []), rows)
 
+    @property
+    def _no_designs(self) -> Columns:
+        return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.design_columns}
+
     def _described(self, start: int, values: Mapping[str, Numbers]) -> Columns:
         numbers = np.arange(start, start + len(next(iter(values.values()))))
         return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
 
-    def _allowed(self, values: Mapping[str, Numbers], n_designs: int) -> NDArray[np.bool_]:
+    def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
+        n_designs = len(next(iter(values.values())))
         known: dict[str, Any] = flattened(dict(self.base_data)) | dict(values)
         short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
         allowed = np.ones(n_designs, bool)
@@ -138,18 +153,20 @@ class Evaluation:
     def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "Iterator[_Solved]":
         group = [scenes[place] for place in places]
         if self.target_error is None:
-            rows, metrics = design_states(group, Chain, self.tolerance, self.groups)
-            yield _Solved(np.array(places), rows, metrics)
+            for block in design_states(group, Chain, self.tolerance, self.groups):
+                yield _Solved(np.array(places)[block.places], block.rows, block.metrics)
             return
         for choice in choices(group, self.target_error):
             rung = choice.rung
             chosen = [group[place] for place in choice.places]
-            rows, metrics = design_states(
+            for block in design_states(
                 chosen, Chain, rung.tolerance, self.groups, drops_bars=rung.drops_bars
-            )
-            metrics["rung"] = np.full(len(chosen), rung.name)
-            metrics["error_bound_mm"] = choice.bounds
-            yield _Solved(np.array(places)[choice.places], rows, metrics)
+            ):
+                if block.metrics is not None:
+                    block.metrics["rung"] = np.full(len(block.places), rung.name)
+                    block.metrics["error_bound_mm"] = choice.bounds[block.places]
+                here = np.array(places)[choice.places][block.places]
+                yield _Solved(here, block.rows, block.metrics)
 
     def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
         """Rows of all groups, brought back into the order of the designs."""
@@ -178,16 +195,15 @@ class Evaluation:
         n_designs = len(described["design"])
         status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("U16")
         rows = dict(described)
+        finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
         for column in self.design_columns[len(described) + 2 :]:
             values = np.full(n_designs, EMPTY.get(column.kind, np.nan), _dtype(column.kind))
-            for part in solved:
-                values[part.places] = part.metrics[column.name]
+            for places, metrics in finished:
+                values[places] = metrics[column.name]
             rows[column.name] = values
-        for part in solved:
-            complete = part.metrics["n_stable"] == part.metrics["n_states"]
-            status[part.places] = np.where(
-                complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE
-            )
+        for places, metrics in finished:
+            complete = metrics["n_stable"] == metrics["n_states"]
+            status[places] = np.where(complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE)
         rows["status"] = status
         rows["reason"] = np.array([reasons.get(place, "") for place in range(n_designs)])
         return {column.name: rows[column.name] for column in self.design_columns}
@@ -207,11 +223,11 @@ REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TE
 
 
 class _Solved(NamedTuple):
-    """Designs at some places of a chunk: rows of their states, and metrics."""
+    """Designs at some places of a chunk: rows of their states, and, with the last, metrics."""
 
     places: Numbers
     rows: Columns
-    metrics: Columns
+    metrics: Columns | None
 
 
 def value_columns(space: Space) -> dict[str, Column]:

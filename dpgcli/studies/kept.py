@@ -12,6 +12,7 @@ from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.predict import predict
 
 STIFF_BARS = 1e3  # times the stiffest spring: where rigid bars are put back as elastic ones
+MOST_KEPT = 2**20  # states, 100 MB each time
 STATES_ONLY = Request(columns=("states",))
 
 
@@ -41,6 +42,11 @@ def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Pla
     if name not in KEEPABLE:
         raise UsageError(f"--keep {name}: expected {', '.join(KEEPABLE)}")
     plan = explain(scene, replace(STATES_ONLY, target_error=target_error))
+    if plan.n_states > MOST_KEPT:
+        raise UsageError(
+            f"--keep: all {plan.n_states:,} states would be held twice, {MOST_KEPT:,} may be: "
+            "take fewer units"
+        )
     kept = KEEPABLE[name](plan)
     if kept is None:
         others = ", ".join(other for other in KEEPABLE if KEEPABLE[other](plan) is not None)

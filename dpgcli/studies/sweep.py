@@ -2,10 +2,12 @@
 
 import hashlib
 import json
+import os
 import shlex
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
@@ -13,16 +15,16 @@ from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.files.parts import PartStore
 from dpgcli.files.spec import scene_of, spelled
-from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.differences import differences
 from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
+from dpgcli.studies.extent import Extent, size_text
+from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
-BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
 STATES, DESIGNS = "states.parquet", "designs.parquet"
 RUN, REPORT = "run.json", "report.md"
 PARTS = ".parts"
@@ -90,6 +92,7 @@ class Study:
             "dpg.schema_version": str(SCHEMA_VERSION),
             "dpg.law": scene_of(self.sweep.base).finger.law.description,
             "dpg.versions": versions(),
+            "dpg.code": HERE.code,
         }
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
         return {**said, "dpg.fingerprint": digest}
@@ -108,15 +111,12 @@ class Study:
     @property
     def chunk_size(self) -> int:
         """Designs per chunk: many states, but never so many that one waits for it."""
-        return max(1, STATES_PER_CHUNK >> self.most_units)
+        return max(1, STATES_PER_CHUNK >> self.extent.most_units)
 
-    @property
-    def most_units(self) -> int:
-        """Units of the longest finger in the space."""
-        key = "finger.units"
-        swept = [int(n) for axis in self.sweep.space.axes for n in axis.values.get(key, ())]
-        possible = [n for n in swept if 1 <= n <= MAX_UNITS]
-        return max([self.sweep.base.finger.units, *possible])
+    @cached_property
+    def extent(self) -> Extent:
+        """What the sweep takes."""
+        return Extent(self.sweep, lambda values: self.evaluation.allowed(values))
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""
@@ -146,15 +146,23 @@ class Study:
         return sum(batch["status"].to_pylist().count(DesignStatus.FAILED) for batch in batches)
 
     def check_room(self) -> None:
-        """Refuse a sweep whose tables the disk cannot hold; raises UsageError."""
+        """Refuse what memory, or the disk, cannot hold; raises UsageError."""
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        if self.extent.bytes_in_memory > memory:
+            raise UsageError(
+                f"{self.sweep.space.size:,} designs take {size_text(self.extent.bytes_in_memory)} "
+                f"of memory in their summary, and this machine has {size_text(memory)}: "
+                "take fewer values, or go on with --force"
+            )
         missing = self.store.missing([(0, self.sweep.space.size)])
         n_designs = sum(stop - start for start, stop in missing)
-        needed = 2 * (n_designs << self.most_units) * BYTES_PER_STATE
+        n_states = self.extent.n_states * n_designs // self.sweep.space.size
+        needed = self.extent.bytes_needed * n_designs // self.sweep.space.size
         free = shutil.disk_usage(_existing(self.folder)).free
         if needed > free:
             raise UsageError(
-                f"{n_designs:,} designs have about {n_designs << self.most_units:,} states, "
-                f"{_size(needed)} while they are made, and {_size(free)} are free: "
+                f"{n_designs:,} designs have about {n_states:,} states, "
+                f"{size_text(needed)} while they are made, and {size_text(free)} are free: "
                 "take fewer values or units, or go on with --force"
             )
 
@@ -177,6 +185,7 @@ class Study:
     ) -> Progress:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
+        check_workers(workplace)
         for damaged in store.damaged():
             damaged.path.unlink()
         store.say(self.metadata)
@@ -186,16 +195,17 @@ class Study:
         n_resumed = n_designs - sum(stop - start for start, stop in missing)
         progress = Progress(n_designs, n_resumed, n_resumed, workplace.n_workers)
         work = Work(evaluation, store if workplace.is_local else None)
-        runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop)))
+        runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop), HERE))
         began = perf_counter()
         for result in runner.run(chunked(missing, self.chunk_size)):
             chunk, done = result.chunk, result.value
             if done is None:
                 progress.failures.append(chunk.start)
                 tables = evaluation.failed(chunk.start, space.designs(chunk.start, chunk.stop))
-                done = work.stored(chunk, tables, 0.0)
+                done = work.stored(chunk, [tables])
             if done.content is not None:
-                store.write(chunk.start, chunk.stop, done.content)
+                with store.part(chunk.start, chunk.stop) as file:
+                    file.write(done.content)
             progress.n_states += done.n_states
             progress.core_seconds += done.core_seconds
             progress.writing_seconds += done.writing_seconds
@@ -259,15 +269,6 @@ def drop_half_written(folder: Path) -> None:
 def stores(folder: Path) -> list[PartStore]:
     """What unfinished sweeps left in a folder."""
     return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
-
-
-def _size(n_bytes: float) -> str:
-    """A number of bytes as people say it."""
-    for unit in ("bytes", "KiB", "MiB", "GiB"):
-        if n_bytes < 1024:
-            return f"{n_bytes:.2g} {unit}" if n_bytes < 10 else f"{n_bytes:.0f} {unit}"
-        n_bytes /= 1024
-    return f"{n_bytes:,.4g} TiB"
 
 
 def _existing(folder: Path) -> Path:

@@ -1,12 +1,15 @@
 """What a worker does with a chunk of designs, and what it sends back."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from time import process_time
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from dpgcli.exploration.executors import Chunk
-from dpgcli.files.parts import PartStore, encoded
+from dpgcli.files.parts import PartStore, write_part
 from dpgcli.studies.evaluation import Evaluation, Numbers, Tables
+from dpgcli.studies.maker import Maker, check_maker
 
 
 class Done(NamedTuple):
@@ -29,23 +32,43 @@ class Work:
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers]) -> Done:
-        """Evaluate a chunk's designs, with these values by key, into a part."""
-        began = process_time()
-        tables = self.evaluation(chunk.start, values)
-        return self.stored(chunk, tables, process_time() - began)
+    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> Done:
+        """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
+        check_maker(maker)
+        return self.stored(chunk, self.evaluation(chunk.start, values))
 
-    def stored(self, chunk: Chunk, tables: Tables, core_seconds: float) -> Done:
-        """Store the part, or send it along."""
+    def stored(self, chunk: Chunk, blocks: Iterable[Tables]) -> Done:
+        """Store the part as its blocks come, or send it along."""
         began = process_time()
-        n_states = len(tables.states["design"])
-        content = encoded(
-            self.evaluation.state_columns,
-            tables.states,
-            self.evaluation.design_columns,
-            tables.designs,
-        )
+        clock = _Clock()
         if self.store is None:
-            return Done(n_states, core_seconds, process_time() - began, content)
-        self.store.write(chunk.start, chunk.stop, content)
-        return Done(n_states, core_seconds, process_time() - began, None)
+            sink = BytesIO()
+            n_states = self._write(sink, clock.timed(blocks))
+            content: bytes | None = sink.getvalue()
+        else:
+            content = None
+            with self.store.part(chunk.start, chunk.stop) as file:
+                n_states = self._write(file, clock.timed(blocks))
+        return Done(n_states, clock.seconds, process_time() - began - clock.seconds, content)
+
+    def _write(self, sink: IO[bytes], blocks: Iterable[Tables]) -> int:
+        evaluation = self.evaluation
+        return write_part(sink, evaluation.state_columns, evaluation.design_columns, blocks)
+
+
+@dataclass
+class _Clock:
+    """CPU seconds that making things took, apart from what was done with them."""
+
+    seconds: float = 0.0
+
+    def timed(self, blocks: Iterable[Tables]) -> Iterator[Tables]:
+        """The blocks, as they are."""
+        blocks = iter(blocks)
+        while True:
+            began = process_time()
+            block = next(blocks, None)
+            self.seconds += process_time() - began
+            if block is None:
+                return
+            yield block

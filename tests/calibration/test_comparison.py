@@ -1,5 +1,6 @@
 """Predicted states beside known ones."""
 
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -98,6 +99,19 @@ def test_shapes_are_held_against_the_layer(reference_finger: Fingers) -> None:
     largest, rms = compare(finger, shifted, frame).shape[:, 0]
     assert largest == pytest.approx(0.3)
     assert 0.2 < rms < 0.3
+
+
+def test_a_shape_of_many_points_takes_the_memory_of_some(reference_finger: Fingers) -> None:
+    finger, patterns = reference_finger(40, 1e4), np.ones((40, 1), bool)
+    own = lattice_states(finger, patterns, Frame())
+    shape = np.repeat(own.layer[:, :, 0], 5000, axis=1)
+    known = replace(KnownStates.of_tips(patterns, own.tip), shapes=(shape,))
+    tracemalloc.start()
+    assert compare(finger, known, Frame()).shape.max() < 1e-12
+    (_, most) = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert shape.shape[1] == 210_000
+    assert most < 20 * shape.nbytes
 
 
 def test_distances_are_those_of_an_independent_search() -> None:

@@ -50,6 +50,20 @@ def test_values_come_back_from_their_own_states(
     assert found.by_key["bistable_stiffness_N_per_mm"] == 12.84
 
 
+def test_bars_are_bounded_by_the_domes_not_by_a_number_of_newtons(
+    reference_finger: Fingers,
+) -> None:
+    """A finger of micrometers and micronewtons, whose bars are a thousandth as stiff."""
+    lengths = {"segment_length": 13.5e-3, "segment_height": 10.75e-3, "stroke": 3.5e-3}
+    springs = {"bistable_stiffness": 12.84e-3, "hinge_stiffness": 24.2e-9}
+    start = reference_finger(3, 0.5, **lengths, **springs)
+    truth = {"linear_stiffness_N_per_mm": 0.2}
+    known = lattice_states(start.with_values(truth), PATTERNS, Frame())
+    tips = KnownStates.of_tips(PATTERNS, known.tip)
+    found = FingerFit(start, tips, Frame(), tuple(truth)).fit()
+    assert found.by_key["linear_stiffness_N_per_mm"] == pytest.approx(0.2, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_errors_are_those_of_noise_seen_again_and_again(reference_finger: Fingers) -> None:
     """100 fits to tips with normal errors of 0.05 mm."""

@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,7 +14,9 @@ from typing import Any
 
 import pytest
 
+import dpgcli
 from dpgcli.cli.exits import ExitCode
+from dpgcli.studies.maker import HERE
 
 pytest.importorskip("distributed")
 
@@ -145,3 +149,61 @@ def test_no_scheduler(sweep: Path) -> None:
     assert errors.startswith("dpg: --scheduler tcp://127.0.0.1:1: no scheduler or no worker")
     assert len(errors.splitlines()) == 1
     assert not (sweep / "out").exists()
+
+
+@pytest.fixture
+def add_other_worker(tmp_path: Path) -> Iterator[Callable[[str], None]]:
+    """Start workers, at an address, whose package differs by one line."""
+    shutil.copytree(Path(dpgcli.__file__).parent, tmp_path / "other" / "dpgcli")
+    with (tmp_path / "other" / "dpgcli" / "mechanics" / "laws.py").open("a") as laws:
+        laws.write("\nCHANGED = True\n")
+    processes = []
+
+    def started(address: str) -> None:
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        place = ("--local-directory", os.fspath(tmp_path / "others"))
+        command = (sys.executable, "-m", "distributed.cli.dask_worker", address, *options, *place)
+        here = {"cwd": tmp_path / "other"}  # of all folders, modules are looked for there first
+        environment = {**os.environ, "DASK_DISTRIBUTED__DIAGNOSTICS__NVML": "False"}
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        processes.append(subprocess.Popen(command, env=environment, **here, **pipes))
+        until(lambda: len(list((tmp_path / "others").rglob("*.dirlock"))) == len(processes))
+
+    yield started
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def is_refused(process: "subprocess.Popen[str]") -> bool:
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (ExitCode.USAGE, ""), errors
+    assert len(errors.splitlines()) == 1, errors
+    assert str(HERE) in errors
+    return len(set(re.findall("code ([0-9a-f]{8})", errors))) == 2
+
+
+@pytest.mark.slow
+def test_a_mixed_cluster_is_refused(
+    cluster: Cluster, sweep: Path, add_other_worker: Callable[[str], None]
+) -> None:
+    add_other_worker(cluster[0])
+    time.sleep(1)  # until the scheduler knows it
+    assert is_refused(start(sweep, *on_dask(cluster[0])))
+    assert not list((sweep / "out").rglob("*.part"))
+
+
+@pytest.mark.slow
+def test_a_worker_that_joins_later_is_held_to_the_same(
+    cluster: Cluster, sweep: Path, add_other_worker: Callable[[str], None]
+) -> None:
+    """What the others have done is kept, and is theirs alone."""
+    address, workers = cluster
+    (sweep / "sweep.yaml").write_text(SWEEP.replace("to: 3, count: 30", "to: 3, count: 600"))
+    process = start(sweep, *on_dask(address))
+    until(lambda: list((sweep / "out").rglob("*.part")))
+    add_other_worker(address)
+    for worker in workers:
+        worker.kill()  # what they had under way goes to the one that came
+    assert is_refused(process)
+    assert list((sweep / "out").rglob("*.part"))

@@ -27,6 +27,7 @@ FIRST = [
     "min_eigenvalue_N_per_mm",
     "residual_N",
 ]
+HINGE_OF_NANOMETERS = "finger.lattice.hinge_stiffness_N_mm_per_rad=24.2e-12"
 ONE_WELL = ("-s", "finger.lattice.force_linearity=0.2")
 
 
@@ -51,6 +52,19 @@ def test_the_first_columns_are_fixed(call: Call, folder: Path, form: str) -> Non
         head = text.splitlines()[0]
         names = list(json.loads(text)[0]) if form == "json" else head.replace(",", " ").split()
     assert names[: len(FIRST)] == FIRST
+
+
+def test_the_table_of_a_finger_of_nanometers_has_digits_too(call: Call, study: Any) -> None:
+    lengths = {"segment_length_mm": 13.75, "segment_height_mm": 10.75, "stroke_mm": 3.5}
+    changes = [f"finger.lattice.{key}={value * 1e-6}" for key, value in lengths.items()]
+    settings = [word for change in changes for word in ("-s", change)]
+    columns = ("--columns", "tip_x_mm,tip_y_mm", "--pattern", "111")
+    large = call("predict", study[0], "-q", *columns)
+    small = call("predict", study[0], "-q", *columns, "-s", HINGE_OF_NANOMETERS, *settings)
+    x, y = map(float, large.stdout.split()[-2:])
+    small_x, small_y = map(float, small.stdout.split()[-2:])
+    assert 1e6 * small_x == pytest.approx(x, rel=1e-5)
+    assert 1e6 * small_y == pytest.approx(y, rel=1e-5)
 
 
 @pytest.mark.parametrize("changes", [(), ONE_WELL, ("--nodes",)])
@@ -527,3 +541,15 @@ def test_a_file_of_domes_can_be_predicted_from_its_table(call: Call, folder: Pat
     again = rows_of(call, "kept.json", "--uncertainty")
     (folder / "fitted.yaml").write_text(FITTED)
     assert again == rows_of(call, "three_unit.yaml", *BY_FILE, "--uncertainty")
+
+
+@pytest.mark.parametrize(("patterns", "is_long"), [((), False), (("--pattern", "00*"), True)])
+def test_what_takes_long_is_said_before(
+    call: Call, monkeypatch: pytest.MonkeyPatch, patterns: tuple[str, ...], is_long: bool
+) -> None:
+    """The work itself is left out; `-q` says nothing."""
+    monkeypatch.setattr("dpgcli.states.predict.Prediction.blocks", lambda _: iter(()))
+    columns = ("twenty_unit.yaml", "--columns", "min_eigenvalue_N_per_mm", *patterns)
+    said = call("predict", *columns, "--format", "csv").stderr.splitlines()
+    assert said[0].startswith("262,144 states: about ") == is_long
+    assert call("predict", "-q", *columns, "--format", "csv").stderr == ""

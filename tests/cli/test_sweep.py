@@ -22,6 +22,7 @@ from dpgcli.exploration.executors import Chunk
 from dpgcli.files.output import sole_use
 from dpgcli.files.sweep import read_sweep
 from dpgcli.files.tables import read_metadata
+from dpgcli.studies.maker import HERE
 from dpgcli.studies.sweep import Study
 from dpgcli.studies.work import Work
 
@@ -352,10 +353,10 @@ def test_what_a_worker_sends_is_less_than_a_pipe_takes_at_once(sweep: Path) -> N
     study = Study(read_sweep(sweep), sweep.parent / "out")
     study.store.say({})
     values = study.sweep.space.designs(0, 6)
-    done = Work(study.evaluation, study.store)(Chunk(0, 6), values)
+    done = Work(study.evaluation, study.store)(Chunk(0, 6), values, HERE)
     assert done.n_states == 5 * 8
     assert len(pickle.dumps(done)) < select.PIPE_BUF / 4
-    assert Work(study.evaluation, None)(Chunk(0, 6), values).content is not None
+    assert Work(study.evaluation, None)(Chunk(0, 6), values, HERE).content is not None
 
 
 def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:
@@ -624,3 +625,35 @@ def test_what_is_wrong_in_a_calibration_has_its_place(call: Any, domes: Path) ->
     assert result.exit_code == ExitCode.USAGE
     assert "dome.yaml:1:1: calibration_version: expected 1" in result.stderr
     assert not (domes / "out").exists()
+
+
+def test_what_takes_long_is_said_before_it_is_begun(
+    call: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The work itself is left out; `-q` says nothing."""
+    axis = "space:\n  - {key: finger.units, values: [22, 2]}\n"
+    (folder / "long.yaml").write_text(f"base: three_unit.yaml\n{axis}")
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Study, "compute", stopped)
+    said, *_ = call("sweep", "long.yaml", "-o", "out").stderr.splitlines()
+    assert said.startswith("out: 2 designs, 4,194,308 states: about 1.5 min of one core, 960 MiB")
+    assert "of disk, 400 MiB of memory" in said
+    quiet = call("sweep", "long.yaml", "-o", "out", "-q").stderr
+    assert "about" not in quiet
+    (folder / "short.yaml").write_text(f"base: three_unit.yaml\n{axis.replace('22', '3')}")
+    assert "about" not in call("sweep", "short.yaml", "-o", "short").stderr
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_a_finger_of_more_states_than_can_be_is_refused_whatever_is_forced(
+    call: Any, folder: Path, force: tuple[str, ...]
+) -> None:
+    axis = "space:\n  - {key: finger.units, values: [2, 40]}\n"
+    (folder / "long.yaml").write_text(f"base: three_unit.yaml\n{axis}")
+    result = call("sweep", "long.yaml", "-o", "out", *force)
+    assert result.exit_code == ExitCode.USAGE
+    assert "40 units has 1,099,511,627,776 states, more than the 67,108,864" in result.stderr
+    assert not (folder / "out").exists()

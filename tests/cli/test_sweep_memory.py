@@ -44,3 +44,16 @@ def test_two_hundred_thousand_designs_stay_small(folder: Path) -> None:
         [*command, *jobs], cwd=folder, capture_output=True, text=True, timeout=900, check=True
     )
     assert int(done.stderr.split()[-1]) < LIMIT
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs procfs")
+def test_a_design_of_many_states_stays_small(folder: Path) -> None:
+    """2^18 states of one design, which all at once would take 4 GB."""
+    axis = "space:\n  - {key: finger.units, values: [18]}\n"
+    (folder / "sweep.yaml").write_text(f"base: three_unit.yaml\n{axis}")
+    command = [sys.executable, "-c", PROGRAM, "sweep", "sweep.yaml", "-o", "out", "-q", "-j", "1"]
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=900, check=True
+    )
+    assert int(done.stderr.split()[-1]) < LIMIT

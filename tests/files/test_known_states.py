@@ -1,5 +1,6 @@
 """Known states from CSV: every column, every message, and shapes by their points."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ push2_N,pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,opening1
 0.2,10,26,-6,-0.25,-0.27,3.5,0.04,1.2,
 """
 SEMICOLONS = '1: header: expected columns separated by commas, found ";" (and write decimal points)'
+HEAD = "pattern,x_mm,y_mm\n"
 SHAPES = """\
 pattern,x_mm,y_mm
 10,0,0
@@ -268,3 +270,24 @@ def test_shapes_in_another_unit(write):
     shapes = write("pattern,x_mm,y_mm\n10,0,0\n10,0.026,-0.003\n", "shapes.csv")
     with pytest.raises(SpecError, match=r"x_mm: expected shapes of a finger .* \(meters\?\)"):
         check_scale(tips, read_states(tips, 2, shapes), 27.0)
+
+
+def test_more_states_than_can_be_solved_at_once_are_refused(problems, monkeypatch):
+    monkeypatch.setattr("dpgcli.files.known_states.MOST_UNITS", 4)
+    (problem,) = problems(WHOLE)
+    assert problem.endswith("expected at most 2 states of 2 units, found 3 (a part at a time)")
+
+
+def test_many_states_and_many_points_are_read_in_time(write):
+    """Each row once, not once for each other."""
+    patterns = [f"{code:014b}" for code in range(0, 2**14, 2)]
+    states = "".join(f"{pattern},1,2\n" for pattern in patterns)
+    points = "".join(f"{pattern},{x},0\n" for x in range(4) for pattern in patterns)
+    files = (
+        write(f"pattern,tip_x_mm,tip_y_mm\n{states}"),
+        write(f"pattern,x_mm,y_mm\n{points}", "s.csv"),
+    )
+    began = time.process_time()
+    known = read_states(files[0], 14, files[1])
+    assert time.process_time() - began < 5
+    assert [shape.tolist() for shape in known.shapes] == [[[0, 1, 2, 3], [0] * 4]] * 2**13

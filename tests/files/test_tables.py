@@ -4,12 +4,14 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.files.spec import canonical_json, read_spec, scene_of
-from dpgcli.files.tables import ROWS_PER_GROUP, write_states
+from dpgcli.files.tables import record_batch, schema, write_states, write_table
+from dpgcli.states.columns import Column, Group
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 
@@ -80,11 +82,22 @@ def test_a_large_table_has_large_row_groups(tmp_path: Path) -> None:
     table = written(tmp_path / "states.parquet", "twenty_unit")
     sizes = [table.metadata.row_group(i).num_rows for i in range(table.num_row_groups)]
     assert sum(sizes) == 2**20
-    assert set(sizes[:-1]) <= {ROWS_PER_GROUP}
+    assert set(sizes[:-1]) == {2**17}
     patterns = table.read(columns=["pattern"]).column(0)
     assert patterns[0].as_py() == "0" * 20
     assert patterns[2**20 - 1].as_py() == "1" * 20
     assert len(patterns.unique()) == 2**20
+
+
+def test_a_wide_table_has_row_groups_of_fewer_rows(tmp_path: Path) -> None:
+    """What is gathered before it is written has a bound in bytes, not in rows."""
+    columns = tuple(Column(f"x{i}", "", "a number", Group.NODES) for i in range(320))
+    rows = {column.name: np.zeros(40_000) for column in columns}
+    batches = [record_batch(columns, rows)]
+    write_table(tmp_path / "wide.parquet", schema(columns), batches, {})
+    metadata = pq.read_metadata(tmp_path / "wide.parquet")
+    sizes = [metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)]
+    assert sizes == [2**17 // 10] * 3 + [40_000 - 3 * (2**17 // 10)]
 
 
 def test_a_column_of_truths_reads_back(tmp_path: Path) -> None:

@@ -49,6 +49,17 @@ def test_places_in_the_text_figure() -> None:
     assert text_figure([]) == []
 
 
+@pytest.mark.parametrize("scale", [1e-18, 1.0, 1e9])
+def test_what_is_exact_is_drawn_below_everything_else(scale: float) -> None:
+    """Also where all errors are far below those of a finger in millimeters."""
+    rows = [row("exact", 0.0, 1e-3), row("fine", 1e-3 * scale, 1e-5), row("rough", scale, 1e-6)]
+    places = {
+        mark: next(i for i, line in enumerate(text_figure(rows)) if f"{mark}" in line[7:])
+        for mark in "abc"
+    }
+    assert places["c"] < places["b"] < places["a"]
+
+
 def test_the_models_error_is_a_line_above_the_points() -> None:
     model = {**row("model", 3.0, 1.0), "group": "model"}
     lines = text_figure([*ROWS, model])

@@ -164,6 +164,11 @@ def test_what_is_not_left_out_cannot_be_put_back(name: str, scene: Scene) -> Non
         Bench(scene, 1, (name,)).check()
 
 
+def test_more_states_than_can_be_held_twice_are_not_put_back() -> None:
+    with pytest.raises(UsageError, match=r"2,097,152 states .* 1,048,576"):
+        Bench(Scene(finger(21), ()), 1, ("whole-fingers",)).check()
+
+
 def test_the_growth_goes_through_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     """Long fingers are measured in the way that predict takes them."""
     monkeypatch.setattr(module, "GROWTH_UNITS", (2, 13))

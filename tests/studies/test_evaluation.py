@@ -49,13 +49,16 @@ def test_metrics_follow_from_the_states(study: Any, tables: Any, base: str) -> N
     assert set(states["design"]) == set(metrics.index[metrics["status"] == "stable"])
     for number, rows in states[states["status"] == "stable"].groupby("design"):
         row = metrics.loc[number]
+        length = rows["tip_x_mm"][rows["pattern"].str.count("1") == 0].item()
         tips = list(zip(rows["tip_x_mm"], rows["tip_y_mm"], strict=True))
         reach = [float(np.hypot(x, y)) for x, y in tips]
         expected = {
             "n_units": len(rows["pattern"].iloc[0]),
             "n_states": 2 ** row["n_units"],
             "n_stable": len(rows),
-            "n_distinct_tips": len({(round(x / 0.01), round(y / 0.01)) for x, y in tips}),
+            "n_distinct_tips": len(
+                {(round(x / length * 1e4), round(y / length * 1e4)) for x, y in tips}
+            ),
             "reach_min_mm": min(reach),
             "reach_max_mm": max(reach),
             "stiffness_min_N_per_mm": min(rows["tip_stiffness_min_N_per_mm"]),

@@ -12,6 +12,7 @@ import pytest
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Workplace, processes, serial
 from dpgcli.studies import sweep as studies
+from dpgcli.studies.extent import BYTES_PER_STATE
 from dpgcli.studies.sweep import Progress, Shard, Study, assemble, stores
 
 AXES = (
@@ -267,7 +268,7 @@ def test_what_is_done_needs_no_room_again(study: Any, monkeypatch: pytest.Monkey
     """A sweep stopped by a full disk must not be refused for room it has used already."""
     with pytest.raises(StoppedError):
         study(*AXES).compute(serial(), stopping_after(18))
-    needed = 2 * 76 * 16 * studies.BYTES_PER_STATE
+    needed = 2 * 76 * 16 * BYTES_PER_STATE
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, int(0.6 * needed)))
     study(*AXES).check_room()
 
@@ -280,7 +281,7 @@ def test_the_room_that_is_asked_for_is_enough_and_not_ten_times_too_much(
     parts = sum(part.path.stat().st_size for part in made.store.parts())
     made.assemble()
     written = sum(map(len, bytes_of(made.folder).values()))
-    asked = 2 * 300 * 8 * studies.BYTES_PER_STATE
+    asked = 2 * 300 * 8 * BYTES_PER_STATE
     assert parts + written < 10 * asked
 
 

@@ -27,7 +27,9 @@ Plot = Annotated[
 ]
 Bootstrap = Annotated[
     int,
-    typer.Option("--bootstrap", metavar="N", min=0, help="95 % intervals from N resampled fits"),
+    typer.Option(
+        "--bootstrap", metavar="N", min=0, max=100_000, help="95 % intervals from N resampled fits"
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]
 LossOption = Annotated[Loss, typer.Option("--loss", help="How residuals count")]

@@ -85,8 +85,13 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         base_path,
         (path, base_path, *base_document.files, *reader.tables),
         spec.model_dump(exclude_none=True, exclude={"base"}),
-        tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
+        tuple(map(_digest, reader.tables)),
     )
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _base(

@@ -8,7 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-MOST_POINTS = 10_000_000
+MOST_POINTS = 10_000_000  # of an axis
+MOST_NUMBERS = 25_000_000  # of all axes: they are held in memory, 8 bytes each
+MOST_KEYS = 256  # each of which is a column of both tables
+MOST_AXES = 64  # as many dimensions as an array may have
+MOST_BYTES = 2**29  # of a table as text
 Bound = Annotated[float, Field(ge=-1e18, le=1e18)]
 
 
@@ -76,7 +80,9 @@ class SweepSpec(Part):
     """A base spec and the space of designs around it."""
 
     base: str = Field(description="the path of a spec, from this file's folder")
-    space: Annotated[list[AxisSpec], Field(min_length=1)] = Field(description="a list of axes")
+    space: Annotated[list[AxisSpec], Field(min_length=1, max_length=MOST_AXES)] = Field(
+        description=f"a list of 1 to {MOST_AXES} axes"
+    )
     constraints: list[str] | None = Field(
         default=None, description="a list of expressions over keys, such as units < 6"
     )

@@ -16,7 +16,16 @@ from dpgcli.exploration.space import Axis, Range, linear, listed, logarithmic, s
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
 from dpgcli.files.spec.problems import unknown_key
-from dpgcli.files.sweep.models import MANY_KEYS, ONE_KEY, AxisSpec, Between, Sample
+from dpgcli.files.sweep.models import (
+    MANY_KEYS,
+    MOST_BYTES,
+    MOST_KEYS,
+    MOST_NUMBERS,
+    ONE_KEY,
+    AxisSpec,
+    Between,
+    Sample,
+)
 
 UNITS = "finger.units"
 
@@ -33,9 +42,21 @@ class SpaceReader:
         self.problems: list[Problem] = []
         self.tables: list[Path] = []
         self.keys: set[str] = set()
+        self.n_numbers = self.n_keys = 0
 
     def wrong(self, path: KeyPath, expected: str, found: str, hint: str = "") -> None:
         self.problems.append(self.document.problem(path, expected, found, hint))
+
+    def has_room(self, path: KeyPath, n_points: int, n_keys: int) -> bool:
+        """Count an axis in, before it is made; False, with a problem, where it is too large."""
+        self.n_numbers += n_points * n_keys
+        self.n_keys += n_keys
+        has_room = self.n_numbers <= MOST_NUMBERS and self.n_keys <= MOST_KEYS
+        if not has_room:
+            expected = f"at most {MOST_NUMBERS:,} numbers of {MOST_KEYS} keys in all axes"
+            found = f"{self.n_numbers:,} numbers of {self.n_keys:,} keys up to here"
+            self.wrong(path, expected, found, "take fewer points or keys, or several sweeps")
+        return has_room
 
     def axis(self, place: int, said: AxisSpec) -> Axis | None:
         """The axis, or None with a problem."""
@@ -49,7 +70,7 @@ class SpaceReader:
             needs = "a key beside" if said.key is None else "no key beside"
             self.wrong(path, f"{needs} {kinds[0]}", shown(said.key))
             return None
-        made = self.made(path, said, kinds[0])
+        made = self.made(path, said, kinds[0]) if self.has_room(path, *_size(said)) else None
         if made is not None:
             self.check_keys((*path, "key" if said.key else kinds[0]), list(made.values))
         return made
@@ -71,7 +92,9 @@ class SpaceReader:
             return None
         make = logarithmic if is_log else linear
         axis = make(key, between.first, between.last, between.count)
-        return Axis({key: _numbers(key, axis.values[key].tolist())})
+        values = axis.values[key]
+        is_count = key == UNITS and bool((values == np.rint(values)).all())
+        return Axis({key: values.astype(np.int64)}) if is_count else axis
 
     def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
         lengths = {key: len(values) for key, values in columns.items()}
@@ -94,6 +117,8 @@ class SpaceReader:
 
         table = self.folder / name
         try:
+            if not self.table_has_room(path, table):
+                return None
             if table.suffix == ".parquet":
                 frame = pd.read_parquet(table)
             else:
@@ -102,6 +127,8 @@ class SpaceReader:
                     frame = pd.read_csv(table, index_col=False)
         except (OSError, ValueError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
+            return None
+        if not self.has_room(path, *frame.shape):
             return None
         if frame.empty:
             self.wrong(path, "rows of finite numbers", "no rows")
@@ -119,6 +146,28 @@ class SpaceReader:
             return None
         self.tables.append(table)
         return Axis(columns)
+
+    def table_has_room(self, path: KeyPath, table: Path) -> bool:
+        """Whether a table can be read; False, with a problem, where it is too large for that.
+
+        Raises OSError and ValueError for what is no table.
+        """
+        import pyarrow.parquet as pq
+
+        if table.suffix == ".parquet":
+            with table.open("rb") as stream:
+                facts = pq.read_metadata(stream)
+            n_numbers, n_keys = facts.num_rows * facts.num_columns, facts.num_columns
+            if n_numbers > MOST_NUMBERS or n_keys > MOST_KEYS:
+                return self.has_room(path, facts.num_rows, n_keys)
+        elif (n_bytes := table.stat().st_size) > MOST_BYTES:
+            expected, found = (
+                f"at most {MOST_BYTES // 2**20} MiB of CSV",
+                f"{n_bytes // 2**20:,} MiB",
+            )
+            self.wrong(path, expected, found, "write Parquet, or several sweeps")
+            return False
+        return True
 
     def check_keys(self, path: KeyPath, keys: list[str]) -> None:
         """Keys must be known to the spec, and vary on one axis only."""
@@ -151,6 +200,16 @@ class SpaceReader:
             expected = "numeric keys, by their last part or, if two share that, in full"
             self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
+
+
+def _size(said: AxisSpec) -> tuple[int, int]:
+    """Points and keys of an axis, as far as they are known before it is made."""
+    if said.sample is not None:
+        return said.sample.count, len(said.sample.ranges)
+    if said.paired is not None:
+        return max(map(len, said.paired.values())), len(said.paired)
+    between = said.linear or said.log
+    return (between.count if between else len(said.values or ())), int(said.key is not None)
 
 
 def _numbers(key: str, values: Sequence[int | float]) -> Any:

@@ -1,10 +1,14 @@
 """Sweep files: what they say, and every mistake in them with its place."""
 
+import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
@@ -13,6 +17,9 @@ from dpgcli.files.sweep import Sweep, read_sweep
 CONFIGS = Path(__file__).parents[3] / "configs"
 HEIGHT = "finger.geometry.dome_height_mm"
 SEPARATION = "finger.geometry.unit_separation_mm"
+OF_UNIT = "finger.overrides.{}.geometry.dome_height_mm: {{from: 5, to: 6}}"
+SIXTY_FOUR = ", ".join(OF_UNIT.format(unit) for unit in range(1, 65))
+PAIRS = [(first, last) for last in range(2, 25) for first in range(1, last)][:257]
 Read = Callable[..., Sweep]
 
 
@@ -373,3 +380,87 @@ def test_ranges_beyond_every_key_are_refused_and_all_others_are_finite(read: Rea
 def test_a_text_among_numbers_is_one_problem(read: Read) -> None:
     (said,) = problems(read, f"{{key: {HEIGHT}, values: [6, tall]}}")
     assert "space.0.values.1: expected a list of numbers" in said
+
+
+def peak(work: Callable[[], object]) -> int:
+    """Bytes that are allocated at once while the work is done."""
+    tracemalloc.start()
+    work()
+    (_, most) = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return most
+
+
+@pytest.mark.parametrize(
+    ("axes", "found"),
+    [
+        (
+            (f"sample: {{method: sobol, count: 10000000, ranges: {{{SIXTY_FOUR}}}}}",),
+            "640,000,000 numbers of 64 keys",
+        ),
+        (
+            (f"sample: {{method: latin_hypercube, count: 10000000, ranges: {{{SIXTY_FOUR}}}}}",),
+            "640,000,000 numbers of 64 keys",
+        ),
+        ((f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 9000000}}}}",) * 3, "27,000,000"),
+        ((f"{{key: {HEIGHT}, log: {{from: 1, to: 2, count: 9000000}}}}",) * 3, "27,000,000"),
+    ],
+)
+def test_axes_of_too_many_numbers_are_refused_before_they_are_made(
+    read: Read, axes: tuple[str, ...], found: str
+) -> None:
+    def reading() -> None:
+        (*_, last) = problems(read, *axes)
+        assert "at most 25,000,000 numbers" in last
+        assert found in last
+
+    assert peak(reading) < 4 * 8 * 9_000_000
+
+
+def test_a_large_axis_takes_the_memory_of_its_numbers(read: Read) -> None:
+    axis = f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 1000000}}}}"
+    assert peak(lambda: read(axis)) < 3 * 8_000_000
+
+
+def test_many_keys_are_refused(read: Read) -> None:
+    columns = ", ".join(f"finger.overrides.{i}-{j}.geometry.dome_height_mm: [5]" for i, j in PAIRS)
+    assert "257 keys up to here" in problems(read, f"paired: {{{columns}}}")[0]
+
+
+def test_many_axes_are_refused(read: Read) -> None:
+    (problem,) = problems(read, *[f"{{key: {HEIGHT}, values: [5]}}"] * 65)
+    assert "a list of 1 to 64 axes" in problem
+
+
+@pytest.mark.parametrize("name", ["wide.csv", "wide.parquet"])
+def test_a_table_of_many_columns_is_one_problem(read: Read, tmp_path: Path, name: str) -> None:
+    frame = pd.DataFrame(np.ones((2, 5000)), columns=[f"column{i}" for i in range(5000)])
+    if name.endswith("csv"):
+        frame.to_csv(tmp_path / name, index=False)
+    else:
+        frame.to_parquet(tmp_path / name)
+    began = time.process_time()
+    (problem,) = problems(read, f"table: {name}")
+    assert "5,000 keys up to here" in problem
+    assert time.process_time() - began < 5
+
+
+def test_a_parquet_table_of_too_many_numbers_is_not_read(
+    read: Read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = pa.DictionaryArray.from_arrays(
+        pa.array(np.zeros(26_000_000, np.int8)), pa.array([6.5])
+    )
+    pq.write_table(pa.table({HEIGHT: values}), tmp_path / "long.parquet")
+    monkeypatch.setattr(pd, "read_parquet", lambda _: pytest.fail("read"))
+    assert "26,000,000 numbers of 1 keys" in problems(read, "table: long.parquet")[0]
+
+
+def test_a_csv_table_of_too_many_bytes_is_not_read(
+    read: Read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (tmp_path / "long.csv").open("wb") as file:
+        file.truncate(2**29 + 2**20)
+    monkeypatch.setattr(pd, "read_csv", lambda *_, **__: pytest.fail("read"))
+    (problem,) = problems(read, "table: long.csv")
+    assert "at most 512 MiB of CSV, found 513 MiB" in problem

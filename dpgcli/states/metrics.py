@@ -1,0 +1,186 @@
+"""What the states of designs come to for each design, gathered block by block."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.rows import Columns
+from dpgcli.states.solve import Status, Units, reach
+from dpgcli.states.wells import barriers
+
+TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
+CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
+CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
+
+DESIGN_COLUMNS = (
+    Column("n_units", "", "number of units", Group.STATES, Kind.COUNT),
+    Column("n_states", "", "number of patterns", Group.STATES, Kind.COUNT),
+    Column("n_stable", "", "number of certified states", Group.STATES, Kind.COUNT),
+    Column(
+        "n_distinct_tips",
+        "",
+        f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
+        Group.STATES,
+        Kind.COUNT,
+    ),
+    Column("workspace_area_mm2", "mm²", "area of the tips' convex hull", Group.STATES),
+    Column("reach_min_mm", "mm", "smallest distance of a tip from the base", Group.STATES),
+    Column("reach_max_mm", "mm", "largest distance of a tip from the base", Group.STATES),
+    Column("aperture_min_mm", "mm", "smallest aperture of the gripper", Group.GRIPPER),
+    Column("aperture_max_mm", "mm", "largest aperture of the gripper", Group.GRIPPER),
+    Column("stiffness_min_N_per_mm", "N/mm", "softest tip direction of any state", Group.STATES),
+    Column("stiffness_max_N_per_mm", "N/mm", "stiffest tip direction of any state", Group.STATES),
+    Column(
+        "min_barrier_mJ",
+        "mJ",
+        "smallest barrier of a unit to snap or reset, bars taken as rigid",
+        Group.STATES,
+    ),
+    Column("max_residual_N", "N", "largest unbalanced force of any state", Group.STATES),
+    Column("max_tip_error_mm", "mm", "largest numerical error of any tip", Group.STATES),
+)
+
+LEAST = {  # metric: what of the states it is the least of
+    "reach_min_mm": "reach",
+    "stiffness_min_N_per_mm": "tip_stiffness_min_N_per_mm",
+    "aperture_min_mm": "aperture_mm",
+}
+MOST = {
+    "reach_max_mm": "reach",
+    "stiffness_max_N_per_mm": "tip_stiffness_max_N_per_mm",
+    "max_residual_N": "residual_N",
+    "max_tip_error_mm": "tip_error_mm",
+    "aperture_max_mm": "aperture_mm",
+}
+
+
+@dataclass
+class Metrics:
+    """The row of metrics of each of some designs, from blocks of their states.
+
+    A block holds, design by design, equally many states of each. Its memory is that of a block
+    and of the distinct tips, however many states there are.
+    """
+
+    units: Units
+    n_designs: int
+    n_stable: Indices = field(init=False)
+    extremes: dict[str, Array] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.n_stable = np.zeros(self.n_designs, np.int64)
+        self.length = np.broadcast_to(reach(self.units.finger), self.n_designs)
+        self.corners: list[tuple[Indices, Array]] = []
+        self.tips = _Distinct()
+
+    def add(self, rows: Columns) -> None:
+        """Count a block's states in."""
+        table = {
+            name: rows[name].reshape(self.n_designs, -1)
+            for name in ("status", "tip_x_mm", "tip_y_mm", *LEAST.values(), *MOST.values())
+            if name in rows
+        }
+        table["reach"] = np.hypot(table["tip_x_mm"], table["tip_y_mm"])
+        stable = table.pop("status") == Status.STABLE
+        self.n_stable += stable.sum(axis=1)
+        for names, extreme, sign in ((LEAST, np.minimum, 1.0), (MOST, np.maximum, -1.0)):
+            for name, of in names.items():
+                if of in table:
+                    self._extend(name, extreme, np.where(stable, table[of], sign * np.inf))
+        self._add_tips(table["tip_x_mm"], table["tip_y_mm"], stable)
+
+    def columns(self) -> Columns:
+        """One row per design; NaN where it has no stable state."""
+        n_units = self.units.finger.n_units
+        any_stable = self.n_stable > 0
+        extremes = {n: np.where(any_stable, v, np.nan) for n, v in self.extremes.items()}
+        barrier = barriers(self.units.finger, self.units.wells)
+        return {
+            "n_units": np.full(self.n_designs, n_units),
+            "n_states": np.full(self.n_designs, 2**n_units),
+            "n_stable": self.n_stable,
+            "n_distinct_tips": self.tips.counts(self.n_designs),
+            "workspace_area_mm2": self._area(),
+            "min_barrier_mJ": np.broadcast_to(barrier, self.n_designs),
+            **extremes,
+        }
+
+    def _extend(self, name: str, extreme: Callable[..., Array], values: Array) -> None:
+        found = extreme.reduce(values, axis=1)  # type: ignore[attr-defined]
+        self.extremes[name] = extreme(self.extremes.get(name, found), found)
+
+    def _add_tips(self, x: Array, y: Array, stable: Flags) -> None:
+        owner = np.nonzero(stable)[0]
+        tips = np.column_stack((x[stable], y[stable]))
+        self.tips.add(owner, tips * (TIPS_PER_LENGTH / self.length[owner])[:, None])
+        self.corners.append(hull_corners(owner, tips))
+
+    def _area(self) -> Array:
+        """Area of each design's hull; 0 where it is narrower than rounding."""
+        import shapely
+
+        owner = np.concatenate([part[0] for part in self.corners])
+        points = np.concatenate([part[1] for part in self.corners])
+        area = np.zeros(self.n_designs)
+        if len(owner):
+            designs, hulls = _hulls(owner, points)
+            found, around = shapely.area(hulls), shapely.length(hulls)
+            rounding = 8.0 * np.finfo(float).eps * self.length[designs] * around
+            area[designs] = np.where(found > rounding, found, 0.0)
+        return area
+
+
+@dataclass
+class _Distinct:
+    """Cells of a grid that tips lie in, by design, without what repeats."""
+
+    known: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        self.waiting: list[Indices] = []
+
+    def add(self, owner: Indices, tips: Array) -> None:
+        """Tips (tip, 2) in steps of the grid, and the design of each."""
+        most = 2.0 ** (CELL_BITS - 1) - 1
+        x, y = np.clip(np.rint(tips.T), -most, most).astype(np.int64) + int(most)
+        self.waiting.append(np.unique((((owner << CELL_BITS) | x) << CELL_BITS) | y))
+        if sum(map(len, self.waiting)) > max(CELLS_AT_ONCE, len(self.known)):
+            self._join()
+
+    def counts(self, n_designs: int) -> Indices:
+        """How many cells each design's tips lie in."""
+        self._join()
+        return np.bincount(self.known >> (2 * CELL_BITS), minlength=n_designs)
+
+    def _join(self) -> None:
+        self.known = np.unique(np.concatenate((self.known, *self.waiting)))
+        self.waiting.clear()
+
+
+def hull_corners(owner: Indices, points: Array) -> tuple[Indices, Array]:
+    """The points (point, 2) that span each owner's convex hull, and the owner of each.
+
+    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
+    >>> owner, corners = hull_corners(np.zeros(5, int), square)
+    >>> sorted(set(map(tuple, corners.tolist())))
+    [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]
+    """
+    import shapely
+
+    if not len(owner):
+        return owner, points
+    designs, hulls = _hulls(owner, points)
+    corners, index = shapely.get_coordinates(hulls, return_index=True)
+    return designs[index], corners
+
+
+def _hulls(owner: Indices, points: Array) -> tuple[Indices, Array]:
+    """The owners and the hull of each one's points, whatever it comes to: polygon, line, point."""
+    import shapely
+
+    order = np.repeat(np.argsort(owner, kind="stable"), 2)  # a line needs two points
+    designs, place = np.unique(owner[order], return_inverse=True)
+    return designs, shapely.convex_hull(shapely.linestrings(points[order], indices=place))

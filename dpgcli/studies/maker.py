@@ -1,0 +1,71 @@
+"""Who makes the numbers of a sweep: versions and code, so that nobody else's are taken for them."""
+
+import hashlib
+import os
+import platform
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import dpgcli
+from dpgcli.errors import WorkplaceError
+from dpgcli.exploration.executors import Workplace
+
+NO_NUMBERS = ("accuracy", "cli", "report")  # parts of the package that no number passes through
+
+
+class Maker(NamedTuple):
+    """Versions of the package and of NumPy, and the SHA-256 of the package's code."""
+
+    dpg: str
+    numpy: str
+    code: str
+
+    def __str__(self) -> str:
+        return f"dpg {self.dpg}, NumPy {self.numpy}, code {self.code[:8]}"
+
+
+def code_of(package: Path) -> str:
+    """SHA-256 of all modules of a package that its numbers come from, their names included.
+
+    About 7 ms; not `NO_NUMBERS`, so that work on what is printed leaves finished parts as they are.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        name = path.relative_to(package)
+        if name.parts[0] not in NO_NUMBERS:
+            content = path.read_bytes()
+            digest.update(f"{name.as_posix()} {len(content)} ".encode() + content)
+    return digest.hexdigest()
+
+
+HERE = Maker(dpgcli.__version__, np.__version__, code_of(Path(dpgcli.__file__).parent))
+
+
+def here() -> Maker:
+    """Who works in this process, found when it began to: its files may have changed since."""
+    return HERE
+
+
+def check_maker(maker: Maker) -> None:
+    """Raise WorkplaceError in a worker that is not the one who is to make the numbers."""
+    if maker != HERE:
+        where = f"{platform.node()}, process {os.getpid()}, Python in {sys.prefix}"
+        raise WorkplaceError(_mixed(f"a worker ({where})", str(HERE), maker))
+
+
+def check_workers(workplace: Workplace) -> None:
+    """Ask all workers that are there; raises WorkplaceError for the first that is another."""
+    for worker, maker in workplace.ask(here).items():
+        if maker != HERE:
+            says = str(maker) if isinstance(maker, Maker) else f"another dpg, or none ({maker!r})"
+            raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE))
+
+
+def _mixed(who: str, has: str, maker: Maker) -> str:
+    return (
+        f"{who} has {has}, but this sweep is of {maker}: their numbers may differ; "
+        "install one package everywhere and restart its workers"
+    )
