@@ -1,7 +1,6 @@
 """A sweep: every design of a space, evaluated at a workplace, resumable, into two tables."""
 
-import hashlib
-import json
+import re
 import shlex
 import shutil
 from collections.abc import Callable, Sequence
@@ -11,7 +10,9 @@ from time import perf_counter
 
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
-from dpgcli.files.parts import PartStore
+from dpgcli.files.output import Mark
+from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
+from dpgcli.files.seal import is_whole
 from dpgcli.files.spec import scene_of, spelled
 from dpgcli.files.spec.models import MAX_UNITS
 from dpgcli.files.sweep import Sweep
@@ -91,8 +92,7 @@ class Study:
             "dpg.law": scene_of(self.sweep.base).finger.law.description,
             "dpg.versions": versions(),
         }
-        digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-        return {**said, "dpg.fingerprint": digest}
+        return {**said, FINGERPRINT: fingerprint(said)}
 
     @property
     def _exactness(self) -> dict[str, str]:
@@ -103,7 +103,7 @@ class Study:
     @property
     def store(self) -> PartStore:
         """Where the parts of just this sweep are kept."""
-        return PartStore(self.folder / PARTS / self.metadata["dpg.fingerprint"][:16])
+        return PartStore(self.folder / PARTS / self.metadata[FINGERPRINT][:16])
 
     @property
     def chunk_size(self) -> int:
@@ -127,10 +127,11 @@ class Study:
 
     @property
     def is_up_to_date(self) -> bool:
-        """Whether both tables are there and were made from just this."""
-        fingerprint = self.metadata["dpg.fingerprint"]
+        """Whether both tables are there, undamaged, and were made from just this."""
+        wanted = self.metadata[FINGERPRINT]
         return all(
-            read_metadata(self.folder / name).get("dpg.fingerprint") == fingerprint
+            is_whole(self.folder / name)
+            and read_metadata(self.folder / name).get(FINGERPRINT) == wanted
             for name in (STATES, DESIGNS)
         )
 
@@ -162,9 +163,11 @@ class Study:
         """Refuse to go on beside an unfinished sweep of other content; raises UsageError."""
         for store in stores(self.folder):
             if store.folder != self.store.folder:
-                changed = ", ".join(differences(store.said(), self.metadata))
+                said = store.said()
+                changed = ", ".join(differences(said, self.metadata))
+                what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
                 raise UsageError(
-                    f"{self.folder} holds an unfinished sweep that differs in {changed}: "
+                    f"{self.folder} holds an unfinished sweep {what}: "
                     "finish it as it was, take another --output, or drop it with --restart"
                 )
 
@@ -221,10 +224,12 @@ class Study:
 def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     """Join the parts of one sweep from one or more stores into its two tables, whole or not.
 
-    Raises UsageError for parts of different sweeps, gaps and overlaps.
+    Raises UsageError for damage, parts of different sweeps, gaps and overlaps.
     """
     metadata = parts_of[0].said()
     for store in parts_of:
+        if not store.said():
+            raise UsageError(f"{store.folder / SAID} is damaged: run its sweep again")
         if damaged := store.damaged():
             raise UsageError(f"{damaged[0].path} is damaged: run its sweep again")
     for store in parts_of[1:]:
@@ -244,9 +249,17 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
         write_table(folder / name, parts[0].schema(which), batches, metadata, in_thread=True)
 
 
+def outputs(folder: Path) -> tuple[tuple[Path, Mark], ...]:
+    """What a finished sweep writes into its folder."""
+    tables = ((folder / name, Mark.TABLE) for name in (STATES, DESIGNS))
+    return (*tables, (folder / RUN, Mark.FACTS), (folder / REPORT, Mark.REPORT))
+
+
 def drop_parts(folder: Path) -> None:
-    """Remove what unfinished sweeps left in a folder."""
-    shutil.rmtree(folder / PARTS, ignore_errors=True)
+    """Remove what unfinished sweeps left in a folder, and nothing of anybody else's."""
+    for path in folder.glob(f"{PARTS}/*/"):
+        if re.fullmatch("[0-9a-f]{16}", path.name):
+            PartStore(path).drop()
 
 
 def drop_half_written(folder: Path) -> None:

@@ -116,9 +116,14 @@ def test_foreign_files_among_the_parts_do_not_matter(
     with pytest.raises(StoppedError):
         study(*AXES).compute(serial(), stopping_after(6))
     folder = study(*AXES).store.folder
-    for name in (".x.part.abc.tmp", "0000000000-0000000004.part", "notes.txt", "x.part"):
+    foreign = {"0000000000-0000000004.part", "notes.txt", "x.part"}
+    for name in (".x.part.abc.tmp", *foreign):
         (folder / name).write_bytes(b"half-writ")
-    assert finish(study(*AXES)) == expected
+    made = study(*AXES)
+    made.compute(serial(), quiet)
+    made.assemble()
+    assert bytes_of(made.folder) == expected
+    assert {path.name for path in folder.iterdir()} == foreign, "and they stay"
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff"])
