@@ -102,6 +102,8 @@ def sweep(
         is_new = restart or not study.is_up_to_date
         if is_new:
             if part is None:
+                for path in study.damaged:
+                    say(f"{path} is damaged: made again")
                 check_outputs(study.sweep.files, *outputs(output))
             _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)

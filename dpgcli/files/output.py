@@ -90,9 +90,10 @@ def check_apart(paths: Iterable[Path]) -> None:
     for path in paths:
         status = path.stat() if path.exists() else None
         name = os.path.realpath(path).casefold()
-        first = seen.setdefault((status.st_dev, status.st_ino) if status else name, path)
-        if first is not path:
-            raise UsageError(f"{first}, {path}: expected names that differ")
+        key = (status.st_dev, status.st_ino) if status else name
+        if key in seen:
+            raise UsageError(f"{seen[key]}, {path}: expected names that differ")
+        seen[key] = path
 
 
 def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dpgcli.errors import UsageError
-from dpgcli.files.seal import is_sealed
+from dpgcli.files.seal import is_whole_in
 
 TEXTS = ("calibration", "status", "reason", "rung")
 COUNTS = ("design", "n_stable")
@@ -42,27 +42,25 @@ def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
 
 
 def read_undamaged(path: Path) -> Any:
-    """A Parquet file as a pyarrow Table, after a look at its seal if `dpg` wrote it.
+    """A Parquet file as a pyarrow Table, its bytes held against its seal if `dpg` wrote it.
 
     Raises UsageError for what is damaged, or no Parquet file.
     """
     try:
         with path.open("rb") as stream:  # pyarrow takes no name that is not text
-            sealed = is_sealed(stream)
-            if sealed is not False:
-                table = pq.read_table(stream)
-                is_ours = any(key.startswith(b"dpg.") for key in table.schema.metadata or ())
-                if sealed or not is_ours:
-                    _ = table.column_names  # that they are text
+            is_whole = is_whole_in(stream)
+            if is_whole is not False:  # nothing damaged is decoded
+                with pq.ParquetFile(stream, page_checksum_verification=True) as file:
+                    is_ours = b"dpg.content_sha256" in (file.metadata.metadata or {})
+                    table = file.read()
+                if is_whole or not is_ours:
+                    _ = table.column_names  # raises where they are no text
                     return table
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read {path}: not a Parquet file") from error
-    raise UsageError(
-        f"cannot read {path}: damaged, or changed by another program that kept the metadata of "
-        "dpg: make it again, or store it without them"
-    )
+    raise UsageError(f"{path} is damaged: its bytes are not those of its SHA-256; make it again")
 
 
 def _plain(path: Path, table: Any) -> pd.DataFrame:
@@ -131,9 +129,17 @@ def read_run(path: Path) -> dict[str, Any] | None:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
         raise UsageError(f"cannot read {path}: not JSON, or nested too deeply") from error
-    if not isinstance(facts, dict):
-        raise UsageError(f"{path} holds no facts of a run: expected a JSON object")
+    if not isinstance(facts, dict) or not _is_shallow(facts):
+        raise UsageError(
+            f"{path} holds no facts of a run: expected a JSON object, a few levels deep"
+        )
     return facts
+
+
+def _is_shallow(value: Any, levels: int = 8) -> bool:
+    """Whether no value is nested deeper than some levels."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return levels > 0 and all(_is_shallow(part, levels - 1) for part in parts)
 
 
 def read_record(path: Path) -> dict[str, Any]:

@@ -26,16 +26,16 @@ def seal(path: Path) -> None:
         stream.write(digest)
 
 
-def is_whole(path: Path) -> bool:
-    """Whether a file is there, sealed, and as it was sealed."""
+def is_whole(path: Path) -> bool | None:
+    """Whether a table is as it was sealed; None where there is none, or one without a seal."""
     try:
         with path.open("rb") as stream:
-            return is_sealed(stream) is True
+            return is_whole_in(stream)
     except OSError:
-        return False
+        return None
 
 
-def is_sealed(stream: BinaryIO) -> bool | None:
+def is_whole_in(stream: BinaryIO) -> bool | None:
     """Whether a table is as it was sealed; None for a file without a seal."""
     place = _place(stream)
     if place is None:

@@ -1,6 +1,5 @@
 """A sweep: every design of a space, evaluated at a workplace, resumable, into two tables."""
 
-import re
 import shlex
 import shutil
 from collections.abc import Callable, Sequence
@@ -136,6 +135,12 @@ class Study:
         )
 
     @property
+    def damaged(self) -> list[Path]:
+        """Tables that are there and were sealed, but are not as they were."""
+        tables = (self.folder / name for name in (STATES, DESIGNS))
+        return [path for path in tables if is_whole(path) is False]
+
+    @property
     def owns_all_parts(self) -> bool:
         """Whether no other sweep has unfinished parts in the folder."""
         return all(store.folder == self.store.folder for store in stores(self.folder))
@@ -257,9 +262,8 @@ def outputs(folder: Path) -> tuple[tuple[Path, Mark], ...]:
 
 def drop_parts(folder: Path) -> None:
     """Remove what unfinished sweeps left in a folder, and nothing of anybody else's."""
-    for path in folder.glob(f"{PARTS}/*/"):
-        if re.fullmatch("[0-9a-f]{16}", path.name):
-            PartStore(path).drop()
+    for store in _stores(folder):
+        store.drop()
 
 
 def drop_half_written(folder: Path) -> None:
@@ -271,7 +275,12 @@ def drop_half_written(folder: Path) -> None:
 
 def stores(folder: Path) -> list[PartStore]:
     """What unfinished sweeps left in a folder."""
-    return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
+    return [store for store in _stores(folder) if (store.folder / SAID).exists()]
+
+
+def _stores(folder: Path) -> list[PartStore]:
+    """Folders whose names are beginnings of fingerprints."""
+    return [PartStore(path) for path in sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/"))]
 
 
 def _size(n_bytes: float) -> str:

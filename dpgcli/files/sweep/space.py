@@ -117,7 +117,7 @@ class SpaceReader:
                 row = int(wrong[0]) if len(wrong) else 0
                 found = f"{shown(str(column[row]))} in row {row + 1}"
                 self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")
-            elif column.dtype.kind == "u" and numbers.max() >= 2**63:
+            elif column.dtype.kind == "u" and int(column.max()) >= 2**63:
                 found = str(column.max())
                 self.wrong(path, f"whole numbers below 2^63 in column {key}", found)
         if len(self.problems) > n_before:
