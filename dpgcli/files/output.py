@@ -20,7 +20,7 @@ class Mark(Enum):
 
     NONE = rb"(?!)"  # nothing that is there is replaced
     ANY = rb""  # whatever is there is replaced
-    TABLE = rb"dpg\.file_sha256"
+    TABLE = rb"dpg\.(content|file)_sha256"
     FACTS = rb'"written_by": "dpg '
     REPORT = rb"<!-- written by dpg -->"
     FIGURE = rb"drawn by dpg"

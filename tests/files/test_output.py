@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from dpgcli.errors import OutputError, UsageError
-from dpgcli.files.output import Mark, check_apart, check_writable, is_own, whole_file
+from dpgcli.files.output import (
+    Mark,
+    check_apart,
+    check_outputs,
+    check_writable,
+    is_own,
+    whole_file,
+)
 
 
 def names(folder: Path) -> list[str]:
@@ -240,3 +247,11 @@ def test_names_are_told_apart_by_more_than_capitals(tmp_path: Path) -> None:
     for name in ("hard", "soft"):
         with pytest.raises(UsageError, match="expected names that differ"):
             check_apart((one, tmp_path / name))
+
+
+def test_outputs_have_names_of_their_own(tmp_path: Path) -> None:
+    table, plot = tmp_path / "a.svg", tmp_path / "A.svg"
+    with pytest.raises(UsageError, match="expected names that differ"):
+        check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (plot, Mark.FIGURE))
+    check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (None, Mark.FIGURE))
+    assert names(tmp_path) == []
