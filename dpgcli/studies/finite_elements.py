@@ -122,9 +122,8 @@ def solve(deck: Path, limits: Limits) -> Output:
     """
     log, results = deck.with_suffix(".log"), deck.with_suffix(".dat")
     with _scratch(deck) as scratch:
-        _write(
-            log, f"# dpg fe, {deck.name}: words of {SOLVER}\n"
-        )  # a new file: no link, no old one
+        # a file of its own first: what stood there, or has the same inode, is not written into
+        _write(log, f"# dpg fe, {deck.name}: words of {SOLVER}\n")
         with log.open("ab") as stream:
             code = _ended(deck.stem, scratch, stream, limits, log)
         said = log.read_text(encoding="utf-8", errors="replace")

@@ -136,6 +136,8 @@ def test_a_run_that_fails_leaves_no_new_result(
     assert result.stdout == "deck/hinge.inp\n"
     assert files(folder) <= {"hinge.inp", "hinge.log", "hinge.dat", "hinge.csv"}
     assert (folder / "deck" / "hinge.csv").read_text() == before
+    fake('cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE, "--run").exit_code == ExitCode.DONE, "what it left is of dpg"
 
 
 def test_a_run_that_hangs_is_ended_with_all_it_started(call: Any, folder: Path, fake: Fake) -> None:
