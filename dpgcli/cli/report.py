@@ -21,34 +21,36 @@ def report(
     """Summarize a design space: what is best, what failed and why, where bistability ends."""
     from dpgcli.errors import UsageError
     from dpgcli.files.output import Mark, check_outputs
-    from dpgcli.files.reading import read_designs, read_run
-    from dpgcli.report.page import html, markdown
 
     kind = ".md" if output is None else output.suffix.lower()
     if kind not in KINDS:
         raise UsageError(f"--output {output}: expected a name that ends in {' or '.join(KINDS)}")
-    sources = (folder / "designs.parquet", folder / "run.json")
-    check_outputs(sources, (output, Mark.REPORT))
-    designs, units = read_designs(sources[0])
-    facts = read_run(sources[1])
-    text = (markdown if kind == ".md" else html)(designs, units, facts)
+    check_outputs((folder / "designs.parquet", folder / "run.json"), (output, Mark.REPORT))
+    _, text = _read(folder, kind)
     if output is None:
         print(text, end="")
-        return
-    _write(output, text)
+    else:
+        _write(output, text)
 
 
 def summarize(folder: Path, *, is_new: bool) -> "tuple[pd.DataFrame, str]":
     """The designs of a finished sweep and their report, written into its folder if need be."""
-    from dpgcli.files.reading import read_designs, read_run
-    from dpgcli.report.page import markdown
-
-    designs, units = read_designs(folder / "designs.parquet")
-    text = markdown(designs, units, read_run(folder / "run.json"))
+    designs, text = _read(folder, ".md")
     path = folder / "report.md"
     if is_new or not path.exists():
         _write(path, text)
     return designs, text
+
+
+def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
+    """The designs in a folder, and their report with the mark by which `dpg` knows it."""
+    from dpgcli.files.output import Mark
+    from dpgcli.files.reading import read_designs, read_run
+    from dpgcli.report.page import html, markdown
+
+    designs, units = read_designs(folder / "designs.parquet")
+    text = (markdown if kind == ".md" else html)(designs, units, read_run(folder / "run.json"))
+    return designs, f"{text}\n{Mark.REPORT.value.decode()}\n"
 
 
 def _write(path: Path, text: str) -> None:

@@ -7,12 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from dpgcli.files.output import Mark
 from dpgcli.report.maps import figures
 from dpgcli.report.requirements import Verdict
 from dpgcli.report.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
 
-MARK = Mark.REPORT.value.decode()
 MARKDOWN_SPECIALS = re.compile(r"([\\`*|<>\[\]])")
 STYLE = """
 :root { color-scheme: light dark; --text: #1a1a1a; --page: #fff; --line: #ccc; }
@@ -31,7 +29,7 @@ def markdown(
     designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None
 ) -> str:
     """A design space as GitHub-flavored Markdown; `facts` are those of the run that made it."""
-    return f"{_markdown(sections(DesignSpace(designs, units), facts))}\n{MARK}\n"
+    return _markdown(sections(DesignSpace(designs, units), facts))
 
 
 def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
@@ -43,7 +41,7 @@ def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, An
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width">\n<title>Design space</title>\n'
         f"<style>{STYLE}</style>\n</head>\n<body>\n{body}\n"
-        f"<h2>Figures</h2>\n{figures(space)}\n</body>\n</html>\n{MARK}\n"
+        f"<h2>Figures</h2>\n{figures(space)}\n</body>\n</html>\n"
     )
 
 
