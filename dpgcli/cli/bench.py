@@ -91,7 +91,7 @@ def bench(
 ) -> None:
     """Measure error against run time, beside what else there is."""
     from dpgcli.files.known_states import states_of
-    from dpgcli.files.output import check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs, check_table_name
     from dpgcli.files.spec import canonical_json, checked, read_scene, scene_of
     from dpgcli.report.precision import cheapest_way, draw_precision
     from dpgcli.studies.bench import Bench
@@ -100,10 +100,10 @@ def bench(
     if plot is not None:
         check_plot(plot)
     sources = [path for path in (spec, against, compare) if path is not None]
-    check_outputs(sources, output, record, plot)
+    outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_table_name(output)
     document = read_scene(spec, settings or ())
-    check_outputs([*sources, *document.files], output, record, plot)
+    check_outputs([*sources, *document.files], *outputs)
     content = checked(document)
     scene, said = scene_of(content), canonical_json(content)
     target = None if target_error is None else millimeters("--target-error", target_error)

@@ -120,8 +120,9 @@ def _record(verdict: "Verdict") -> dict[str, Any]:
 
     failures = [asdict(failure) for failure in verdict.failures()]
     for failure in failures:
-        found = failure["found"].items()
-        failure["found"] = {k: v if math.isfinite(v) else None for k, v in found}
+        for part in ("values", "found"):
+            numbers = failure[part].items()
+            failure[part] = {k: v if math.isfinite(v) else None for k, v in numbers}
     return {
         "requirement": verdict.requirement.text,
         "is_met": verdict.is_met,

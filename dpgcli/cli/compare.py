@@ -55,7 +55,7 @@ def compare(
     """Hold predictions against finite elements or measurements."""
     from dpgcli.calibration.comparison import columns, compare, rows
     from dpgcli.files.known_states import states_of
-    from dpgcli.files.output import check_outputs
+    from dpgcli.files.output import Mark, check_outputs
     from dpgcli.files.spec import checked, read_scene, recalibrated, scene_of
 
     document = read_scene(spec, settings or ())
@@ -67,7 +67,7 @@ def compare(
     if plot is not None:
         check_plot(plot)
         sources = [path for path in (spec, data, shapes, calibration) if path is not None]
-        check_outputs([*sources, *document.files], plot)
+        check_outputs([*sources, *document.files], (plot, Mark.FIGURE))
     found = compare(finger, known, frame)
     calibrated = None if better is None else compare(better, known, frame)
     table = rows(known, found, calibrated)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def write_depfile(path: Path, study: "Study") -> None:
     """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does."""
-    from dpgcli.files.output import check_not_read, whole_file
+    from dpgcli.files.output import Mark, check_not_read, whole_file
     from dpgcli.studies.sweep import DESIGNS, STATES
 
     check_not_read(study.sweep.files, (path,))
@@ -19,7 +19,7 @@ def write_depfile(path: Path, study: "Study") -> None:
     targets = " ".join(_escaped(study.folder / name) for name in (STATES, DESIGNS))
     sources = [_escaped(source) for source in study.sweep.files if source != Path("-")]
     text = f"{targets}: {' '.join(sources)}\n" + "".join(f"\n{source}:\n" for source in sources)
-    with whole_file(path) as temporary:
+    with whole_file(path, Mark.DEPFILE) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

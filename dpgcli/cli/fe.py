@@ -159,12 +159,12 @@ def _carry_out(
     model: "Model", spec: Path, folder: Path, limits: "Limits | None", quiet: bool
 ) -> None:
     """Write the deck, run it if wanted, and name the files on standard output."""
-    from dpgcli.files.output import check_outputs, sole_use
+    from dpgcli.files.output import Mark, check_outputs, sole_use
     from dpgcli.studies import finite_elements as studies
 
     deck, curve = studies.deck_path(model, folder), studies.curve_path(model, folder)
     with sole_use(folder):
-        check_outputs((spec,), deck, curve, deck.with_suffix(".log"), deck.with_suffix(".dat"))
+        check_outputs((spec,), *((path, Mark.ANY) for path in studies.files(deck)))
         for path in studies.write_deck(model, folder):
             say(f"{path}: removed, it came from another deck")
         if limits is None:

@@ -17,7 +17,7 @@ def init(
     import sys
 
     from dpgcli.errors import OutputError
-    from dpgcli.files.output import whole_file
+    from dpgcli.files.output import Mark, whole_file
     from dpgcli.files.spec import starter
 
     if path == Path("-"):
@@ -25,6 +25,6 @@ def init(
         return
     if os.path.lexists(path) and not force:
         raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
-    with whole_file(path) as temporary:
+    with whole_file(path, Mark.ANY) as temporary:
         temporary.write_text(starter(), encoding="utf-8")
     print(f"wrote {path}; next: dpg predict {path}", file=sys.stderr)

@@ -21,8 +21,8 @@ def merge(
 ) -> None:
     """Join shards into the tables of the whole sweep."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import sole_use
-    from dpgcli.studies.sweep import assemble, drop_half_written, drop_parts, stores
+    from dpgcli.files.output import check_outputs, sole_use
+    from dpgcli.studies.sweep import RUN, assemble, drop_half_written, outputs, stores
 
     found = []
     for folder in shards:
@@ -35,8 +35,11 @@ def merge(
         found += here
     with sole_use(output):
         drop_half_written(output)
+        check_outputs((), *(each for each in outputs(output) if each[0] != output / RUN))
         assemble(found, output)
-        drop_parts(output)  # its own, if it was one of the shards
+        for store in found:
+            if store.folder.parent.parent.samefile(output):
+                store.drop()
         designs, text = summarize(output, is_new=True)
     if not quiet:
         print(text, end="")

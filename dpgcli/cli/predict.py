@@ -104,17 +104,18 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.files.output import check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs, check_table_name
 
-    check_outputs(sources, output, plot)
-    check_outputs(sources, output, plot, None if output is None else _run_file(output))
+    run_file = None if output is None else _run_file(output)
+    outputs = ((output, Mark.TABLE), (plot, Mark.FIGURE), (run_file, Mark.FACTS))
+    check_outputs(sources, *outputs)
     check_table_name(output)
 
 
 def _run_file(output: Path) -> Path:
     """What differs between runs stands beside the table: states.parquet, states.run.json."""
     stem = output.stem if output.suffix == ".parquet" else output.name
-    return output.with_name(f"{stem}.run.json")
+    return output.parent / f"{stem}.run.json"
 
 
 def _write(

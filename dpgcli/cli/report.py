@@ -20,33 +20,41 @@ def report(
 ) -> None:
     """Summarize a design space: what is best, what failed and why, where bistability ends."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import whole_file
-    from dpgcli.files.reading import read_designs, read_run
-    from dpgcli.report.page import html, markdown
+    from dpgcli.files.output import Mark, check_outputs
 
     kind = ".md" if output is None else output.suffix.lower()
     if kind not in KINDS:
         raise UsageError(f"--output {output}: expected a name that ends in {' or '.join(KINDS)}")
-    designs, units = read_designs(folder / "designs.parquet")
-    facts = read_run(folder / "run.json")
-    text = (markdown if kind == ".md" else html)(designs, units, facts)
+    check_outputs((folder / "designs.parquet", folder / "run.json"), (output, Mark.REPORT))
+    _, text = _read(folder, kind)
     if output is None:
         print(text, end="")
-        return
-    with whole_file(output) as temporary:
-        temporary.write_bytes(text.encode(errors="backslashreplace"))
+    else:
+        _write(output, text)
 
 
 def summarize(folder: Path, *, is_new: bool) -> "tuple[pd.DataFrame, str]":
     """The designs of a finished sweep and their report, written into its folder if need be."""
-    from dpgcli.files.output import whole_file
-    from dpgcli.files.reading import read_designs, read_run
-    from dpgcli.report.page import markdown
-
-    designs, units = read_designs(folder / "designs.parquet")
-    text = markdown(designs, units, read_run(folder / "run.json"))
+    designs, text = _read(folder, ".md")
     path = folder / "report.md"
     if is_new or not path.exists():
-        with whole_file(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        _write(path, text)
     return designs, text
+
+
+def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
+    """The designs in a folder, and their report with the mark by which `dpg` knows it."""
+    from dpgcli.files.output import Mark
+    from dpgcli.files.reading import read_designs, read_run
+    from dpgcli.report.page import html, markdown
+
+    designs, units = read_designs(folder / "designs.parquet")
+    text = (markdown if kind == ".md" else html)(designs, units, read_run(folder / "run.json"))
+    return designs, f"{text}\n{Mark.REPORT.value.decode()}\n"
+
+
+def _write(path: Path, text: str) -> None:
+    from dpgcli.files.output import Mark, whole_file
+
+    with whole_file(path, Mark.REPORT) as temporary:
+        temporary.write_bytes(text.encode(errors="backslashreplace"))

@@ -51,14 +51,14 @@ def stress(
     quiet: Quiet = False,
 ) -> None:
     """Hold stiff and extreme cases against extended precision."""
-    from dpgcli.files.output import check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs, check_table_name
     from dpgcli.files.spec import scene_of
 
     check_installed("dpg stress", "mpmath")
     checked, sources = _spec(spec, settings or ())
     finger = None if checked is None else scene_of(checked).finger
     cases = _cases(finger, only or ())
-    check_outputs(sources, output)
+    check_outputs(sources, (output, Mark.TABLE))
     check_table_name(output)
     began = perf_counter()
     with patient_output():

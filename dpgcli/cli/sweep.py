@@ -85,17 +85,15 @@ def sweep(
     if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
         _start_fork_server_early()
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_appendable, sole_use
-    from dpgcli.studies.sweep import DESIGNS, STATES, drop_half_written, drop_parts
+    from dpgcli.files.output import check_outputs, sole_use
+    from dpgcli.studies.sweep import drop_half_written, drop_parts, outputs
 
     part = _shard(shard)
     _check_executor(executor, scheduler)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     study = _study(spec, settings or (), output, tolerance, target_error)
-    if summary_file is not None:
-        tables = (output / name for name in (STATES, DESIGNS))
-        check_appendable(summary_file, (*study.sweep.files, *tables))
+    _check_names(study, depfile, summary_file)
     rules = _rules(study, require or [])
     if depfile is not None:
         write_depfile(depfile, study)
@@ -104,6 +102,10 @@ def sweep(
         is_new = restart or not study.is_up_to_date
         if is_new:
             study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
+            if part is None:
+                for path in study.damaged:
+                    say(f"{path} is damaged: made again")
+                check_outputs(study.sweep.files, *outputs(output))
             _check_folder(study, restart=restart, force=force)
             if not quiet:
                 _say_before(study)
@@ -160,6 +162,19 @@ def _say_before(study: "Study") -> None:
             f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
             "memory (rough: a factor of two either way)"
         )
+
+
+def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
+    """Files of their own, none of them one that is read."""
+    from dpgcli.files.output import check_apart, check_appendable, check_not_read
+    from dpgcli.studies.sweep import outputs
+
+    written = [path for path, _ in outputs(study.folder)]
+    written += [path for path in (depfile, summary_file) if path is not None]
+    check_not_read(study.sweep.files, written)
+    check_apart(written)
+    if summary_file is not None:
+        check_appendable(summary_file, study.sweep.files)
 
 
 def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:

@@ -1,22 +1,49 @@
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and never in the place of what somebody else wrote."""
 
 import fcntl
 import os
+import re
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from enum import Enum
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
 
+ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
+
+
+class Mark(Enum):
+    """What every file of a kind has among its first or last bytes, by which it is known."""
+
+    NONE = rb"(?!)"  # nothing that is there is replaced
+    ANY = rb""  # whatever is there is replaced
+    TABLE = rb"dpg\.(content|file)_sha256"
+    FACTS = rb'"written_by": "dpg '
+    REPORT = rb"<!-- written by dpg -->"
+    FIGURE = rb"drawn by dpg"
+    CALIBRATION = rb"^made_by: dpg "
+    DEPFILE = rb"\A[^\n]*states\.parquet [^\n]*designs\.parquet:"
+    DECK = rb"\A\*\* dpg fe "
+    CURVE = rb"\A# dpg fe "
+    LOG = rb"\A# dpg fe, "
+    DISPLACEMENTS = rb"^ *displacements \(vx,vy,vz\) for set "
+
+
+Output = tuple[Path | None, Mark]
+
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
     """Give a temporary file beside `path`; sync it and rename it when all went well.
 
-    A link stays one: what it points to is written.
+    A link stays one: what it points to is written. What is there is replaced only if it is
+    empty or has the mark, and its permissions stay.
     Whatever interrupts the block leaves `path` as it was and no temporary file. Raises
-    OutputError where the file cannot be written: no folder, no permission, no space.
+    OutputError where the file cannot be written: no folder, no permission, no space, a file of
+    somebody else.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -24,6 +51,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         try:
             yield temporary
             _sync(temporary, os.O_RDWR)
+            _check_replaceable(target, mark)
             temporary.replace(target)
             _sync(target.parent, os.O_RDONLY)
         except BaseException:
@@ -34,18 +62,38 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def check_outputs(sources: Iterable[Path], *paths: Path | None) -> None:
+def is_own(path: Path, mark: Mark) -> bool:
+    """Whether a file has the mark, or nothing in it that could be lost."""
+    with path.open("rb") as stream:
+        head = stream.read(ENDS)
+        stream.seek(-min(ENDS, stream.seek(0, os.SEEK_END)), os.SEEK_END)
+        pattern = re.compile(mark.value, re.MULTILINE)
+        return not head or any(map(pattern.search, (head, stream.read())))
+
+
+def check_outputs(sources: Iterable[Path], *outputs: Output) -> None:
     """Fail before the work: files that can be written, under names of their own.
 
     Raises OutputError for what cannot be written, UsageError for one name twice or for one of
     the files that are read.
     """
-    given = [path for path in paths if path is not None]
-    for path in given:
-        check_writable(path)
-    if len({os.path.realpath(path) for path in given}) < len(given):
-        raise UsageError(f"{', '.join(map(str, given))}: expected names that differ")
-    check_not_read(sources, given)
+    given = [(path, mark) for path, mark in outputs if path is not None]
+    check_not_read(sources, [path for path, _ in given])
+    check_apart(path for path, _ in given)
+    for path, mark in given:
+        check_writable(path, mark)
+
+
+def check_apart(paths: Iterable[Path]) -> None:
+    """Raise UsageError for one file under two names, also where capitals do not count."""
+    seen: dict[tuple[int, int] | str, Path] = {}
+    for path in paths:
+        status = path.stat() if path.exists() else None
+        name = os.path.realpath(path).casefold()
+        key = (status.st_dev, status.st_ino) if status else name
+        if key in seen:
+            raise UsageError(f"{seen[key]}, {path}: expected names that differ")
+        seen[key] = path
 
 
 def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
@@ -77,12 +125,14 @@ def check_appendable(path: Path, sources: Iterable[Path]) -> None:
         raise OutputError(f"cannot write {path}: {error.strerror}") from error
 
 
-def check_writable(path: Path) -> None:
+def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:
     """Fail before the work rather than after it."""
+    target = Path(os.path.realpath(path))
     try:
         if path.is_dir():
             raise IsADirectoryError(None, "is a folder")
-        _beside(Path(os.path.realpath(path))).unlink()
+        _beside(target).unlink()
+        _check_replaceable(target, mark)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -118,8 +168,19 @@ def sole_use(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def _check_replaceable(target: Path, mark: Mark) -> None:
+    """Raise OSError for a file that is not of this program, or that its owner protects."""
+    if not target.is_file():
+        return
+    if not os.access(target, os.W_OK):
+        raise PermissionError(None, "it is write-protected")
+    if not is_own(target, mark):
+        hint = "move it away, or give another name"
+        raise FileExistsError(None, f"it is there and not of dpg; {hint}")
+
+
 def _beside(path: Path) -> Path:
-    """An empty file in the same folder, with the permissions a new file gets.
+    """An empty file in the same folder, with the permissions of the old one or of a new one.
 
     Renaming over a device or pipe would replace it, /dev/null for the whole machine.
     """
@@ -127,15 +188,28 @@ def _beside(path: Path) -> Path:
         raise OSError(None, "is a device or pipe, not a file")
     handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".tmp", dir=path.parent)
     try:
-        mask = os.umask(0)
-        os.umask(mask)
-        os.fchmod(handle, 0o666 & ~mask)
+        _permit(handle, path)
     except BaseException:
         Path(name).unlink()
         raise
     finally:
         os.close(handle)
     return Path(name)
+
+
+def _permit(handle: int, old: Path) -> None:
+    """Give a new file the permissions and, as far as one may, the owners of an old one."""
+    if not old.exists():
+        mask = os.umask(0)
+        os.umask(mask)
+        os.fchmod(handle, 0o666 & ~mask)
+        return
+    status = old.stat()
+    for owner, group in ((status.st_uid, -1), (-1, status.st_gid)):
+        with suppress(PermissionError):
+            os.fchown(handle, owner, group)
+    is_same_group = os.fstat(handle).st_gid == status.st_gid
+    os.fchmod(handle, stat.S_IMODE(status.st_mode) & (0o777 if is_same_group else 0o707))
 
 
 def _sync(path: Path, flags: int) -> None:

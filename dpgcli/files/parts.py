@@ -11,8 +11,8 @@ import os
 import re
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -20,7 +20,7 @@ from typing import IO, Any, NamedTuple
 import pyarrow as pa
 
 from dpgcli.errors import OutputError
-from dpgcli.files.output import whole_file
+from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.tables import record_batch, schema
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import Columns
@@ -28,6 +28,13 @@ from dpgcli.states.rows import Columns
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
 LENGTH = struct.Struct("<Q")
 SAID = "sweep.json"
+FINGERPRINT = "dpg.fingerprint"
+
+
+def fingerprint(said: Mapping[str, str]) -> str:
+    """The SHA-256 of what a sweep is about."""
+    rest = {key: text for key, text in said.items() if key != FINGERPRINT}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def write_part(
@@ -104,7 +111,7 @@ class PartStore:
             with scratch.open("wb") as file:
                 yield file
             name = f"{start:010d}-{stop:010d}-{_digest(scratch)}.part"
-            with whole_file(self.folder / name) as temporary:
+            with whole_file(self.folder / name, Mark.ANY) as temporary:
                 scratch.replace(temporary)
         except OSError as error:
             raise OutputError(f"cannot write {scratch}: {error.strerror or error}") from error
@@ -118,16 +125,28 @@ class PartStore:
         except OSError as error:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
-            with whole_file(self.folder / SAID) as temporary:
+            with whole_file(self.folder / SAID, Mark.ANY) as temporary:
                 temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
 
     def said(self) -> dict[str, str]:
-        """What the sweep is about; empty where that cannot be read."""
+        """What the sweep is about; empty where that cannot be read, or is damaged."""
         try:
             said = json.loads((self.folder / SAID).read_bytes())
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return {}
-        return said if isinstance(said, dict) else {}
+        if not isinstance(said, dict) or said.get(FINGERPRINT) != fingerprint(said):
+            return {}
+        return said
+
+    def drop(self) -> None:
+        """Remove what belongs to the sweep, and the folder if that was all."""
+        with suppress(OSError):
+            for path in self.folder.iterdir():
+                is_temporary = path.name.startswith(".") and path.suffix == ".tmp"
+                if is_temporary or path.name == SAID or NAME.fullmatch(path.name):
+                    path.unlink()
+            self.folder.rmdir()
+            self.folder.parent.rmdir()
 
     def parts(self) -> list[Part]:
         """Parts in order of their designs."""

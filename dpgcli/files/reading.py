@@ -1,6 +1,7 @@
 """Tables of designs and facts of runs, read back."""
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,34 +10,113 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dpgcli.errors import UsageError
+from dpgcli.files.seal import is_whole_in
 
+TEXTS = ("calibration", "status", "reason", "rung")
+COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 
 
 def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """A table of designs and the unit of each of its columns, empty where there is none.
 
-    Raises UsageError for what is no table of designs.
+    Columns are text, whole numbers or numbers, whatever types they were stored as; what is
+    neither is left out. Raises UsageError for what is damaged, or no table of designs.
     """
     if path.is_dir():
         raise UsageError(f"{path} is a folder: name the table in it, designs.parquet")
-    try:
-        with path.open("rb") as stream:  # pyarrow takes no name that is not text
-            table = pq.read_table(stream)
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
-    except pa.ArrowException as error:
-        raise UsageError(f"cannot read {path}: not a Parquet file") from error
+    table = read_undamaged(path)
     missing = [name for name in NEEDED if name not in table.column_names]
     if missing:
         raise UsageError(
             f"{path} is no table of designs: no column {', '.join(missing)}; "
             "dpg sweep writes one, designs.parquet"
         )
+    if twice := sorted({name for name in table.column_names if table.column_names.count(name) > 1}):
+        raise UsageError(f"{path}: expected each column once, found {', '.join(twice)} again")
     units = {
-        field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema
+        field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
+        for field in table.schema
     }
-    return table.to_pandas(), units
+    return _plain(path, table), units
+
+
+def read_undamaged(path: Path) -> Any:
+    """A Parquet file as a pyarrow Table, its bytes held against its seal if `dpg` wrote it.
+
+    Raises UsageError for what is damaged, or no Parquet file.
+    """
+    try:
+        with path.open("rb") as stream:  # pyarrow takes no name that is not text
+            is_whole = is_whole_in(stream)
+            if is_whole is not False:  # nothing damaged is decoded
+                with pq.ParquetFile(stream, page_checksum_verification=True) as file:
+                    is_ours = b"dpg.content_sha256" in (file.metadata.metadata or {})
+                    table = file.read()
+                if is_whole or not is_ours:
+                    _ = table.column_names  # raises where they are no text
+                    return table
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        raise UsageError(f"cannot read {path}: not a Parquet file") from error
+    raise UsageError(f"{path} is damaged: its bytes are not those of its SHA-256; make it again")
+
+
+def _plain(path: Path, table: Any) -> pd.DataFrame:
+    """The columns of three plain types."""
+    names = table.column_names
+    swept = names[names.index("design") + 1 : names.index("calibration")]
+    columns = {}
+    for name in names:
+        column = table.column(name)
+        if pa.types.is_dictionary(column.type):
+            column = column.cast(column.type.value_type)
+        kind = "text" if name in TEXTS else "whole numbers" if name in COUNTS else "numbers"
+        plain = READERS[kind](column)
+        if plain is not None:
+            columns[name] = plain
+        elif name in (*NEEDED, *swept):
+            raise UsageError(f"{path}: column {name}: expected {kind}, found {column.type}")
+    return pd.DataFrame(columns)
+
+
+def _text(column: Any) -> Any:
+    """Text, empty where there is none; None for a column of anything else."""
+    if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+        try:
+            return column.to_pandas().astype(object).fillna("")
+        except UnicodeDecodeError:
+            return None
+    numbers = _numbers(column)
+    is_empty = column.null_count == len(column) or (numbers is not None and numbers.isna().all())
+    return pd.Series([""] * len(column), dtype=object) if is_empty else None
+
+
+def _whole(column: Any) -> Any:
+    """Whole numbers, none missing; None for a column of anything else."""
+    numbers = _numbers(column)
+    if numbers is None or (numbers % 1 != 0).any() or (numbers.abs() >= 2**63).any():
+        return None
+    return numbers.astype("int64")
+
+
+def _numbers(column: Any) -> Any:
+    """Whole numbers if all are there and fit, else numbers; None for a column of neither."""
+    kind = column.type
+    if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
+        kinds = ["float64"] if column.null_count else ["int64", "float64"]
+    elif pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+        kinds = ["float64"]
+    else:
+        return None
+    for plain in kinds:
+        with suppress(pa.ArrowException):  # more than 63 bits
+            return column.cast(plain, safe=plain == "int64").to_pandas()
+    return None
+
+
+READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
 
 
 def read_run(path: Path) -> dict[str, Any] | None:
@@ -47,11 +127,19 @@ def read_run(path: Path) -> dict[str, Any] | None:
         return None
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"cannot read {path}: not JSON") from error
-    if not isinstance(facts, dict):
-        raise UsageError(f"{path} holds no facts of a run: expected a JSON object")
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"cannot read {path}: not JSON, or nested too deeply") from error
+    if not isinstance(facts, dict) or not _is_shallow(facts):
+        raise UsageError(
+            f"{path} holds no facts of a run: expected a JSON object, a few levels deep"
+        )
     return facts
+
+
+def _is_shallow(value: Any, levels: int = 8) -> bool:
+    """Whether no value is nested deeper than some levels."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return levels > 0 and all(_is_shallow(part, levels - 1) for part in parts)
 
 
 def read_record(path: Path) -> dict[str, Any]:

@@ -16,7 +16,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dpgcli import __version__
-from dpgcli.files.output import whole_file
+from dpgcli.files.output import Mark, whole_file
+from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.files.spec import spelled
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
@@ -78,28 +79,34 @@ def write_table(
     """Write record batches, as they come, to a Parquet file.
 
     The same rows give the same bytes, however they are cut into batches. Batches that may be
-    made in another thread are made `in_thread` while those before are compressed. Raises
-    OutputError, and leaves no half-written file whatever happens.
+    made in another thread are made `in_thread` while those before are compressed. The file is
+    sealed. Raises OutputError, and leaves no half-written file whatever happens.
     """
     digest = hashlib.sha256()
     groups = _hashed(_row_groups(batches, described), digest)
-    with (
-        whole_file(path) as temporary,
-        temporary.open("wb") as stream,  # pyarrow takes no name that is not text
-        pq.ParquetWriter(
-            stream,
-            described.with_metadata(metadata),
-            compression="zstd",
-            compression_level=3,
-            use_dictionary=[
-                f.name for f in described if pa.types.is_string(f.type) and f.name not in DISTINCT
-            ],
-            use_byte_stream_split=[f.name for f in described if pa.types.is_floating(f.type)],
-        ) as writer,
-    ):
-        for group in _ahead(groups) if in_thread else groups:
-            writer.write_batch(group, row_group_size=rows_at_once(len(described)))
-        writer.add_key_value_metadata({"dpg.content_sha256": digest.hexdigest()})
+    with whole_file(path, Mark.TABLE) as temporary:
+        with (
+            temporary.open("wb") as stream,  # pyarrow takes no name that is not text
+            pq.ParquetWriter(
+                stream, described.with_metadata(metadata), **_layout(described)
+            ) as writer,
+        ):
+            for group in _ahead(groups) if in_thread else groups:
+                writer.write_batch(group, row_group_size=rows_at_once(len(described)))
+            content = {"dpg.content_sha256": digest.hexdigest()}
+            writer.add_key_value_metadata({**content, KEY: UNSEALED})
+        seal(temporary)
+
+
+def _layout(described: Any) -> dict[str, Any]:
+    """How the columns of a table are packed."""
+    strings = [f.name for f in described if pa.types.is_string(f.type)]
+    return {
+        "compression": "zstd",
+        "compression_level": 3,
+        "use_dictionary": [name for name in strings if name not in DISTINCT],
+        "use_byte_stream_split": [f.name for f in described if pa.types.is_floating(f.type)],
+    }
 
 
 def read_metadata(path: Path) -> dict[str, str]:
@@ -118,8 +125,9 @@ def versions() -> str:
 
 def write_run(path: Path, facts: dict[str, Any]) -> None:
     """Write what differs between runs (times, host) beside a table."""
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    text = json.dumps({"written_by": f"dpg {__version__}", **facts}, indent=2)
+    with whole_file(path, Mark.FACTS) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:

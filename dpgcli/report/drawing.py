@@ -5,10 +5,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dpgcli.files.output import whole_file
+from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.places import shortened
 
 LONGEST_TITLE = 100
+AUTHOR = Mark.FIGURE.value.decode()
 
 
 @contextmanager
@@ -23,8 +24,8 @@ def figure_to(path: Path, width: float, height: float) -> Iterator[Any]:
         FigureCanvasAgg(figure)
         yield figure
         kind = path.suffix.lower().removeprefix(".")
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        with whole_file(path) as temporary:
+        metadata = {"svg": {"Date": None, "Creator": AUTHOR}, "png": {"Software": AUTHOR}}[kind]
+        with whole_file(path, Mark.FIGURE) as temporary:
             figure.savefig(temporary, format=kind, dpi=150, metadata=metadata)
 
 

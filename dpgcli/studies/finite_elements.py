@@ -15,11 +15,15 @@ from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.models import Model
 from dpgcli.calibration.fe.results import displacements, reported_error, version
 from dpgcli.errors import OutputError, SolverError, UsageError
-from dpgcli.files.output import whole_file
+from dpgcli.files.output import Mark, is_own, whole_file
 
 SOLVER = "ccx"
-RESULTS = (".dat", ".csv", ".log")
-OWN_DECK, OWN_CURVE = b"** dpg fe ", b"# dpg fe "  # how files of this module begin
+MARKS = {
+    ".inp": Mark.DECK,
+    ".dat": Mark.DISPLACEMENTS,
+    ".csv": Mark.CURVE,
+    ".log": Mark.LOG,
+}
 THREADS = (
     "OMP_NUM_THREADS",
     "CCX_NPROC_STIFFNESS",
@@ -55,23 +59,23 @@ def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
     _check_own(deck)
     outdated: tuple[Path, ...] = ()
     if not deck.exists() or deck.read_bytes() != model.deck.encode():
-        beside = (deck.with_suffix(suffix) for suffix in RESULTS)
-        outdated = tuple(path for path in beside if path.exists())
+        outdated = tuple(path for path in files(deck) if path.exists() and path != deck)
     for path in outdated:
         path.unlink()
     _write(deck, model.deck)
     return outdated
 
 
+def files(deck: Path) -> tuple[Path, ...]:
+    """What is written on the way from a deck to its curve."""
+    return tuple(deck.with_suffix(suffix) for suffix in MARKS)
+
+
 def _check_own(deck: Path) -> None:
     """Nobody else's files are overwritten or removed."""
-    curve = deck.with_suffix(".csv")
-    is_own = deck.exists() and deck.read_bytes().startswith(OWN_DECK)
-    foreign = [] if is_own else [deck, *(deck.with_suffix(suffix) for suffix in RESULTS)]
-    if is_own and curve.exists() and not curve.read_bytes().startswith(OWN_CURVE):
-        foreign = [curve]
-    if there := [str(path) for path in foreign if path.exists()]:
-        raise UsageError(f"{', '.join(there)}: not of dpg fe, give another folder")
+    there = [path for path in files(deck) if path.exists()]
+    if foreign := [str(path) for path in there if not is_own(path, MARKS[path.suffix])]:
+        raise UsageError(f"{', '.join(foreign)}: not of dpg fe, give another folder")
 
 
 def run(model: Model, folder: Path, limits: Limits) -> str:
@@ -106,7 +110,7 @@ def curve_path(model: Model, folder: Path) -> Path:
 
 
 def _write(path: Path, text: str) -> None:
-    with whole_file(path) as temporary:
+    with whole_file(path, MARKS[path.suffix]) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
@@ -118,14 +122,18 @@ def solve(deck: Path, limits: Limits) -> Output:
     """
     log, results = deck.with_suffix(".log"), deck.with_suffix(".dat")
     with _scratch(deck) as scratch:
-        with log.open("wb") as stream:
+        # a file of its own first: what stood there, or has the same inode, is not written into
+        _write(log, f"# dpg fe, {deck.name}: words of {SOLVER}\n")
+        with log.open("ab") as stream:
             code = _ended(deck.stem, scratch, stream, limits, log)
         said = log.read_text(encoding="utf-8", errors="replace")
         printed = scratch / results.name
         if code != 0 or not printed.exists():
             raise SolverError(_failure(code, said, log))
         text = printed.read_text(encoding="utf-8", errors="replace")
-        printed.replace(results)
+        if is_own(printed, Mark.DISPLACEMENTS):
+            with whole_file(results, Mark.DISPLACEMENTS) as temporary:
+                shutil.copyfile(printed, temporary)
     return Output(text, said)
 
 

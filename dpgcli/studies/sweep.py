@@ -1,7 +1,5 @@
 """A sweep: every design of a space, evaluated at a workplace, resumable, into two tables."""
 
-import hashlib
-import json
 import os
 import shlex
 import shutil
@@ -13,7 +11,9 @@ from time import perf_counter
 
 from dpgcli.errors import UsageError
 from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
-from dpgcli.files.parts import PartStore
+from dpgcli.files.output import Mark
+from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
+from dpgcli.files.seal import is_whole
 from dpgcli.files.spec import scene_of, spelled
 from dpgcli.files.sweep import Sweep
 from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
@@ -94,8 +94,7 @@ class Study:
             "dpg.versions": versions(),
             "dpg.code": HERE.code,
         }
-        digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-        return {**said, "dpg.fingerprint": digest}
+        return {**said, FINGERPRINT: fingerprint(said)}
 
     @property
     def _exactness(self) -> dict[str, str]:
@@ -106,7 +105,7 @@ class Study:
     @property
     def store(self) -> PartStore:
         """Where the parts of just this sweep are kept."""
-        return PartStore(self.folder / PARTS / self.metadata["dpg.fingerprint"][:16])
+        return PartStore(self.folder / PARTS / self.metadata[FINGERPRINT][:16])
 
     @property
     def chunk_size(self) -> int:
@@ -127,12 +126,19 @@ class Study:
 
     @property
     def is_up_to_date(self) -> bool:
-        """Whether both tables are there and were made from just this."""
-        fingerprint = self.metadata["dpg.fingerprint"]
+        """Whether both tables are there, undamaged, and were made from just this."""
+        wanted = self.metadata[FINGERPRINT]
         return all(
-            read_metadata(self.folder / name).get("dpg.fingerprint") == fingerprint
+            is_whole(self.folder / name)
+            and read_metadata(self.folder / name).get(FINGERPRINT) == wanted
             for name in (STATES, DESIGNS)
         )
+
+    @property
+    def damaged(self) -> list[Path]:
+        """Tables that are there and were sealed, but are not as they were."""
+        tables = (self.folder / name for name in (STATES, DESIGNS))
+        return [path for path in tables if is_whole(path) is False]
 
     @property
     def owns_all_parts(self) -> bool:
@@ -170,9 +176,11 @@ class Study:
         """Refuse to go on beside an unfinished sweep of other content; raises UsageError."""
         for store in stores(self.folder):
             if store.folder != self.store.folder:
-                changed = ", ".join(differences(store.said(), self.metadata))
+                said = store.said()
+                changed = ", ".join(differences(said, self.metadata))
+                what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
                 raise UsageError(
-                    f"{self.folder} holds an unfinished sweep that differs in {changed}: "
+                    f"{self.folder} holds an unfinished sweep {what}: "
                     "finish it as it was, take another --output, or drop it with --restart"
                 )
 
@@ -231,10 +239,12 @@ class Study:
 def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     """Join the parts of one sweep from one or more stores into its two tables, whole or not.
 
-    Raises UsageError for parts of different sweeps, gaps and overlaps.
+    Raises UsageError for damage, parts of different sweeps, gaps and overlaps.
     """
     metadata = parts_of[0].said()
     for store in parts_of:
+        if not store.said():
+            raise UsageError(f"{store.folder / SAID} is damaged: run its sweep again")
         if damaged := store.damaged():
             raise UsageError(f"{damaged[0].path} is damaged: run its sweep again")
     for store in parts_of[1:]:
@@ -254,9 +264,16 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
         write_table(folder / name, parts[0].schema(which), batches, metadata, in_thread=True)
 
 
+def outputs(folder: Path) -> tuple[tuple[Path, Mark], ...]:
+    """What a finished sweep writes into its folder."""
+    tables = ((folder / name, Mark.TABLE) for name in (STATES, DESIGNS))
+    return (*tables, (folder / RUN, Mark.FACTS), (folder / REPORT, Mark.REPORT))
+
+
 def drop_parts(folder: Path) -> None:
-    """Remove what unfinished sweeps left in a folder."""
-    shutil.rmtree(folder / PARTS, ignore_errors=True)
+    """Remove what unfinished sweeps left in a folder, and nothing of anybody else's."""
+    for store in _stores(folder):
+        store.drop()
 
 
 def drop_half_written(folder: Path) -> None:
@@ -268,7 +285,12 @@ def drop_half_written(folder: Path) -> None:
 
 def stores(folder: Path) -> list[PartStore]:
     """What unfinished sweeps left in a folder."""
-    return [PartStore(path.parent) for path in sorted(folder.glob(f"{PARTS}/*/sweep.json"))]
+    return [store for store in _stores(folder) if (store.folder / SAID).exists()]
+
+
+def _stores(folder: Path) -> list[PartStore]:
+    """Folders whose names are beginnings of fingerprints."""
+    return [PartStore(path) for path in sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/"))]
 
 
 def _existing(folder: Path) -> Path:

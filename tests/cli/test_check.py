@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -105,6 +106,57 @@ def test_json_lists_all_and_has_no_nan(call: Call, table: str) -> None:
         "reason": "",
     }
     assert verdict["failing"][-1]["found"] == {"area_mm2": None}
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("-inf"), float("nan")])
+def test_json_has_no_number_that_is_none(
+    call: Call, folder: Path, table: str, value: float
+) -> None:
+    """Among swept values, as of rigid bars, and among what was found."""
+    columns = pq.read_table(folder / table).to_pydict()
+    for name in ("height_mm", "area_mm2"):
+        columns[name] = [value] * N_DESIGNS
+    pq.write_table(pa.table(columns), folder / "designs.parquet")
+    result = call("check", table, "--require", "area_mm2 == 1", "--format", "json")
+    (verdict,) = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(name))
+    assert verdict["failing"][0]["values"] == {"height_mm": None}
+    assert verdict["failing"][0]["found"] == {"area_mm2": None}
+
+
+@pytest.mark.parametrize("form", ["text", "json", "github"])
+def test_a_table_of_a_sweep_that_went_through_csv(call: Call, folder: Path, form: str) -> None:
+    sweep = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\n"
+    (folder / "sweep.yaml").write_text(sweep)
+    assert call("sweep", "sweep.yaml", "-q", "-o", "out", "-j", "1").exit_code == 0
+    rules = ("--require", "n_stable > 2", "--format", form)
+    before = call("check", "out/designs.parquet", *rules)
+    pd.read_parquet(folder / "out" / "designs.parquet").to_csv(folder / "t.csv", index=False)
+    pd.read_csv(folder / "t.csv").to_parquet(folder / "t.parquet")
+    after = call("check", "t.parquet", *rules)
+    assert before.exit_code == after.exit_code == ExitCode.REQUIREMENT
+    assert before.stdout == after.stdout != ""
+
+
+def test_a_damaged_table_is_no_table(call: Call, folder: Path) -> None:
+    sweep = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\n"
+    (folder / "sweep.yaml").write_text(sweep)
+    run = ("sweep", "sweep.yaml", "-o", "out", "-j", "1")
+    assert call(*run).exit_code == 0
+    path = folder / "out" / "designs.parquet"
+    content = path.read_bytes()
+    path.write_bytes(content[:50] + bytes([content[50] ^ 1]) + content[51:])
+    for command in (
+        ("check", "out/designs.parquet", "--require", "n_stable > 0"),
+        ("report", "out"),
+    ):
+        result = call(*command)
+        assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
+        assert "out/designs.parquet is damaged" in result.stderr
+    again = call(*run)
+    assert again.exit_code == 0
+    assert "dpg" not in again.stderr.splitlines()[0]
+    assert again.stderr.startswith("out/designs.parquet is damaged: made again\n")
+    assert path.read_bytes() == content
 
 
 def test_github_shows_nine_and_how_many_more(call: Call, table: str) -> None:

@@ -28,7 +28,7 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
 
     def placed(script: str) -> dict[str, str]:
         programs = tmp_path / "programs"
-        programs.mkdir()
+        programs.mkdir(exist_ok=True)
         path = programs / "ccx"
         path.write_text(f"#!/bin/sh\n{script}\n")
         path.chmod(path.stat().st_mode | stat.S_IXUSR)
@@ -94,7 +94,9 @@ def test_a_run_writes_curve_results_and_log(call: Any, folder: Path, fake: Fake)
     assert result.stdout == "deck/hinge.inp\ndeck/hinge.csv\n"
     assert result.stderr.startswith("Moment over rotation at 0.1 rad: 49.75 N mm/rad. (")
     assert files(folder) == {"hinge.inp", "hinge.dat", "hinge.log", "hinge.csv"}
-    assert (folder / "deck" / "hinge.log").read_text() == "CalculiX Version 2.99, by 3\n"
+    first, *said = (folder / "deck" / "hinge.log").read_text().splitlines()
+    assert first == "# dpg fe, hinge.inp: words of ccx"
+    assert said == ["CalculiX Version 2.99, by 3"]
     text = (folder / "deck" / "hinge.csv").read_text()
     assert "CalculiX 2.99" in text.splitlines()[0]
     curve = rows(folder / "deck" / "hinge.csv")
@@ -134,6 +136,8 @@ def test_a_run_that_fails_leaves_no_new_result(
     assert result.stdout == "deck/hinge.inp\n"
     assert files(folder) <= {"hinge.inp", "hinge.log", "hinge.dat", "hinge.csv"}
     assert (folder / "deck" / "hinge.csv").read_text() == before
+    fake('cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE, "--run").exit_code == ExitCode.DONE, "what it left is of dpg"
 
 
 def test_a_run_that_hangs_is_ended_with_all_it_started(call: Any, folder: Path, fake: Fake) -> None:
@@ -206,6 +210,44 @@ def test_files_of_somebody_else_are_not_touched(call: Any, folder: Path, name: s
     assert f"deck/{name}: not of dpg fe, give another folder" in result.stderr
     assert files(folder) == {name}
     assert (folder / "deck" / name).read_text() == "measured with care"
+
+
+@pytest.mark.parametrize("kind", ["symlink_to", "hardlink_to"])
+@pytest.mark.parametrize("suffix", [".log", ".dat", ".csv"])
+def test_nothing_is_written_through_a_link(
+    call: Any, folder: Path, fake: Fake, kind: str, suffix: str
+) -> None:
+    prepared(folder)
+    fake('echo "CalculiX Version 2.99"; cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE).exit_code == ExitCode.DONE
+    (folder / "notes").write_text("measured with care")
+    link = folder / "deck" / f"hinge{suffix}"
+    getattr(link, kind)(folder / "notes")
+    assert call(*HINGE, "--run").exit_code == ExitCode.USAGE
+    assert call(*HINGE, "--run", "--moment", "4").exit_code == ExitCode.USAGE
+    assert (folder / "notes").read_text() == "measured with care"
+
+
+def test_results_of_a_run_keep_their_modes_and_break_links(
+    call: Any, folder: Path, fake: Fake
+) -> None:
+    prepared(folder)
+    fake('echo "CalculiX Version 2.99"; cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE, "--run").exit_code == ExitCode.DONE
+    kept = {}
+    for path in (folder / "deck").iterdir():
+        path.chmod(0o600)
+        os.link(path, folder / f"kept{path.suffix}")
+        kept[path.suffix] = (path.stat().st_ino, path.read_bytes())
+    fake('echo "CalculiX Version 3.01"; cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE, "--run").exit_code == ExitCode.DONE
+    assert len(kept) == 4
+    for suffix, (inode, content) in kept.items():
+        path = folder / "deck" / f"hinge{suffix}"
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        assert path.stat().st_ino != inode
+        assert (folder / f"kept{suffix}").read_bytes() == content
+    assert "3.01" in (folder / "deck" / "hinge.log").read_text()
 
 
 def test_a_measured_curve_beside_the_deck_stays(call: Any, folder: Path) -> None:

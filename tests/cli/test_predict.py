@@ -293,6 +293,8 @@ def test_a_table_comes_with_its_run(call: Call, folder: Path) -> None:
 
 def test_files_get_the_permissions_of_new_files(run: Any, folder: Path) -> None:
     for mask, mode in ((0o077, 0o600), (0o022, 0o644)):
+        for path in folder.glob("states.*"):
+            path.unlink()
         result = run("predict", "-q", "three_unit.yaml", "-o", "states.parquet", umask=mask)
         assert result.returncode == 0
         for name in ("states.parquet", "states.run.json"):

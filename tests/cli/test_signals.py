@@ -78,13 +78,14 @@ def test_an_interrupt_while_writing_leaves_nothing(
 def test_an_interrupt_leaves_the_old_table_as_it_was(
     start: Any, folder: Path, number: int, code: int, word: str
 ) -> None:
-    (folder / "states.parquet").write_bytes(b"old")
+    old = b"a table of dpg, see dpg.file_sha256"
+    (folder / "states.parquet").write_bytes(old)
     process = start(*WRITING)
     wait_until(is_writing(folder), process)
     process.send_signal(number)
     process.communicate(timeout=30)
     assert process.returncode == code
-    assert (folder / "states.parquet").read_bytes() == b"old"
+    assert (folder / "states.parquet").read_bytes() == old
     assert not list(folder.glob(".states*"))
 
 

@@ -6,8 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from dpgcli.errors import OutputError
-from dpgcli.files.output import check_writable, whole_file
+from dpgcli.errors import OutputError, UsageError
+from dpgcli.files.output import (
+    Mark,
+    check_apart,
+    check_outputs,
+    check_writable,
+    is_own,
+    whole_file,
+)
 
 
 def names(folder: Path) -> list[str]:
@@ -102,4 +109,149 @@ def test_an_interrupt_while_the_file_is_made_leaves_nothing(
     monkeypatch.setattr("os.fchmod", interrupted)
     with pytest.raises(KeyboardInterrupt), whole_file(tmp_path / "table.txt"):
         pass
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path, mode: int) -> None:
+    path = tmp_path / "table.txt"
+    path.write_bytes(b"old")
+    path.chmod(mode)
+    with whole_file(path, Mark.ANY) as temporary:
+        assert stat.S_IMODE(temporary.stat().st_mode) == mode, "from the beginning"
+        temporary.write_text("new", encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == "new"
+    assert stat.S_IMODE(path.stat().st_mode) == mode
+
+
+def test_another_group_sees_nothing_that_was_for_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a file's group cannot be given to the next one, its rights are not either."""
+    path = tmp_path / "table.txt"
+    path.write_bytes(b"old")
+    path.chmod(0o664)
+    try:
+        os.chown(path, -1, path.stat().st_gid + 1)
+    except PermissionError:
+        pytest.skip("only root gives files away")
+
+    def refused(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr("os.fchown", refused)
+    with whole_file(path, Mark.ANY):
+        pass
+    assert stat.S_IMODE(path.stat().st_mode) == 0o604
+
+
+def test_owner_and_group_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "table.txt"
+    path.write_bytes(b"old")
+    given: list[tuple[int, int]] = []
+    monkeypatch.setattr("os.fchown", lambda _, owner, group: given.append((owner, group)))
+    with whole_file(path, Mark.ANY):
+        pass
+    assert given == [(path.stat().st_uid, -1), (-1, path.stat().st_gid)]
+
+
+def test_a_write_protected_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "table.txt"
+    path.write_bytes(b"old")
+    monkeypatch.setattr("os.access", lambda name, mode: mode != os.W_OK or Path(name) != path)
+    with pytest.raises(OutputError, match="it is write-protected"):
+        check_writable(path, Mark.ANY)
+    with pytest.raises(OutputError, match="it is write-protected"), whole_file(path, Mark.ANY):
+        pass
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["table.txt"]
+
+
+LONG = b"0" * 10**6
+KNOWN = {
+    Mark.TABLE: [LONG + b"..dpg.file_sha256..", b"dpg.file_sha256"],
+    Mark.FACTS: [b'{\n  "written_by": "dpg 0.1.0",' + LONG],
+    Mark.REPORT: [b"# Design space\n" + LONG + b"\n<!-- written by dpg -->\n"],
+    Mark.FIGURE: [b"<svg>drawn by dpg" + LONG],
+    Mark.CALIBRATION: [b"calibration_version: 1\nmade_by: dpg 0.1.0, numpy 2" + LONG],
+    Mark.DEPFILE: [b"a/states.parquet a/designs.parquet: b.yaml\n"],
+    Mark.DECK: [b"** dpg fe hinge" + LONG],
+    Mark.CURVE: [b"# dpg fe hinge: a simulation"],
+    Mark.LOG: [b"# dpg fe, hinge.inp: words of ccx\n"],
+    Mark.DISPLACEMENTS: [b"\n displacements (vx,vy,vz) for set ALL and time  0.1E+01\n" + LONG],
+    Mark.ANY: [b"anything"],
+    Mark.NONE: [],
+}
+STRANGE = [
+    b"mine",
+    LONG,
+    LONG + b"dpg.file_sha256" + LONG,
+    b"note: made_by: dpg fit, later by hand\n",
+    b"all: a/states.parquet a/designs.parquet\na/states.parquet a/designs.parquet: b.yaml\n",
+    b"\n** dpg fe hinge",
+    b"see # dpg fe, and # dpg fe hinge",
+    b"the displacements (vx,vy,vz) for set ALL",
+]
+
+
+@pytest.mark.parametrize("mark", Mark)
+def test_files_are_known_by_their_marks(tmp_path: Path, mark: Mark) -> None:
+    path = tmp_path / "file"
+    for kind, contents in KNOWN.items():
+        for content in contents:
+            path.write_bytes(content)
+            assert is_own(path, mark) == (mark in (kind, Mark.ANY)), content[:40]
+    for content in STRANGE:
+        path.write_bytes(content)
+        assert is_own(path, mark) == (mark is Mark.ANY), content[:40]
+    path.write_bytes(b"")
+    assert is_own(path, mark), "nothing can be lost"
+
+
+def test_a_file_that_came_while_the_new_one_was_made_stays(tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    with pytest.raises(OutputError, match="not of dpg"), whole_file(path, Mark.TABLE) as temporary:
+        temporary.write_bytes(b"dpg.file_sha256")
+        path.write_bytes(b"theirs")
+    assert path.read_bytes() == b"theirs"
+    assert names(tmp_path) == ["table.txt"]
+
+
+def test_what_is_not_on_the_disk_gets_no_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The content is synced before the name moves to it, and the folder after that."""
+    path = tmp_path / "table.txt"
+    synced: list[tuple[bool, bytes, bool]] = []
+
+    def fsync(handle: int) -> None:
+        is_folder = stat.S_ISDIR(os.fstat(handle).st_mode)
+        content = b"" if is_folder else os.pread(handle, 10, 0)
+        synced.append((is_folder, content, path.exists()))
+
+    monkeypatch.setattr("os.fsync", fsync)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(b"new")
+    assert synced == [(False, b"new", False), (True, b"", True)]
+
+
+def test_names_are_told_apart_by_more_than_capitals(tmp_path: Path) -> None:
+    one, other = tmp_path / "a.svg", tmp_path / "A.svg"
+    for pair in ((one, other), (one, tmp_path / "x" / ".." / "a.svg"), (one, one)):
+        with pytest.raises(UsageError, match="expected names that differ"):
+            check_apart(pair)
+    check_apart((one, tmp_path / "b.svg"))
+    one.touch()
+    os.link(one, tmp_path / "hard")
+    (tmp_path / "soft").symlink_to(one)
+    for name in ("hard", "soft"):
+        with pytest.raises(UsageError, match="expected names that differ"):
+            check_apart((one, tmp_path / name))
+
+
+def test_outputs_have_names_of_their_own(tmp_path: Path) -> None:
+    table, plot = tmp_path / "a.svg", tmp_path / "A.svg"
+    with pytest.raises(UsageError, match="expected names that differ"):
+        check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (plot, Mark.FIGURE))
+    check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (None, Mark.FIGURE))
     assert names(tmp_path) == []

@@ -117,9 +117,52 @@ def test_foreign_files_among_the_parts_do_not_matter(
     with pytest.raises(StoppedError):
         study(*AXES).compute(serial(), stopping_after(6))
     folder = study(*AXES).store.folder
-    for name in (".x.part.abc.tmp", "0000000000-0000000004.part", "notes.txt", "x.part"):
+    foreign = {"0000000000-0000000004.part", "notes.txt", "x.part"}
+    for name in (".x.part.abc.tmp", *foreign):
         (folder / name).write_bytes(b"half-writ")
-    assert finish(study(*AXES)) == expected
+    made = study(*AXES)
+    made.compute(serial(), quiet)
+    made.assemble()
+    assert bytes_of(made.folder) == expected
+    assert {path.name for path in folder.iterdir()} == foreign, "and they stay"
+
+
+@pytest.mark.parametrize("name", [studies.STATES, studies.DESIGNS])
+def test_a_damaged_table_is_not_up_to_date(
+    study: Any, expected: dict[str, bytes], name: str
+) -> None:
+    made = study(*AXES)
+    assert finish(made) == expected
+    assert made.is_up_to_date
+    content = bytearray(expected[name])
+    content[len(content) // 2] ^= 4
+    (made.folder / name).write_bytes(content)
+    assert not made.is_up_to_date
+    assert made.damaged == [made.folder / name]
+    assert finish(made) == expected
+    assert made.is_up_to_date
+    assert made.damaged == []
+
+
+def test_a_damaged_description_is_not_believed(study: Any) -> None:
+    """Not one bit of it: a sweep of other content would follow."""
+    made = study(*AXES)
+    made.compute(serial(), quiet)
+    path = made.store.folder / "sweep.json"
+    content = path.read_bytes()
+    assert made.store.said() == made.metadata
+    for bit in random.Random(2).sample(range(8 * len(content)), 300):
+        damaged = bytearray(content)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        assert made.store.said() in ({}, made.metadata)
+    path.write_bytes(content.replace(b'"76"', b'"75"'))
+    with pytest.raises(UsageError, match=r"sweep\.json is damaged: run its sweep again"):
+        assemble([made.store], made.folder)
+    with pytest.raises(UsageError, match=r"an unfinished sweep whose sweep\.json is damaged"):
+        study(AXES[0]).check_unfinished()
+    path.write_bytes(b"[" * 100_000)
+    assert made.store.said() == {}
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff"])

@@ -72,13 +72,14 @@ INTERVAL_COLUMNS = (
 def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path | None) -> None:
     """Before any work: names that fit their content, and files that can be written."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_outputs
+    from dpgcli.files.output import Mark, check_outputs
 
     if output is not None and output.suffix.lower() not in (".yaml", ".yml"):
         raise UsageError(f"--output {output}: expected a name that ends in .yaml")
     if plot is not None:
         check_plot(plot)
-    check_outputs([source for source in sources if source is not None], output, plot)
+    read = [source for source in sources if source is not None]
+    check_outputs(read, (output, Mark.CALIBRATION), (plot, Mark.FIGURE))
 
 
 def positive(option: str, value: float | None) -> float | None:

@@ -71,9 +71,8 @@ def finger(
     from dpgcli.files.spec import read_scene, scene_of
     from dpgcli.files.spec.problems import checked as checked_spec
 
-    check_files((spec, data), output, plot)
     document = read_scene(spec, settings or ())
-    check_files(document.files, output, plot)
+    check_files((spec, data, *document.files), output, plot)
     checked = checked_spec(document)
     where = checked.finger.geometry
     where = geometry_of(geometry, where) if geometry else where

@@ -26,7 +26,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
-from dpgcli.files.output import whole_file
+from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.places import KeyPath, Place, in_order, located, shown
 from dpgcli.files.sections import (
     AGREEMENT,
@@ -77,8 +77,9 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # typed None
     yaml.width = 110
     yaml.allow_unicode = True
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
-        yaml.dump(calibration.model_dump(exclude_none=True), stream)
+    content = calibration.model_dump(exclude_none=True)
+    with whole_file(path, Mark.CALIBRATION) as new, new.open("w", encoding="utf-8") as stream:
+        yaml.dump(content, stream)
 
 
 def read_calibration(path: str | Path) -> Calibration:

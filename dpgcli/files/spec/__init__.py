@@ -19,6 +19,7 @@ from dpgcli.mechanics.scene import Scene
 
 __all__ = [
     "Spec",
+    "canonical",
     "canonical_json",
     "checked",
     "json_schema",
@@ -77,7 +78,7 @@ def json_schema() -> dict[str, Any]:
 
 def canonical_json(spec: Spec) -> str:
     """One line of JSON, the same for specs that say the same; infinity is the text ".inf"."""
-    plain = _canonical(spec.model_dump(exclude_none=True))
+    plain = canonical(spec.model_dump(exclude_none=True))
     return json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -86,14 +87,15 @@ def starter() -> str:
     return resources.files("dpgcli.files.spec").joinpath("starter.yaml").read_text(encoding="utf-8")
 
 
-def _canonical(value: Any) -> Any:
+def canonical(value: Any) -> Any:
+    """Data as strict JSON can say them: infinity is the text ".inf", negative zero is zero."""
     if isinstance(value, dict):
-        return {key: _canonical(item) for key, item in value.items()}
+        return {key: canonical(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_canonical(item) for item in value]
+        return [canonical(item) for item in value]
     return spelled(value) if isinstance(value, float) else value
 
 
 def spelled(value: float) -> float | str:
-    """A number as JSON can say it: infinity is the text ".inf", as in a spec."""
-    return ".inf" if math.isinf(value) else value + 0.0
+    """A number as JSON can say it: infinity is the text ".inf" or "-.inf", as in a spec."""
+    return str(value).replace("inf", ".inf") if math.isinf(value) else value + 0.0

@@ -15,7 +15,7 @@ from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
 from dpgcli.files.places import KeyPath, in_order, located, shown
 from dpgcli.files.source import Document, read_document
-from dpgcli.files.spec import Spec, canonical_json, read_scene
+from dpgcli.files.spec import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.spec.problems import checked
 from dpgcli.files.spec.settings import SETTING
 from dpgcli.files.sweep.models import (
@@ -50,8 +50,9 @@ class Sweep:
 
     def canonical_json(self) -> str:
         """One line of JSON, the same for sweeps that say the same."""
-        said = {"base": canonical_json(self.base), "space": self.said, "tables": self.digests}
-        return json.dumps(said, sort_keys=True, separators=(",", ":"))
+        space = canonical(self.said)
+        said = {"base": canonical_json(self.base), "space": space, "tables": self.digests}
+        return json.dumps(said, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.errors import Problem
+from dpgcli.errors import Problem, UsageError
 from dpgcli.exploration.expressions import Expression, ExpressionError, expression
 from dpgcli.exploration.space import Axis, Range, linear, listed, logarithmic, sampled
 from dpgcli.files.places import KeyPath, shown
@@ -115,17 +115,19 @@ class SpaceReader:
         """Columns of a CSV or Parquet file; pandas reads both."""
         import pandas as pd
 
+        from dpgcli.files.reading import read_undamaged
+
         table = self.folder / name
         try:
             if not self.table_has_room(path, table):
                 return None
             if table.suffix == ".parquet":
-                frame = pd.read_parquet(table)
+                frame = read_undamaged(table).to_pandas()
             else:
                 with warnings.catch_warnings():  # rows that do not fit the header
                     warnings.simplefilter("error", pd.errors.ParserWarning)
                     frame = pd.read_csv(table, index_col=False)
-        except (OSError, ValueError, pd.errors.ParserWarning) as error:
+        except (OSError, ValueError, UsageError, pd.errors.ParserWarning) as error:
             self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
             return None
         if not self.has_room(path, *frame.shape):
@@ -142,6 +144,9 @@ class SpaceReader:
                 row = int(wrong[0]) if len(wrong) else 0
                 found = f"{shown(str(column[row]))} in row {row + 1}"
                 self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")
+            elif column.dtype.kind == "u" and int(column.max()) >= 2**63:
+                found = str(column.max())
+                self.wrong(path, f"whole numbers below 2^63 in column {key}", found)
         if len(self.problems) > n_before:
             return None
         self.tables.append(table)

@@ -1,5 +1,6 @@
 """Sweep files: what they say, and every mistake in them with its place."""
 
+import json
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -101,6 +102,37 @@ def test_a_table_gives_its_very_numbers(read: Read, tmp_path: Path, suffix: str)
 def test_a_table_of_any_numeric_type(read: Read, tmp_path: Path, kind: str) -> None:
     pd.DataFrame({HEIGHT: np.array([6, 7], kind)}).to_parquet(tmp_path / "t.parquet")
     assert designs(read("table: t.parquet")) == {HEIGHT: [6, 7]}
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_whole_numbers_beyond_63_bits_are_refused(read: Read, tmp_path: Path, suffix: str) -> None:
+    """As a signed column they would be negative."""
+    frame = pd.DataFrame({HEIGHT: np.array([6, 2**64 - 1], np.uint64)})
+    if suffix == "csv":
+        frame.to_csv(tmp_path / "t.csv", index=False)
+    else:
+        frame.to_parquet(tmp_path / "t.parquet")
+    (problem,) = problems(read, f"table: t.{suffix}")
+    assert problem == (
+        f"3:5: space.0.table: expected whole numbers below 2^63 in column {HEIGHT}, "
+        "found 18446744073709551615"
+    )
+    whole = pd.DataFrame({HEIGHT: np.array([6, 2**63 - 1], np.uint64)})
+    whole.to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {HEIGHT: [6, 2**63 - 1]}
+
+
+def test_rigid_bars_among_values_are_strict_json(read: Read) -> None:
+    def said(value: str) -> str:
+        key = "finger.linear_stiffness_N_per_mm"
+        return read(f"{{key: {key}, values: [1000, {value}]}}").canonical_json()
+
+    def refused(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    space = json.loads(said(".inf"), parse_constant=refused)["space"]
+    assert space["space"][0]["values"] == [1000, ".inf"]
+    assert len({said(".inf"), said("-.inf"), said("1e300")}) == 3
 
 
 @pytest.mark.parametrize("row", ["6.5,3,9", "6.5"])
