@@ -5,13 +5,12 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
 from enum import IntEnum
 from typing import NoReturn, ParamSpec
 
 import typer
 
-from dpgcli.cli.streams import discard, open_streams, say
+from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
@@ -52,7 +51,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             function(*args, **kwargs)
-            sys.stdout.flush()
+            sys.stdout.flush()  # while a signal still stops it
         except typer.Exit:
             raise
         except SpecError as error:
@@ -63,17 +62,10 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))
-        except BrokenPipeError:  # the reader, such as head, has had enough
-            discard(sys.stdout)
-            raise typer.Exit(ExitCode.DONE) from None
         except KeyboardInterrupt as stop:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
             fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
-        except OSError as error:
-            if error.filename is None:  # what is left without a name is standard output
-                fail(_no_output(error), "")
-            _internal_error()
         except Exception:
             _internal_error()
 
@@ -95,32 +87,22 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
             signal.signal(number, _stop)
     code = _code_of(app)
     _ignore_further_signals()
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        discard(sys.stdout)
-    except OSError as error:
-        code = _no_output(error)
-    with suppress(OSError):
-        sys.stderr.flush()
-        sys.exit(code)
-    discard(sys.stderr)
+    if code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
+        OUTPUT.drop()
+    sys.stdout.flush()
+    if OUTPUT.error is not None and not isinstance(OUTPUT.error, ConnectionError):
+        say(f"dpg: cannot write the output: {OUTPUT.error.strerror}")
+        code = code or ExitCode.USAGE
     sys.exit(code)
 
 
 def _code_of(app: Callable[..., object]) -> int:
-    """The exit code of a run; what typer itself meets (usage, help, a closed pipe) included."""
+    """The exit code of a run; what typer itself meets (usage, help) included."""
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        with suppress(OSError):
-            getattr(error, "show", traceback.print_exc)()
+        getattr(error, "show", traceback.print_exc)()
         return error.exit_code
-    except SystemExit:  # typer's way to end when nobody reads its help
-        discard(sys.stdout)
-        return ExitCode.DONE
-    except OSError as error:
-        return _no_output(error)
     except Terminated:  # before a command has begun, or after it is done
         say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
@@ -128,12 +110,6 @@ def _code_of(app: Callable[..., object]) -> int:
         say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
     return code if isinstance(code, int) else ExitCode.DONE
-
-
-def _no_output(error: OSError) -> ExitCode:
-    discard(sys.stdout)
-    say(f"dpg: cannot write the output: {error.strerror}")
-    return ExitCode.USAGE
 
 
 def _stop(number: int, _: object) -> NoReturn:
@@ -148,6 +124,5 @@ def _ignore_further_signals() -> None:
 
 
 def _internal_error() -> NoReturn:
-    with suppress(OSError):
-        traceback.print_exc()
+    traceback.print_exc()
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")
