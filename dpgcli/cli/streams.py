@@ -4,7 +4,7 @@ import io
 import os
 import sys
 from select import select
-from typing import TextIO
+from typing import Any, TextIO
 
 
 class Stream(io.RawIOBase):
@@ -17,9 +17,9 @@ class Stream(io.RawIOBase):
         self.number = number
         self.error: OSError | None = None
 
-    def write(self, content: memoryview) -> int:  # type: ignore[override]
+    def write(self, content: Any, /) -> int:
         """Write all, or keep why not."""
-        rest = content
+        rest = memoryview(content)
         while rest and self.error is None:
             try:
                 rest = rest[os.write(self.number, rest) :]
@@ -73,8 +73,9 @@ def is_read() -> bool:
 def _text(stream: Stream, before: TextIO | None, *, by_line: bool) -> TextIO:
     """Text as it was written before, to a stream that takes everything."""
     at_once = getattr(before, "write_through", False)
+    binary: Any = stream if at_once else io.BufferedWriter(stream)
     return io.TextIOWrapper(
-        stream if at_once else io.BufferedWriter(stream),
+        binary,
         encoding=before.encoding if before else "utf-8",
         errors="backslashreplace",
         line_buffering=by_line,

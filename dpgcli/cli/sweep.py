@@ -13,7 +13,15 @@ import typer
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated
-from dpgcli.cli.options import MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
+from dpgcli.cli.options import (
+    MOST_PROCESSES,
+    MaxFailed,
+    Quiet,
+    Settings,
+    TargetError,
+    Tolerance,
+    millimeters,
+)
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
 from dpgcli.cli.run import check_failed, run_facts, run_summary
@@ -42,7 +50,8 @@ class ExecutorName(StrEnum):
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")]
 Jobs = Annotated[
-    int | None, typer.Option("-j", "--jobs", min=1, help="Processes  [default: cores]")
+    int | None,
+    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
 ]
 Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
 Scheduler = Annotated[
@@ -85,8 +94,8 @@ def sweep(
     if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
         _start_fork_server_early()
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_appendable, sole_use
-    from dpgcli.studies.sweep import DESIGNS, STATES, drop_half_written, drop_parts
+    from dpgcli.files.output import check_appendable, check_outputs, sole_use
+    from dpgcli.studies.sweep import DESIGNS, STATES, drop_half_written, drop_parts, outputs
 
     part = _shard(shard)
     _check_executor(executor, scheduler)
@@ -103,6 +112,8 @@ def sweep(
         drop_half_written(output)
         is_new = restart or not study.is_up_to_date
         if is_new:
+            if part is None:
+                check_outputs(study.sweep.files, *outputs(output))
             _check_folder(study, restart=restart, force=force)
             progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)

@@ -7,8 +7,10 @@ failed, and everything else goes on. If nothing but failures comes back, it is n
 the run gives up.
 """
 
+import atexit
 import os
 import signal
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -21,11 +23,14 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
+from dpgcli.temporary import temporary_folder
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -36,6 +41,7 @@ UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
 TRIALS = 3  # workers that must fail to do nothing before none is believed to start
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
 CLUSTER_PATIENCE = 10  # s
+LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GO_ON = "What is done is kept, and the same command goes on from there."
 
@@ -163,7 +169,8 @@ class Runner(Generic[T]):
                     executor.submit(os.getpid).result()
             except self.workplace.broken as error:
                 if is_last:
-                    said = f"{self.workplace.name}: workers do not start. {GO_ON}"
+                    why = str(error) or type(error).__name__
+                    said = f"{self.workplace.name}: workers do not start ({why}). {GO_ON}"
                     raise WorkplaceError(said) from error
             else:
                 return
@@ -202,8 +209,7 @@ def serial() -> Workplace:
 
 def processes(n_workers: int) -> Workplace:
     """A pool of processes on this machine."""
-    broken = (BrokenExecutor, EOFError)  # the latter of a fork server that is gone
-    return Workplace("the pool of processes", process_pool, n_workers, broken=broken)
+    return Workplace("the pool of processes", process_pool, n_workers)
 
 
 def dask_cluster(scheduler: str) -> Workplace:
@@ -255,6 +261,7 @@ def start_fork_server(*modules: str) -> None:
     """
     from multiprocessing import forkserver, resource_tracker
 
+    _own_temporary_folder()
     if modules:
         forkserver.set_forkserver_preload(list(modules))
     # what a terminal sends to all its processes is for this one to answer: the others inherit
@@ -268,13 +275,41 @@ def start_fork_server(*modules: str) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@cache
+def _own_temporary_folder() -> None:
+    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
+
+    Raises WorkplaceError where there can be no temporary files.
+    """
+    from multiprocessing import current_process
+
+    try:
+        place = tempfile.gettempdir()
+        place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
+        held = ExitStack()
+        folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
+    except OSError as error:
+        raise WorkplaceError(f"no folder for temporary files: {error}") from error
+    atexit.register(held.close)
+    vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
+
+
 class _Pool(ProcessPoolExecutor):
     """A pool that no signal stops halfway through starting or ending its processes."""
 
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """As of the base."""
+        """As of the base; without a fork server the pool is broken.
+
+        Raises WorkplaceError where the system allows no more processes.
+        """
         with _held_signals():
-            return super().submit(fn, *args, **kwargs)
+            try:
+                return super().submit(fn, *args, **kwargs)
+            except (ConnectionError, FileNotFoundError, EOFError) as error:
+                raise BrokenExecutor("the fork server is gone") from error
+            except OSError as error:
+                said = f"cannot start a process: {error.strerror}. Take fewer --jobs. {GO_ON}"
+                raise WorkplaceError(said) from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of the base."""

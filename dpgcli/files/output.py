@@ -2,12 +2,12 @@
 
 import fcntl
 import os
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
+from dpgcli.temporary import temporary_file
 
 
 @contextmanager
@@ -20,16 +20,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))
     try:
-        temporary = _beside(target)
-        try:
+        with _beside(target) as temporary:
             yield temporary
             _sync(temporary, os.O_RDWR)
             temporary.replace(target)
             _sync(target.parent, os.O_RDONLY)
-        except BaseException:
-            with suppress(OSError):
-                temporary.unlink()
-            raise
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -82,7 +77,8 @@ def check_writable(path: Path) -> None:
     try:
         if path.is_dir():
             raise IsADirectoryError(None, "is a folder")
-        _beside(Path(os.path.realpath(path))).unlink()
+        with _beside(Path(os.path.realpath(path))):
+            pass
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -118,24 +114,19 @@ def sole_use(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _beside(path: Path) -> Path:
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
     """An empty file in the same folder, with the permissions a new file gets.
 
     Renaming over a device or pipe would replace it, /dev/null for the whole machine.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(None, "is a device or pipe, not a file")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".tmp", dir=path.parent)
-    try:
+    with temporary_file(path) as (temporary, handle):
         mask = os.umask(0)
         os.umask(mask)
         os.fchmod(handle, 0o666 & ~mask)
-    except BaseException:
-        Path(name).unlink()
-        raise
-    finally:
-        os.close(handle)
-    return Path(name)
+        yield temporary
 
 
 def _sync(path: Path, flags: int) -> None:

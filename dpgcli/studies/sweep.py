@@ -20,6 +20,7 @@ from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.differences import differences
 from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.studies.work import Work
+from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
@@ -129,9 +130,10 @@ class Study:
     def is_up_to_date(self) -> bool:
         """Whether both tables are there and were made from just this."""
         fingerprint = self.metadata["dpg.fingerprint"]
+        tables = (self.folder / name for name in (STATES, DESIGNS))
         return all(
-            read_metadata(self.folder / name).get("dpg.fingerprint") == fingerprint
-            for name in (STATES, DESIGNS)
+            path.is_file() and read_metadata(path).get("dpg.fingerprint") == fingerprint
+            for path in tables
         )
 
     @property
@@ -249,11 +251,15 @@ def drop_parts(folder: Path) -> None:
     shutil.rmtree(folder / PARTS, ignore_errors=True)
 
 
+def outputs(folder: Path) -> tuple[Path, ...]:
+    """What a finished sweep writes into its folder."""
+    return tuple(folder / name for name in (STATES, DESIGNS, RUN, REPORT))
+
+
 def drop_half_written(folder: Path) -> None:
-    """Remove what a killed run was about to write; for who alone is at work in the folder."""
-    for name in (STATES, DESIGNS, RUN, REPORT):
-        for stale in folder.glob(f".{name}.*.tmp"):
-            stale.unlink()
+    """Remove what a killed run was about to write."""
+    for path in outputs(folder):
+        drop_orphans(path)
 
 
 def stores(folder: Path) -> list[PartStore]:

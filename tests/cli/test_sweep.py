@@ -56,10 +56,10 @@ def test_what_a_killed_run_was_writing_goes(call: Any, sweep: Path, is_done: boo
     out.mkdir(exist_ok=True)
     names = ("states.parquet", "designs.parquet", "run.json", "report.md", "notes.txt")
     for name in names:
-        (out / f".{name}.a1b2c3d4.tmp").write_text("half")
+        (out / f".{name}.dpg3.tmp").write_text("half")
     result = call("sweep", "sweep.yaml", *SERIAL, "-q")
     assert result.exit_code == ExitCode.DONE
-    assert [path.name for path in out.glob(".*.tmp")] == [".notes.txt.a1b2c3d4.tmp"]
+    assert [path.name for path in out.glob(".*.tmp")] == [".notes.txt.dpg3.tmp"]
 
 
 def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
