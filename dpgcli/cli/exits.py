@@ -6,6 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from enum import IntEnum
+from types import FrameType
 from typing import NoReturn, ParamSpec
 
 import typer
@@ -14,6 +15,7 @@ from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
+    NoWorkerError,
     OutputError,
     SolverError,
     SpecError,
@@ -25,6 +27,7 @@ P = ParamSpec("P")
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NOTHING_HALF = "nothing half-written is left"
+SOON = 0.01  # s
 
 
 class ExitCode(IntEnum):
@@ -58,6 +61,8 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             say(str(error))  # each problem starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
+        except NoWorkerError as error:
+            fail(ExitCode.FAILED_CASES, str(error))
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
@@ -85,6 +90,7 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
     for number in STOP_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
             signal.signal(number, _stop)
+    sys.unraisablehook = _unraisable
     code = _code_of(app)
     _ignore_further_signals()
     if code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
@@ -112,10 +118,31 @@ def _code_of(app: Callable[..., object]) -> int:
     return code if isinstance(code, int) else ExitCode.DONE
 
 
-def _stop(number: int, _: object) -> NoReturn:
-    """Unwind once; what comes after the first signal would only disturb the cleaning up."""
+def _stop(number: int, frame: FrameType | None) -> None:
+    """Unwind once; what comes after the first signal would only disturb the cleaning up.
+
+    Not in the middle of an import: extension modules make errors of their own of what is raised.
+    """
+    if any("importlib" in here.f_code.co_filename for here, _ in traceback.walk_stack(frame)):
+        _send_again(number)
+        return
     _ignore_further_signals()
     raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+
+def _send_again(number: int) -> None:
+    signal.signal(number, _stop)
+    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
+    signal.setitimer(signal.ITIMER_REAL, SOON)
+
+
+def _unraisable(lost: "sys.UnraisableHookArgs") -> None:
+    """A stop that came where nothing can be raised, such as in a destructor, is sent again."""
+    if isinstance(lost.exc_value, KeyboardInterrupt | Terminated):
+        is_interrupt = isinstance(lost.exc_value, KeyboardInterrupt)
+        _send_again(signal.SIGINT if is_interrupt else signal.SIGTERM)
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _ignore_further_signals() -> None:

@@ -163,3 +163,13 @@ def millimeters(option: str, text: str) -> float:
     if not 0.0 < length < float("inf"):
         raise UsageError(f"{option} {text}: expected a length > 0 in mm, um, nm or m: 0.01mm")
     return length
+
+
+def seconds(option: str, text: str) -> float:
+    """A time with its unit as a number of s: 30s, 5m, 2h; a plain number is s."""
+    from dpgcli.errors import UsageError
+
+    match = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)([smh]?)", text.strip())
+    if match is None:
+        raise UsageError(f"{option} {text}: expected a time in s, m or h: 5m")
+    return float(match[1]) * {"": 1, "s": 1, "m": 60, "h": 3600}[match[2]]

@@ -13,11 +13,10 @@ import signal
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -27,6 +26,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
@@ -40,7 +40,7 @@ Arguments = Callable[["Chunk"], tuple[Any, ...]]
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
 TRIALS = 3  # workers that must fail to do nothing before none is believed to start
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
-CLUSTER_PATIENCE = 10  # s
+PERIOD = 1.0  # s, of looking after a workplace while nothing comes back
 LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GO_ON = "What is done is kept, and the same command goes on from there."
@@ -137,7 +137,7 @@ class Runner(Generic[T]):
                     while waiting and len(under_way) < UNDER_WAY_PER_WORKER * n_workers:
                         future = executor.submit(self.function, *self.arguments(waiting[0]))
                         under_way[future] = waiting.popleft()
-                    for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                    for future in self._done(under_way):
                         value = future.result()
                         yield Result(under_way.pop(future), value)
             except self.workplace.broken:
@@ -147,11 +147,20 @@ class Runner(Generic[T]):
                     future.cancel()
         return list(under_way.values())
 
+    def _done(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+        """What is done as soon as something is; meanwhile the workplace is looked after."""
+        began = monotonic()
+        while not (done := wait(futures, PERIOD, FIRST_COMPLETED).done):
+            self.workplace.watch(monotonic() - began)
+        return done
+
     def _run_alone(self, chunk: Chunk) -> Iterator[Result[T]]:
         """A chunk that may be to blame, in a pool of its own; halved if it is."""
         try:
             with self._open(1) as executor:
-                value = executor.submit(self.function, *self.arguments(chunk)).result()
+                future = executor.submit(self.function, *self.arguments(chunk))
+                self._done([future])
+                value = future.result()
         except self.workplace.broken:
             if chunk.is_single:
                 yield Result(chunk, None)
@@ -166,7 +175,9 @@ class Runner(Generic[T]):
         for is_last in (*(False,) * (TRIALS - 1), True):
             try:
                 with self._open(1) as executor:
-                    executor.submit(os.getpid).result()
+                    trial = executor.submit(os.getpid)
+                    self._done([trial])
+                    trial.result()
             except self.workplace.broken as error:
                 if is_last:
                     why = str(error) or type(error).__name__
@@ -191,7 +202,8 @@ class Workplace:
     """Where to run: how to make an executor of n workers, and how many.
 
     `is_local` says that workers see this machine's files. `broken` is what an executor raises
-    when a worker dies, `lost` when there is nobody left to ask.
+    when a worker dies, `lost` when there is nobody left to ask. `watch` is called with the seconds
+    for which nothing has come back, and may raise WorkplaceError.
     """
 
     name: str
@@ -200,6 +212,7 @@ class Workplace:
     is_local: bool = True
     broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
     lost: tuple[type[BaseException], ...] = ()
+    watch: Callable[[float], None] = lambda _: None
 
 
 def serial() -> Workplace:
@@ -210,27 +223,6 @@ def serial() -> Workplace:
 def processes(n_workers: int) -> Workplace:
     """A pool of processes on this machine."""
     return Workplace("the pool of processes", process_pool, n_workers)
-
-
-def dask_cluster(scheduler: str) -> Workplace:
-    """The workers of a Dask cluster; raises OSError where no scheduler or no worker answers."""
-    import logging
-
-    from distributed import Client, KilledWorker
-    from distributed.comm.core import CommClosedError
-
-    for name in ("distributed", "distributed.client", "tornado.application"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is raised
-    client = Client(scheduler, timeout=CLUSTER_PATIENCE, set_as_default=False)
-    client.wait_for_workers(1, timeout=CLUSTER_PATIENCE)
-    return Workplace(
-        f"the Dask cluster at {scheduler}",
-        lambda _: client.get_executor(pure=False),
-        sum(client.nthreads().values()),
-        is_local=False,
-        broken=(BrokenExecutor, KilledWorker),
-        lost=(CancelledError, CommClosedError),
-    )
 
 
 class SerialExecutor(Executor):

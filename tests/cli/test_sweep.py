@@ -379,6 +379,12 @@ def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:
         (("--target-error", "1e400mm"), "--target-error 1e400mm: expected a length > 0"),
         (("--target-error", "1mm", "--tolerance", "1e-6"), "drop --tolerance"),
         (("--scheduler", "tcp://x:1"), "go together"),
+        (("--executor", "dask", "--scheduler", "x"), "--scheduler x: expected tcp://host:port"),
+        (("--wait", "5m"), "--wait is for the workers of --executor dask"),
+        (
+            ("--executor", "dask", "--scheduler", "tcp://x:1", "--wait", "soon"),
+            "--wait soon: expected a time in s, m or h: 5m",
+        ),
         (("--summary-file", "none/s.md"), "cannot write none/s.md"),
     ],
 )
@@ -624,3 +630,24 @@ def test_what_is_wrong_in_a_calibration_has_its_place(call: Any, domes: Path) ->
     assert result.exit_code == ExitCode.USAGE
     assert "dome.yaml:1:1: calibration_version: expected 1" in result.stderr
     assert not (domes / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["states.parquet", "designs.parquet", "run.json", "report.md"])
+def test_a_pipe_among_the_outputs_is_refused_before_any_work(
+    run: Any, sweep: Path, name: str
+) -> None:
+    """Reading it would wait for a writer that never comes."""
+    (sweep.parent / "out").mkdir()
+    os.mkfifo(sweep.parent / "out" / name)
+    result = run("sweep", "sweep.yaml", *SERIAL, "-q", timeout=30)
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr == f"dpg: cannot write out/{name}: is a device or pipe, not a file\n"
+    assert not (sweep.parent / "out" / ".parts").exists()
+
+
+def test_a_pipe_in_the_place_of_a_run_is_not_read(run: Any, call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    (sweep.parent / "out" / "run.json").unlink()
+    os.mkfifo(sweep.parent / "out" / "run.json")
+    assert run("sweep", "sweep.yaml", *SERIAL, timeout=30).returncode == ExitCode.DONE
+    assert run("report", "out", timeout=30).returncode == ExitCode.DONE
