@@ -43,7 +43,7 @@ def drop_orphans(path: Path) -> None:
     """Remove temporary files and folders for `path` that killed processes have left."""
     for name in islice(_names(path), AT_ONCE):
         with suppress(OSError):
-            handle = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            handle = os.open(name, os.O_RDONLY | os.O_NONBLOCK)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if _stands(name, handle):

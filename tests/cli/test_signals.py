@@ -74,7 +74,7 @@ class Last:
     def __del__(self):
         os.kill(os.getpid(), signal.{name})
         sum(map(abs, range(99)))
-Last()
+last = [Last()]
 """
 
 
@@ -93,6 +93,7 @@ app = typer.Typer()
 @command
 def work():
     import odd
+    getattr(odd, "last", []).clear()
     time.sleep(20)
     print("went on")
 run_and_exit(app)

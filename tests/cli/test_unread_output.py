@@ -2,12 +2,14 @@
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from dpgcli.cli.streams import Stream
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SWEEP = """base: three_unit.yaml
@@ -35,6 +37,15 @@ BREAKS = (
     "def broken(*_): raise BrokenPipeError('of a socket')\n"
     "import dpgcli.files.spec as specs\n"
     "specs.read_spec = broken"
+)
+FEW = (
+    "from dpgcli.states.predict import Prediction\n"
+    "old = Prediction.blocks\n"
+    "def blocks(self):\n"
+    "    for number, block in enumerate(old(self)):\n"
+    "        assert number < 2, 'goes on'\n"
+    "        yield block\n"
+    "Prediction.blocks = blocks"
 )
 Unread = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -116,6 +127,7 @@ def test_files_are_written(
     assert done.returncode == 0, done.stderr
     assert "dpg:" not in done.stderr
     assert all((folder / name).exists() for name in names)
+    assert "predict" not in words or done.stderr.startswith("8 stable in ")
 
 
 def test_a_broken_pipe_elsewhere_is_an_error(unread: Unread) -> None:
@@ -146,17 +158,22 @@ def test_a_full_disk_behind_the_report_is_said_when_all_is_done(
     assert {path.suffix for path in (folder / "out").iterdir()} == {".parquet", ".json", ".md"}
 
 
-def test_a_pipe_that_does_not_wait_gets_all(folder: Path) -> None:
+def test_a_pipe_that_does_not_wait_gets_all() -> None:
     """As others who write to it may have made it."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
-    words = ("predict", "twenty_unit.yaml", "--pattern", "0*" + "?" * 12, "--format", "csv")
-    command = [sys.executable, "-m", "dpgcli", *words]
-    process = subprocess.Popen(command, cwd=folder, stdout=writing, stderr=subprocess.PIPE)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as stream:
-        content = stream.read()
-    errors = process.communicate(timeout=60)[1]
-    assert process.returncode == 0, errors
-    assert len(content.splitlines()) > 4096
-    assert len(content) > 2**16, "more than the pipe holds"
+    content = bytes(range(256)) * 4096  # more than the pipe holds
+    with ThreadPoolExecutor(1) as thread, os.fdopen(reading, "rb") as stream:
+        read = thread.submit(stream.read)
+        assert Stream(writing).write(memoryview(content)) == len(content)
+        os.close(writing)
+        assert read.result(30) == content
+
+
+def test_who_only_prints_stops_when_nobody_reads(unread: Unread) -> None:
+    words = ("predict", "twenty_unit.yaml", "--format", "csv")
+    done = unread(*words, before=FEW)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = unread(*words, "-o", "a.parquet", before=FEW)
+    assert done.returncode == 3
+    assert "AssertionError: goes on" in done.stderr
