@@ -37,6 +37,10 @@ class WorkplaceError(Exception):
     """The workers that should do the work cannot, or are lost; what was done is kept."""
 
 
+class NoWorkerError(WorkplaceError):
+    """No worker came for as long as one waits; what was done is kept."""
+
+
 class NothingSelectedError(Exception):
     """A selection matches no state."""
 

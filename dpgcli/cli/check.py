@@ -1,9 +1,7 @@
 """`dpg check`: hold a table of designs against requirements."""
 
 import os
-import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -53,10 +51,8 @@ def check(
 
 
 def print_verdicts(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
-    """Print verdicts, which stand when nobody reads on."""
-    with suppress(BrokenPipeError):
-        _PRINTERS[listed_as](verdicts)
-        sys.stdout.flush()
+    """Print verdicts."""
+    _PRINTERS[listed_as](verdicts)
 
 
 def append_summary(path: Path, text: str) -> None:

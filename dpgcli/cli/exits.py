@@ -5,16 +5,17 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
 from enum import IntEnum
+from types import FrameType
 from typing import NoReturn, ParamSpec
 
 import typer
 
-from dpgcli.cli.streams import discard, open_streams, say
+from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
+    NoWorkerError,
     OutputError,
     SolverError,
     SpecError,
@@ -26,6 +27,7 @@ P = ParamSpec("P")
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NOTHING_HALF = "nothing half-written is left"
+SOON = 0.01  # s
 
 
 class ExitCode(IntEnum):
@@ -52,28 +54,23 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             function(*args, **kwargs)
-            sys.stdout.flush()
+            sys.stdout.flush()  # while a signal still stops it
         except typer.Exit:
             raise
         except SpecError as error:
             say(str(error))  # each problem starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
+        except NoWorkerError as error:
+            fail(ExitCode.FAILED_CASES, str(error))
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
             fail(ExitCode.USAGE, str(error))
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, str(error))
-        except BrokenPipeError:  # the reader, such as head, has had enough
-            discard(sys.stdout)
-            raise typer.Exit(ExitCode.DONE) from None
         except KeyboardInterrupt as stop:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
             fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
-        except OSError as error:
-            if error.filename is None:  # what is left without a name is standard output
-                fail(_no_output(error), "")
-            _internal_error()
         except Exception:
             _internal_error()
 
@@ -93,34 +90,25 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
     for number in STOP_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
             signal.signal(number, _stop)
+    sys.unraisablehook = _unraisable
     code = _code_of(app)
     _ignore_further_signals()
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        discard(sys.stdout)
-    except OSError as error:
-        code = _no_output(error)
-    with suppress(OSError):
-        sys.stderr.flush()
-        sys.exit(code)
-    discard(sys.stderr)
+    if code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
+        OUTPUT.drop()
+    sys.stdout.flush()
+    if OUTPUT.error is not None and not isinstance(OUTPUT.error, ConnectionError):
+        say(f"dpg: cannot write the output: {OUTPUT.error.strerror}")
+        code = code or ExitCode.USAGE
     sys.exit(code)
 
 
 def _code_of(app: Callable[..., object]) -> int:
-    """The exit code of a run; what typer itself meets (usage, help, a closed pipe) included."""
+    """The exit code of a run; what typer itself meets (usage, help) included."""
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        with suppress(OSError):
-            getattr(error, "show", traceback.print_exc)()
+        getattr(error, "show", traceback.print_exc)()
         return error.exit_code
-    except SystemExit:  # typer's way to end when nobody reads its help
-        discard(sys.stdout)
-        return ExitCode.DONE
-    except OSError as error:
-        return _no_output(error)
     except Terminated:  # before a command has begun, or after it is done
         say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
@@ -130,16 +118,31 @@ def _code_of(app: Callable[..., object]) -> int:
     return code if isinstance(code, int) else ExitCode.DONE
 
 
-def _no_output(error: OSError) -> ExitCode:
-    discard(sys.stdout)
-    say(f"dpg: cannot write the output: {error.strerror}")
-    return ExitCode.USAGE
+def _stop(number: int, frame: FrameType | None) -> None:
+    """Unwind once; what comes after the first signal would only disturb the cleaning up.
 
-
-def _stop(number: int, _: object) -> NoReturn:
-    """Unwind once; what comes after the first signal would only disturb the cleaning up."""
+    Not in the middle of an import: extension modules make errors of their own of what is raised.
+    """
+    if any("importlib" in here.f_code.co_filename for here, _ in traceback.walk_stack(frame)):
+        _send_again(number)
+        return
     _ignore_further_signals()
     raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+
+def _send_again(number: int) -> None:
+    signal.signal(number, _stop)
+    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
+    signal.setitimer(signal.ITIMER_REAL, SOON)
+
+
+def _unraisable(lost: "sys.UnraisableHookArgs") -> None:
+    """A stop that came where nothing can be raised, such as in a destructor, is sent again."""
+    if isinstance(lost.exc_value, KeyboardInterrupt | Terminated):
+        is_interrupt = isinstance(lost.exc_value, KeyboardInterrupt)
+        _send_again(signal.SIGINT if is_interrupt else signal.SIGTERM)
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _ignore_further_signals() -> None:
@@ -148,6 +151,5 @@ def _ignore_further_signals() -> None:
 
 
 def _internal_error() -> NoReturn:
-    with suppress(OSError):
-        traceback.print_exc()
+    traceback.print_exc()
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.options import Quiet, Settings, SpecPath
+from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -47,7 +47,9 @@ RunOption = Annotated[bool, typer.Option("--run", help="Run ccx, write the curve
 TimeLimit = Annotated[
     float, typer.Option("--time-limit", metavar="SECONDS", help="End ccx after this time")
 ]
-Threads = Annotated[int, typer.Option("--threads", min=1, help="Threads of ccx")]
+Threads = Annotated[
+    int, typer.Option("--threads", min=1, max=MOST_PROCESSES, help="Threads of ccx")
+]
 
 
 def dome(

@@ -32,7 +32,7 @@ app = typer.Typer(
     name="dpg",
     help="Stable shapes of multistable soft grippers, predicted by a lumped spring lattice.",
     epilog="Exit codes: 0 done, 1 a requirement is not met or a hard case fails, 2 usage or spec, "
-    "3 internal error, 4 more failed cases than --max-failed, 5 nothing selected, "
+    "3 internal error, 4 more failed cases than --max-failed, or no worker, 5 nothing selected, "
     "130/143 interrupted.",
     no_args_is_help=True,
     add_completion=False,

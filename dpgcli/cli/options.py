@@ -39,6 +39,7 @@ Tolerance = Annotated[
 
 
 LONG = 30.0  # s of one core: what takes longer is said before
+MOST_PROCESSES = 4096  # more than any machine has cores
 MICRO = ("um", "\u00b5m", "\u03bcm")  # the micro sign and the Greek letter
 POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of ten, in mm
 TargetError = Annotated[
@@ -163,3 +164,13 @@ def millimeters(option: str, text: str) -> float:
     if not 0.0 < length < float("inf"):
         raise UsageError(f"{option} {text}: expected a length > 0 in mm, um, nm or m: 0.01mm")
     return length
+
+
+def seconds(option: str, text: str) -> float:
+    """A time with its unit as a number of s: 30s, 5m, 2h; a plain number is s."""
+    from dpgcli.errors import UsageError
+
+    match = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)([smh]?)", text.strip())
+    if match is None:
+        raise UsageError(f"{option} {text}: expected a time in s, m or h: 5m")
+    return float(match[1]) * {"": 1, "s": 1, "m": 60, "h": 3600}[match[2]]

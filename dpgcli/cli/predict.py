@@ -27,7 +27,7 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import patient_output, say
+from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
     from dpgcli.mechanics.scene import Scene
@@ -80,26 +80,28 @@ def predict(
         principal = columns == "default" and not nodes
         printer = printer_of(printed_as or Format.TABLE, principal=principal)
         rows = printer(prediction.plan.columns, rows)
-    if output is None:
-        for _ in rows:
-            pass
-    else:
-        with patient_output():
-            _write(prediction, output, specs.canonical_json(checked), rows)
+    only_prints = output is None and plot is None
+    if output is not None:
+        _write(prediction, output, specs.canonical_json(checked), rows)
+    for _ in rows:
+        if only_prints and not is_read():  # the work is for nobody
+            break
     if plot is not None:
         _draw(scene, request.patterns, plot)
-    if not quiet:
-        sys.stdout.flush()
+    sys.stdout.flush()
+    if not quiet and (is_read() or not only_prints):
         say("\n".join(_summary(prediction)))
 
 
 def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
     """Blocks, with progress where the work takes long."""
     line = ProgressLine(prediction.plan.n_states, "states", quiet=quiet)
-    for block in prediction.blocks():
-        yield block
-        line.show(prediction.summary.n_states)
-    line.clear()
+    try:
+        for block in prediction.blocks():
+            yield block
+            line.show(prediction.summary.n_states)
+    finally:
+        line.clear()
 
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:

@@ -1,7 +1,6 @@
 """Progress on standard error: one line that moves on a terminal, a line now and then elsewhere."""
 
 import sys
-from contextlib import suppress
 from time import monotonic
 
 FIRST_SHOWN = 1.0  # s: what is over sooner needs no progress
@@ -31,16 +30,14 @@ class ProgressLine:
         rate = (done - self.start) / max(now - self.began, 1e-9)
         left = f", {(self.total - done) / rate:,.0f} s left" if rate > 0 else ""
         line = f"{done:,} of {self.total:,} {self.things}, {rate:,.0f}/s{left}"
-        with suppress(OSError):
-            if self.interactive:
-                print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
-            else:
-                print(line, file=sys.stderr, flush=True)
+        if self.interactive:
+            print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
+        else:
+            print(line, file=sys.stderr, flush=True)
         self.is_shown = self.interactive
         self.due = now + (TERMINAL_PERIOD if self.interactive else PLAIN_PERIOD)
 
     def clear(self) -> None:
         """Take the moving line away."""
         if self.is_shown:
-            with suppress(OSError):
-                print("\r" + " " * 70, end="\r", file=sys.stderr, flush=True)
+            print("\r" + " " * 70, end="\r", file=sys.stderr, flush=True)

@@ -3,15 +3,56 @@
 import io
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from typing import TextIO
+from select import select
+from typing import Any, TextIO
+
+
+class Stream(io.RawIOBase):
+    """A standard stream that takes everything: after its first error, all goes nowhere.
+
+    So nothing that prints is stopped by whoever reads, or does not: `error` says at the end.
+    """
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.error: OSError | None = None
+
+    def write(self, content: Any, /) -> int:
+        """Write all, or keep why not."""
+        rest = memoryview(content)
+        while rest and self.error is None:
+            try:
+                rest = rest[os.write(self.number, rest) :]
+            except BlockingIOError:  # a pipe that others have set so, and that is full
+                select([], [self.number], [])
+            except OSError as error:
+                self.error = error
+        return len(content)
+
+    def drop(self) -> None:
+        """Write no more: what is left may wait for a reader that never comes."""
+        self.error = self.error or BrokenPipeError()
+
+    def writable(self) -> bool:
+        """Always."""
+        return True
+
+    def fileno(self) -> int:
+        """The number it had from the start."""
+        return self.number
+
+    def isatty(self) -> bool:
+        """Whether it is a terminal."""
+        return os.isatty(self.number)
+
+
+OUTPUT, MESSAGES = Stream(1), Stream(2)
 
 
 def open_streams() -> None:
     """Point closed streams to nowhere, so that no file gets their number and is written to.
 
-    What standard output cannot spell is escaped.
+    What a stream cannot spell is escaped.
     """
     for number in range(3):
         try:
@@ -20,56 +61,28 @@ def open_streams() -> None:
             os.open(os.devnull, os.O_RDONLY if number == 0 else os.O_WRONLY)
     # closed by nobody: they are the process's own until its end
     sys.stdin = sys.stdin or os.fdopen(0, encoding="utf-8")
-    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8")
-    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8")
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
+    sys.stdout = _text(OUTPUT, sys.stdout, by_line=OUTPUT.isatty())
+    sys.stderr = _text(MESSAGES, sys.stderr, by_line=True)
 
 
-def discard(stream: TextIO) -> None:
-    """Let what a stream still holds go nowhere, so that the interpreter can end in peace."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, stream.fileno())
-    os.close(null)
+def is_read() -> bool:
+    """Whether standard output still goes anywhere."""
+    return OUTPUT.error is None
+
+
+def _text(stream: Stream, before: TextIO | None, *, by_line: bool) -> TextIO:
+    """Text as it was written before, to a stream that takes everything."""
+    at_once = getattr(before, "write_through", False)
+    binary: Any = stream if at_once else io.BufferedWriter(stream)
+    return io.TextIOWrapper(
+        binary,
+        encoding=before.encoding if before else "utf-8",
+        errors="backslashreplace",
+        line_buffering=by_line,
+        write_through=at_once,
+    )
 
 
 def say(message: str) -> None:
     """Print on standard error; where that cannot be, the exit code has to do."""
-    with suppress(OSError):
-        print(message, file=sys.stderr, flush=True)
-
-
-@contextmanager
-def patient_output() -> Iterator[None]:
-    """Hold back an error of standard output until the block is done, so that files get written."""
-    stream = sys.stdout
-    patient = _Patient(stream)
-    sys.stdout = patient
-    try:
-        yield
-    finally:
-        sys.stdout = stream
-    if patient.error is not None:
-        raise patient.error
-
-
-class _Patient(io.TextIOBase):
-    """Writes through; after the first error it swallows all that follows."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self.stream = stream
-        self.error: OSError | None = None
-
-    def write(self, text: str) -> int:
-        """Write, or keep why not."""
-        if self.error is None:
-            try:
-                return self.stream.write(text)
-            except OSError as error:
-                self.error = error
-                discard(self.stream)
-        return len(text)
-
-    def isatty(self) -> bool:
-        """Whether the stream behind is a terminal."""
-        return self.stream.isatty()
+    print(message, file=sys.stderr, flush=True)

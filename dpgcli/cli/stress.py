@@ -16,7 +16,7 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Quiet, Settings, check_installed
 from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import patient_output, say
+from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
     from dpgcli.accuracy.gauntlet import Case
@@ -61,10 +61,9 @@ def stress(
     check_outputs(sources, (output, Mark.TABLE))
     check_table_name(output)
     began = perf_counter()
-    with patient_output():
-        outcomes = _printed(printed_as, _progress(cases, quiet), finger)
-        if output is not None:
-            _write(output, outcomes, checked)
+    outcomes = _printed(printed_as, _progress(cases, quiet), finger)
+    if output is not None:
+        _write(output, outcomes, checked)
     if not quiet:
         sys.stdout.flush()
         say(_summary(outcomes, perf_counter() - began))

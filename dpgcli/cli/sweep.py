@@ -13,7 +13,17 @@ import typer
 from dpgcli.cli.check import append_summary, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated
-from dpgcli.cli.options import LONG, MaxFailed, Quiet, Settings, TargetError, Tolerance, millimeters
+from dpgcli.cli.options import (
+    LONG,
+    MOST_PROCESSES,
+    MaxFailed,
+    Quiet,
+    Settings,
+    TargetError,
+    Tolerance,
+    millimeters,
+    seconds,
+)
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
 from dpgcli.cli.run import check_failed, run_facts, run_summary
@@ -29,6 +39,8 @@ if TYPE_CHECKING:
     from dpgcli.studies.sweep import Progress, Shard, Study
 
 MOST_NAMED = 20
+WAIT = "5m"
+ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 
 class ExecutorName(StrEnum):
@@ -42,11 +54,18 @@ class ExecutorName(StrEnum):
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")]
 Jobs = Annotated[
-    int | None, typer.Option("-j", "--jobs", min=1, help="Processes  [default: cores]")
+    int | None,
+    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
 ]
 Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
 Scheduler = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask: tcp://host:port")
+]
+Wait = Annotated[
+    str | None,
+    typer.Option(
+        "--wait", metavar="TIME", help="For a worker of Dask, while none is there  [default: 5m]"
+    ),
 ]
 Part = Annotated[
     str | None, typer.Option("--shard", metavar="K/N", help="Only part K of N; see merge")
@@ -69,6 +88,7 @@ def sweep(
     jobs: Jobs = None,
     executor: Where = ExecutorName.PROCESSES,
     scheduler: Scheduler = None,
+    wait: Wait = None,
     shard: Part = None,
     settings: Settings = None,
     tolerance: Tolerance = None,
@@ -89,7 +109,7 @@ def sweep(
     from dpgcli.studies.sweep import drop_half_written, drop_parts, outputs
 
     part = _shard(shard)
-    _check_executor(executor, scheduler)
+    limit = _patience(executor, scheduler, wait)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     study = _study(spec, settings or (), output, tolerance, target_error)
@@ -109,7 +129,7 @@ def sweep(
             _check_folder(study, restart=restart, force=force)
             if not quiet:
                 _say_before(study)
-            progress = _computed(study, _workplace(executor, jobs, scheduler), part, quiet)
+            progress = _computed(study, _workplace(executor, jobs, scheduler, limit), part, quiet)
             _conclude(study, progress, part, settings or (), quiet)
         else:
             if part is None and study.owns_all_parts:  # what a run left that was stopped at its end
@@ -280,25 +300,33 @@ def _shard(text: str | None) -> "Shard | None":
     return Shard(int(match[1]), int(match[2]))
 
 
-def _check_executor(executor: ExecutorName, scheduler: str | None) -> None:
+def _patience(executor: ExecutorName, scheduler: str | None, wait: str | None) -> float:
+    """How long a worker of Dask may be waited for, in s."""
     from dpgcli.errors import UsageError
 
     if (executor is ExecutorName.DASK) != (scheduler is not None):
         raise UsageError("--executor dask and --scheduler tcp://host:port go together")
+    if scheduler is not None and re.fullmatch(ADDRESS, scheduler) is None:
+        raise UsageError(f"--scheduler {scheduler}: expected tcp://host:port")
+    if scheduler is None and wait is not None:
+        raise UsageError("--wait is for the workers of --executor dask")
+    return seconds("--wait", wait or WAIT)
 
 
-def _workplace(executor: ExecutorName, jobs: int | None, scheduler: str | None) -> "Workplace":
+def _workplace(
+    executor: ExecutorName, jobs: int | None, scheduler: str | None, limit: float
+) -> "Workplace":
     from dpgcli.errors import UsageError
-    from dpgcli.exploration import executors
+    from dpgcli.exploration import cluster, executors
 
     if scheduler is not None:
         try:
-            return executors.dask_cluster(scheduler)
+            return cluster.dask_cluster(scheduler, limit, say)
         except ImportError as error:
             raise UsageError("--executor dask needs Dask: pip install distributed") from error
         except (OSError, ValueError) as error:
             what = f"--scheduler {scheduler}: no scheduler or no worker answers"
-            raise UsageError(f"{what}: {error}") from error
+            raise UsageError(f"{what}: {str(error) or 'time is up'}") from error
     n_workers = jobs or os.cpu_count() or 1
     if executor is ExecutorName.SERIAL or n_workers == 1:
         return executors.serial()

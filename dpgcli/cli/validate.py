@@ -1,7 +1,5 @@
 """`dpg validate`: check specs without solving."""
 
-import sys
-from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -43,9 +41,7 @@ def validate(
         else:
             if listed_as is ProblemFormat.TEXT:
                 print(f"{path}: ok")
-    with suppress(BrokenPipeError):  # the verdict stands when nobody reads on
-        _PRINTERS[listed_as](problems)
-        sys.stdout.flush()
+    _PRINTERS[listed_as](problems)
     if problems:
         raise typer.Exit(ExitCode.USAGE)
 

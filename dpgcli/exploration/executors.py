@@ -7,25 +7,30 @@ failed, and everything else goes on. If nothing but failures comes back, it is n
 the run gives up.
 """
 
+import atexit
 import os
 import signal
+import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
+from dpgcli.temporary import temporary_folder
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -35,7 +40,8 @@ Arguments = Callable[["Chunk"], tuple[Any, ...]]
 UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
 TRIALS = 3  # workers that must fail to do nothing before none is believed to start
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
-CLUSTER_PATIENCE = 10  # s
+PERIOD = 1.0  # s, of looking after a workplace while nothing comes back
+LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GO_ON = "What is done is kept, and the same command goes on from there."
 
@@ -131,7 +137,7 @@ class Runner(Generic[T]):
                     while waiting and len(under_way) < UNDER_WAY_PER_WORKER * n_workers:
                         future = executor.submit(self.function, *self.arguments(waiting[0]))
                         under_way[future] = waiting.popleft()
-                    for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                    for future in self._done(under_way):
                         value = future.result()
                         yield Result(under_way.pop(future), value)
             except self.workplace.broken:
@@ -141,11 +147,20 @@ class Runner(Generic[T]):
                     future.cancel()
         return list(under_way.values())
 
+    def _done(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+        """What is done as soon as something is; meanwhile the workplace is looked after."""
+        began = monotonic()
+        while not (done := wait(futures, PERIOD, FIRST_COMPLETED).done):
+            self.workplace.watch(monotonic() - began)
+        return done
+
     def _run_alone(self, chunk: Chunk) -> Iterator[Result[T]]:
         """A chunk that may be to blame, in a pool of its own; halved if it is."""
         try:
             with self._open(1) as executor:
-                value = executor.submit(self.function, *self.arguments(chunk)).result()
+                future = executor.submit(self.function, *self.arguments(chunk))
+                self._done([future])
+                value = future.result()
         except self.workplace.broken:
             if chunk.is_single:
                 yield Result(chunk, None)
@@ -160,10 +175,13 @@ class Runner(Generic[T]):
         for is_last in (*(False,) * (TRIALS - 1), True):
             try:
                 with self._open(1) as executor:
-                    executor.submit(os.getpid).result()
+                    trial = executor.submit(os.getpid)
+                    self._done([trial])
+                    trial.result()
             except self.workplace.broken as error:
                 if is_last:
-                    said = f"{self.workplace.name}: workers do not start. {GO_ON}"
+                    why = str(error) or type(error).__name__
+                    said = f"{self.workplace.name}: workers do not start ({why}). {GO_ON}"
                     raise WorkplaceError(said) from error
             else:
                 return
@@ -184,8 +202,10 @@ class Workplace:
     """Where to run: how to make an executor of n workers, and how many.
 
     `is_local` says that workers see this machine's files. `broken` is what an executor raises
-    when a worker dies, `lost` when there is nobody left to ask. `ask` calls a function in each
+    when a worker dies, `lost` when there is nobody left to ask. `ask` puts a question to each
     worker that may be of another installation: what it returns or raises, by the worker's name.
+    `watch` is called with the seconds for which nothing has come back, and may raise
+    WorkplaceError.
     """
 
     name: str
@@ -195,6 +215,7 @@ class Workplace:
     broken: tuple[type[BaseException], ...] = (BrokenExecutor,)
     lost: tuple[type[BaseException], ...] = ()
     ask: Callable[[Callable[[], Any]], dict[str, Any]] = lambda _: {}
+    watch: Callable[[float], None] = lambda _: None
 
 
 def serial() -> Workplace:
@@ -204,30 +225,7 @@ def serial() -> Workplace:
 
 def processes(n_workers: int) -> Workplace:
     """A pool of processes on this machine."""
-    broken = (BrokenExecutor, EOFError)  # the latter of a fork server that is gone
-    return Workplace("the pool of processes", process_pool, n_workers, broken=broken)
-
-
-def dask_cluster(scheduler: str) -> Workplace:
-    """The workers of a Dask cluster; raises OSError where no scheduler or no worker answers."""
-    import logging
-
-    from distributed import Client, KilledWorker
-    from distributed.comm.core import CommClosedError
-
-    for name in ("distributed", "distributed.client", "tornado.application"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is raised
-    client = Client(scheduler, timeout=CLUSTER_PATIENCE, set_as_default=False)
-    client.wait_for_workers(1, timeout=CLUSTER_PATIENCE)
-    return Workplace(
-        f"the Dask cluster at {scheduler}",
-        lambda _: client.get_executor(pure=False),
-        sum(client.nthreads().values()),
-        is_local=False,
-        broken=(BrokenExecutor, KilledWorker),
-        lost=(CancelledError, CommClosedError),
-        ask=lambda function: client.run(function, on_error="return"),
-    )
+    return Workplace("the pool of processes", process_pool, n_workers)
 
 
 class SerialExecutor(Executor):
@@ -258,6 +256,7 @@ def start_fork_server(*modules: str) -> None:
     """
     from multiprocessing import forkserver, resource_tracker
 
+    _own_temporary_folder()
     if modules:
         forkserver.set_forkserver_preload(list(modules))
     # what a terminal sends to all its processes is for this one to answer: the others inherit
@@ -271,13 +270,41 @@ def start_fork_server(*modules: str) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@cache
+def _own_temporary_folder() -> None:
+    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
+
+    Raises WorkplaceError where there can be no temporary files.
+    """
+    from multiprocessing import current_process
+
+    try:
+        place = tempfile.gettempdir()
+        place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
+        held = ExitStack()
+        folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
+    except OSError as error:
+        raise WorkplaceError(f"no folder for temporary files: {error}") from error
+    atexit.register(held.close)
+    vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
+
+
 class _Pool(ProcessPoolExecutor):
     """A pool that no signal stops halfway through starting or ending its processes."""
 
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """As of the base."""
+        """As of the base; without a fork server the pool is broken.
+
+        Raises WorkplaceError where the system allows no more processes.
+        """
         with _held_signals():
-            return super().submit(fn, *args, **kwargs)
+            try:
+                return super().submit(fn, *args, **kwargs)
+            except (ConnectionError, FileNotFoundError, EOFError) as error:
+                raise BrokenExecutor("the fork server is gone") from error
+            except OSError as error:
+                said = f"cannot start a process: {error.strerror}. Take fewer --jobs. {GO_ON}"
+                raise WorkplaceError(said) from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of the base."""

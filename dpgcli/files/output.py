@@ -4,13 +4,13 @@ import fcntl
 import os
 import re
 import stat
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
+from dpgcli.temporary import temporary_file
 
 ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
 
@@ -47,17 +47,12 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))
     try:
-        temporary = _beside(target)
-        try:
+        with _beside(target) as temporary:
             yield temporary
             _sync(temporary, os.O_RDWR)
             _check_replaceable(target, mark)
             temporary.replace(target)
             _sync(target.parent, os.O_RDONLY)
-        except BaseException:
-            with suppress(OSError):
-                temporary.unlink()
-            raise
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -131,8 +126,8 @@ def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:
     try:
         if path.is_dir():
             raise IsADirectoryError(None, "is a folder")
-        _beside(target).unlink()
-        _check_replaceable(target, mark)
+        with _beside(target):
+            _check_replaceable(target, mark)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -179,22 +174,17 @@ def _check_replaceable(target: Path, mark: Mark) -> None:
         raise FileExistsError(None, f"it is there and not of dpg; {hint}")
 
 
-def _beside(path: Path) -> Path:
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
     """An empty file in the same folder, with the permissions of the old one or of a new one.
 
     Renaming over a device or pipe would replace it, /dev/null for the whole machine.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(None, "is a device or pipe, not a file")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".tmp", dir=path.parent)
-    try:
+    with temporary_file(path) as (temporary, handle):
         _permit(handle, path)
-    except BaseException:
-        Path(name).unlink()
-        raise
-    finally:
-        os.close(handle)
-    return Path(name)
+        yield temporary
 
 
 def _permit(handle: int, old: Path) -> None:

@@ -24,6 +24,7 @@ from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.tables import record_batch, schema
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import Columns
+from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
 LENGTH = struct.Struct("<Q")
@@ -106,17 +107,16 @@ class PartStore:
     @contextmanager
     def part(self, start: int, stop: int) -> Iterator[IO[bytes]]:
         """A file to write the bytes of a part to; stored whole or not at all."""
-        scratch = self.folder / f".{start:010d}-{stop:010d}.tmp"
+        place = self.folder / f"{start:010d}-{stop:010d}"
         try:
-            with scratch.open("wb") as file:
-                yield file
-            name = f"{start:010d}-{stop:010d}-{_digest(scratch)}.part"
-            with whole_file(self.folder / name, Mark.ANY) as temporary:
-                scratch.replace(temporary)
+            with temporary_file(place) as (scratch, _):
+                with scratch.open("wb") as file:
+                    yield file
+                name = f"{place.name}-{_digest(scratch)}.part"
+                with whole_file(self.folder / name, Mark.ANY) as temporary:
+                    scratch.replace(temporary)
         except OSError as error:
-            raise OutputError(f"cannot write {scratch}: {error.strerror or error}") from error
-        finally:
-            scratch.unlink(missing_ok=True)
+            raise OutputError(f"cannot write {place}: {error.strerror or error}") from error
 
     def say(self, said: dict[str, str]) -> None:
         """Keep what the sweep is about beside its parts."""

@@ -121,6 +121,8 @@ READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
 
 def read_run(path: Path) -> dict[str, Any] | None:
     """The facts of a run; None if there is no such file. Raises UsageError for other content."""
+    if path.is_fifo():  # it would be waited for
+        return None
     try:
         facts = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

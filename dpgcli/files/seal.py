@@ -28,6 +28,8 @@ def seal(path: Path) -> None:
 
 def is_whole(path: Path) -> bool | None:
     """Whether a table is as it was sealed; None where there is none, or one without a seal."""
+    if not path.is_file():  # a pipe would be waited for
+        return None
     try:
         with path.open("rb") as stream:
             return is_whole_in(stream)

@@ -4,9 +4,8 @@ import os
 import shutil
 import signal
 import subprocess
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -16,6 +15,7 @@ from dpgcli.calibration.fe.models import Model
 from dpgcli.calibration.fe.results import displacements, reported_error, version
 from dpgcli.errors import OutputError, SolverError, UsageError
 from dpgcli.files.output import Mark, is_own, whole_file
+from dpgcli.temporary import temporary_folder
 
 SOLVER = "ccx"
 MARKS = {
@@ -140,28 +140,46 @@ def solve(deck: Path, limits: Limits) -> Output:
 def _ended(job: str, folder: Path, log: IO[bytes], limits: Limits, log_name: Path) -> int:
     """The exit code of CalculiX, which does not outlive this function."""
     environment = {**os.environ, **dict.fromkeys(THREADS, str(limits.n_threads))}
-    try:
-        process = subprocess.Popen(
-            [SOLVER, job],
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,  # a group of its own, to be ended as a whole
-        )
-    except OSError as error:
-        raise SolverError(f"cannot start {SOLVER}: {error.strerror}") from error
-    try:
-        return process.wait(limits.time_limit)
-    except subprocess.TimeoutExpired:
-        limit = f"{limits.time_limit:g} s (--time-limit)"
-        raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
-    finally:
-        if process.returncode is None:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+    with _doomed_group() as group:
+        try:
+            process = subprocess.Popen(
+                [SOLVER, job],
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                process_group=group,
+            )
+        except OSError as error:
+            raise SolverError(f"cannot start {SOLVER}: {error.strerror}") from error
+        try:
+            return process.wait(limits.time_limit)
+        except subprocess.TimeoutExpired:
+            limit = f"{limits.time_limit:g} s (--time-limit)"
+            raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
+        finally:
+            os.killpg(group, signal.SIGKILL)
             process.wait()
+
+
+@contextmanager
+def _doomed_group() -> Iterator[int]:
+    """A group of processes, all of which end with this block, and if this process is killed.
+
+    A shell in it waits for the end of a pipe that this process alone can write to.
+    """
+    with subprocess.Popen(
+        ["/bin/sh", "-c", "read line; kill -KILL 0"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        process_group=0,
+    ) as shell:
+        try:
+            yield shell.pid
+        finally:
+            os.killpg(shell.pid, signal.SIGKILL)
 
 
 def _failure(code: int, said: str, log: Path) -> str:
@@ -175,11 +193,8 @@ def _failure(code: int, said: str, log: Path) -> str:
 def _scratch(deck: Path) -> Iterator[Path]:
     """A folder beside the deck with a copy of it, gone at the end."""
     try:
-        scratch = Path(tempfile.mkdtemp(prefix=f".{deck.stem}-", dir=deck.parent))
-        try:
+        with temporary_folder(deck) as scratch:
             shutil.copy(deck, scratch)
             yield scratch
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"cannot write {deck.parent}: {error.strerror or error}") from error

@@ -2,8 +2,10 @@
 
 import hashlib
 import os
+import pkgutil
 import platform
 import sys
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,12 +43,10 @@ def code_of(package: Path) -> str:
     return digest.hexdigest()
 
 
+# who works in this process, found when it began to: its files may have changed since
 HERE = Maker(dpgcli.__version__, np.__version__, code_of(Path(dpgcli.__file__).parent))
-
-
-def here() -> Maker:
-    """Who works in this process, found when it began to: its files may have changed since."""
-    return HERE
+# asked with a function that every Python has: one of this package would end a worker without it
+WHO = partial(pkgutil.resolve_name, f"{__name__}:HERE")
 
 
 def check_maker(maker: Maker) -> None:
@@ -58,7 +58,7 @@ def check_maker(maker: Maker) -> None:
 
 def check_workers(workplace: Workplace) -> None:
     """Ask all workers that are there; raises WorkplaceError for the first that is another."""
-    for worker, maker in workplace.ask(here).items():
+    for worker, maker in workplace.ask(WHO).items():
         if maker != HERE:
             says = str(maker) if isinstance(maker, Maker) else f"another dpg, or none ({maker!r})"
             raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE))

@@ -23,6 +23,7 @@ from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.studies.extent import Extent, size_text
 from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
+from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 STATES, DESIGNS = "states.parquet", "designs.parquet"
@@ -277,10 +278,9 @@ def drop_parts(folder: Path) -> None:
 
 
 def drop_half_written(folder: Path) -> None:
-    """Remove what a killed run was about to write; for who alone is at work in the folder."""
-    for name in (STATES, DESIGNS, RUN, REPORT):
-        for stale in folder.glob(f".{name}.*.tmp"):
-            stale.unlink()
+    """Remove what a killed run was about to write."""
+    for path, _ in outputs(folder):
+        drop_orphans(path)
 
 
 def stores(folder: Path) -> list[PartStore]:

@@ -70,14 +70,14 @@ def study(folder: Path) -> tuple[str, str]:
 
 @pytest.fixture
 def run(folder: Path) -> Run:
-    """Run `dpg` as a process of its own; `env` adds to the environment."""
+    """Run `dpg` as a process of its own; `env` adds to the environment, `before` to the program."""
 
     def started(
-        *arguments: str, env: Mapping[str, str] | None = None, **options: Any
+        *arguments: str, env: Mapping[str, str] | None = None, before: str = "", **options: Any
     ) -> "subprocess.CompletedProcess[str]":
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 60}
         return subprocess.run(
-            [*PROGRAM, *arguments],
+            [*PROGRAM[:2], f"{before}\n{PROGRAM[2]}", *arguments],
             cwd=folder,
             env=surroundings(env),
             check=False,

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -139,6 +140,63 @@ def test_a_lost_scheduler_ends_the_sweep_with_a_message(cluster: Cluster, sweep:
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (ExitCode.USAGE, "")
     assert "Traceback" not in errors
+
+
+@pytest.mark.slow
+def test_lost_workers_are_said_and_waited_for(cluster: Cluster, sweep: Path) -> None:
+    """Not for ever; what was done is kept."""
+    address, workers = cluster
+    process = start(sweep, *on_dask(address), "--wait", "12s")
+    until(lambda: list((sweep / "out").rglob("*.part")))
+    for worker in workers:
+        worker.kill()
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (ExitCode.FAILED_CASES, "")
+    first, second = errors.splitlines()
+    assert first.endswith(f"{address}: no worker answers; waiting 12 s for one (--wait)")
+    assert re.search(r"no worker for 1\d s \(--wait\)\. What is done is kept", second)
+    assert list((sweep / "out").rglob("*.part"))
+
+
+BARE = (
+    "import sys; sys.modules['dpgcli'] = None\nfrom distributed.cli.dask_worker import main; main()"
+)
+
+
+@pytest.mark.slow
+def test_a_worker_without_the_package_is_named(
+    cluster: Cluster, sweep: Path, tmp_path: Path
+) -> None:
+    options = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
+    place = ("--local-directory", os.fspath(tmp_path / "bare"))
+    bare = subprocess.Popen(
+        [sys.executable, "-c", BARE, cluster[0], *options, *place],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        until(lambda: list((tmp_path / "bare").rglob("*.dirlock")))
+        time.sleep(1)  # until the scheduler knows it
+        process = start(sweep, *on_dask(cluster[0]))
+        output, errors = process.communicate(timeout=60)
+        assert (process.returncode, output) == (ExitCode.USAGE, "")
+        named = r"worker tcp://127\.0\.0\.1:[0-9]+ of .* has another dpg, or none \(.*dpgcli.*\)"
+        assert re.search(named, errors)
+        assert len(errors.splitlines()) == 1
+        assert bare.poll() is None, "asking does it no harm"
+    finally:
+        bare.kill()
+        bare.wait()
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_says_nothing(sweep: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        process = start(sweep, *on_dask(f"tcp://127.0.0.1:{server.getsockname()[1]}"))
+        output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (ExitCode.USAGE, "")
+    assert "no scheduler or no worker answers: time is up" in errors
+    assert len(errors.splitlines()) == 1
 
 
 @pytest.mark.slow

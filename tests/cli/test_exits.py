@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.options import seconds
+from dpgcli.errors import UsageError
 
 Call = Callable[..., Any]
 COMMANDS = {
@@ -16,8 +18,8 @@ COMMANDS = {
     "--target-error --plot --quiet",
     "explain": "--format --pattern --set --columns --nodes --formulation --tolerance "
     "--target-error",
-    "sweep": "--output --jobs --executor --scheduler --shard --set --tolerance --target-error "
-    "--restart --force "
+    "sweep": "--output --jobs --executor --scheduler --wait --shard --set --tolerance "
+    "--target-error --restart --force "
     "--depfile --require --max-failed --summary-file --quiet",
     "bench": "--set --repeats --target-error --keep --against --first-station --tip-offset "
     "--format --output --plot --json "
@@ -82,6 +84,10 @@ def test_the_version_goes_to_standard_output(call: Call) -> None:
         ("validate",),
         ("validate", "missing.yaml"),
         ("init", "missing/finger.yaml"),
+        ("sweep", "three_unit.yaml", "-o", "out", "-j", "0"),
+        ("sweep", "three_unit.yaml", "-o", "out", "-j", "9" * 20),
+        ("sweep", "three_unit.yaml", "-o", "out", "--shard", "1/" + "9" * 20),
+        ("fe", "dome", "three_unit.yaml", "--out", "out", "--threads", "9" * 20),
     ],
 )
 def test_misuse_is_2_without_output_of_data(call: Call, arguments: tuple[str, ...]) -> None:
@@ -235,3 +241,16 @@ def test_ascii_output_does_no_harm(run: Any, arguments: tuple[str, ...]) -> None
     result: subprocess.CompletedProcess[str] = run(*arguments, env=env)
     assert result.returncode == (ExitCode.USAGE if "--tolerance" in arguments else 0)
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [("5m", 300.0), ("1.5h", 5400.0), ("30s", 30.0), ("12", 12.0)]
+)
+def test_times(text: str, expected: float) -> None:
+    assert seconds("--wait", text) == expected
+
+
+@pytest.mark.parametrize("text", ["", "m", "-5m", "5 d", "inf", "nan", "1e9", "5mm"])
+def test_what_is_no_time(text: str) -> None:
+    with pytest.raises(UsageError, match="expected a time in s, m or h: 5m"):
+        seconds("--wait", text)

@@ -1,6 +1,7 @@
 """Ctrl-C, SIGTERM and a closed terminal, at any time: no broken file, a plain message."""
 
 import resource
+import select
 import signal
 import subprocess
 import sys
@@ -59,6 +60,64 @@ main()
     )
     assert done.returncode == ExitCode.INTERRUPTED
     assert done.stderr == "dpg: interrupted; nothing half-written is left\n"
+
+
+CONVERTING = """
+try:
+    os.kill(os.getpid(), signal.{name})
+    sum(map(abs, range(99)))
+except BaseException as error:
+    raise ImportError("failed to import") from error
+"""
+DESTROYED = """
+class Last:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+        sum(map(abs, range(99)))
+last = [Last()]
+"""
+
+
+@pytest.mark.parametrize("place", [CONVERTING, DESTROYED], ids=["import", "destructor"])
+@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+def test_an_interrupt_where_others_would_catch_it(
+    tmp_path: Path, place: str, number: signal.Signals, code: int, word: str
+) -> None:
+    """As extension modules do that start, and Python itself where nothing can be raised."""
+    (tmp_path / "odd.py").write_text("import os, signal\n" + place.format(name=number.name))
+    program = """
+import time, typer
+from dpgcli.cli.exits import command, run_and_exit
+app = typer.Typer()
+@app.command()
+@command
+def work():
+    import odd
+    getattr(odd, "last", []).clear()
+    time.sleep(20)
+    print("went on")
+run_and_exit(app)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr == f"dpg: {word}; nothing half-written is left\n"
+
+
+@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+def test_an_interrupt_while_nobody_reads(
+    start: Any, number: signal.Signals, code: int, word: str
+) -> None:
+    """A reader that is there and never reads keeps nobody from ending."""
+    process = start("predict", "twenty_unit.yaml", "--format", "csv")
+    with select.epoll() as poll:
+        poll.register(process.stdout, select.EPOLLIN)
+        assert poll.poll(30)
+    time.sleep(0.5)  # until the pipe is full
+    process.send_signal(number)
+    assert process.wait(10) == code
+    assert process.stderr.read().decode() == f"dpg: {word}; nothing half-written is left\n"
 
 
 @pytest.mark.parametrize(("number", "code", "word"), SIGNALS)

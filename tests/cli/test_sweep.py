@@ -57,10 +57,10 @@ def test_what_a_killed_run_was_writing_goes(call: Any, sweep: Path, is_done: boo
     out.mkdir(exist_ok=True)
     names = ("states.parquet", "designs.parquet", "run.json", "report.md", "notes.txt")
     for name in names:
-        (out / f".{name}.a1b2c3d4.tmp").write_text("half")
+        (out / f".{name}.dpg3.tmp").write_text("half")
     result = call("sweep", "sweep.yaml", *SERIAL, "-q")
     assert result.exit_code == ExitCode.DONE
-    assert [path.name for path in out.glob(".*.tmp")] == [".notes.txt.a1b2c3d4.tmp"]
+    assert [path.name for path in out.glob(".*.tmp")] == [".notes.txt.dpg3.tmp"]
 
 
 def test_two_tables_and_what_differs_between_runs(call: Any, sweep: Path) -> None:
@@ -380,6 +380,12 @@ def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:
         (("--target-error", "1e400mm"), "--target-error 1e400mm: expected a length > 0"),
         (("--target-error", "1mm", "--tolerance", "1e-6"), "drop --tolerance"),
         (("--scheduler", "tcp://x:1"), "go together"),
+        (("--executor", "dask", "--scheduler", "x"), "--scheduler x: expected tcp://host:port"),
+        (("--wait", "5m"), "--wait is for the workers of --executor dask"),
+        (
+            ("--executor", "dask", "--scheduler", "tcp://x:1", "--wait", "soon"),
+            "--wait soon: expected a time in s, m or h: 5m",
+        ),
         (("--summary-file", "none/s.md"), "cannot write none/s.md"),
     ],
 )
@@ -657,3 +663,24 @@ def test_a_finger_of_more_states_than_can_be_is_refused_whatever_is_forced(
     assert result.exit_code == ExitCode.USAGE
     assert "40 units has 1,099,511,627,776 states, more than the 67,108,864" in result.stderr
     assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["states.parquet", "designs.parquet", "run.json", "report.md"])
+def test_a_pipe_among_the_outputs_is_refused_before_any_work(
+    run: Any, sweep: Path, name: str
+) -> None:
+    """Reading it would wait for a writer that never comes."""
+    (sweep.parent / "out").mkdir()
+    os.mkfifo(sweep.parent / "out" / name)
+    result = run("sweep", "sweep.yaml", *SERIAL, "-q", timeout=30)
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr == f"dpg: cannot write out/{name}: is a device or pipe, not a file\n"
+    assert not (sweep.parent / "out" / ".parts").exists()
+
+
+def test_a_pipe_in_the_place_of_a_run_is_not_read(run: Any, call: Any, sweep: Path) -> None:
+    assert call("sweep", "sweep.yaml", *SERIAL).exit_code == ExitCode.DONE
+    (sweep.parent / "out" / "run.json").unlink()
+    os.mkfifo(sweep.parent / "out" / "run.json")
+    assert run("sweep", "sweep.yaml", *SERIAL, timeout=30).returncode == ExitCode.DONE
+    assert run("report", "out", timeout=30).returncode == ExitCode.DONE

@@ -2,10 +2,12 @@
 
 import importlib
 import os
+import resource
+import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import forkserver, get_context
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +16,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.errors import WorkplaceError
-from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked, processes, serial
+from dpgcli.exploration.executors import (
+    Chunk,
+    Runner,
+    Workplace,
+    chunked,
+    process_pool,
+    processes,
+    serial,
+)
 
 
 @pytest.fixture
-def deadly(monkeypatch: pytest.MonkeyPatch) -> Any:
+def deadly() -> Iterator[Any]:
     """Functions that worker processes can import too."""
-    monkeypatch.syspath_prepend(Path(__file__).parent)
-    return importlib.import_module("deadly")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(Path(__file__).parent)
+        yield importlib.import_module("deadly")
 
 
 def results(runner: "Runner[Any]", chunks: Iterator[Chunk]) -> dict[int, Any]:
@@ -154,3 +165,44 @@ def test_a_reader_that_stops_early_leaves_no_thread_behind(deadly: Any, tmp_path
         if thread is not threading.main_thread():
             thread.join(timeout=10)
             assert not thread.is_alive()
+
+
+@pytest.mark.parametrize(("n_times", "ends_well"), [(1, True), (99, False)])
+def test_a_fork_server_that_is_killed_is_started_again(
+    deadly: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, n_times: int, ends_well: bool
+) -> None:
+    """Just after it has been looked at, and before it is asked for a worker."""
+    server: Any = vars(forkserver)["_forkserver"]
+    killed = []
+
+    def unlucky(n_workers: int) -> Any:
+        pool = process_pool(n_workers)
+        monkeypatch.undo()
+        if len(killed) < n_times:
+            killed.append(server._forkserver_pid)
+            os.kill(killed[-1], signal.SIGKILL)
+            os.waitid(os.P_PID, killed[-1], os.WEXITED | os.WNOWAIT)
+            monkeypatch.setattr(server, "ensure_running", lambda: None)
+        return pool
+
+    workplace = Workplace("the pool", unlucky, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    if ends_well:
+        assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}
+    else:
+        with pytest.raises(WorkplaceError, match=r"do not start \(the fork server is gone\)"):
+            list(runner.run(chunked([(0, 12)], 3)))
+    assert killed
+
+
+def test_a_system_that_allows_no_more_processes(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path))
+    process_pool(1).shutdown()  # what is started once is there
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with pytest.raises(WorkplaceError, match="start a process: Too many open files"):
+        try:
+            n_open = len(list(Path("/dev/fd").iterdir()))
+            resource.setrlimit(resource.RLIMIT_NOFILE, (n_open + 9, limits[1]))
+            list(runner.run(chunked([(0, 12)], 3)))
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
