@@ -105,8 +105,8 @@ def sweep(
     if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
         _start_fork_server_early()
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_outputs, sole_use
-    from dpgcli.studies.sweep import drop_half_written, drop_parts, outputs
+    from dpgcli.files.output import sole_use
+    from dpgcli.studies.sweep import drop_half_written, drop_parts
 
     part = _shard(shard)
     limit = _patience(executor, scheduler, wait)
@@ -123,9 +123,7 @@ def sweep(
         if is_new:
             study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
             if part is None:
-                for path in study.damaged:
-                    say(f"{path} is damaged: made again")
-                check_outputs(study.sweep.files, *outputs(output))
+                _check_tables(study)
             _check_folder(study, restart=restart, force=force)
             if not quiet:
                 _say_before(study)
@@ -195,6 +193,16 @@ def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None
     check_apart(written)
     if summary_file is not None:
         check_appendable(summary_file, study.sweep.files)
+
+
+def _check_tables(study: "Study") -> None:
+    """Refuse what cannot be replaced, and say what is damaged."""
+    from dpgcli.files.output import check_outputs
+    from dpgcli.studies.sweep import outputs
+
+    for path in study.damaged:
+        say(f"{path} is damaged: made again")
+    check_outputs(study.sweep.files, *outputs(study.folder))
 
 
 def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:
