@@ -9,19 +9,26 @@ from dpgcli.files.places import Place, located
 from dpgcli.text import control_character
 
 
-def content_of(path: Path, place: Place, most: int, hint: str = "") -> bytes:
-    """The bytes of a file, at most `most`. Raises SpecError for what cannot be read."""
+def content_of(path: Path, place: Place, most: int | None = None, hint: str = "") -> bytes:
+    """The bytes of a file, at most `most`; of a regular file, which has an end, all by default.
+
+    Raises SpecError for what cannot be read.
+    """
     if control := control_character(str(path)):
         expected = "a name without control characters"
         raise SpecError((located(place, "file", expected, f"{control} in it"),))
     try:
         status = path.stat()
-        if stat.S_ISREG(status.st_mode) and status.st_size > most:
+        is_regular = stat.S_ISREG(status.st_mode)
+        if stat.S_ISDIR(status.st_mode) or (most is None and not is_regular):
+            found = "a directory" if stat.S_ISDIR(status.st_mode) else "a device or pipe"
+            raise SpecError((located(place, "file", "a file", found),))
+        if most is None:
+            return path.read_bytes()
+        if is_regular and status.st_size > most:
             raise _too_large(place, most, f"{status.st_size} bytes", hint)
         with path.open("rb") as stream:
             return bounded(stream, place, most, hint)
-    except IsADirectoryError:
-        raise SpecError((located(place, "file", "a file", "a directory"),)) from None
     except (OSError, ValueError) as error:
         found = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None

@@ -1,6 +1,5 @@
 """The file of a sweep: a base spec and a space around it, read and checked."""
 
-import hashlib
 import json
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
@@ -83,9 +82,9 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         Space(tuple(axis for axis in axes if axis is not None)),
         tuple(rule for rule in rules if rule is not None),
         base_path,
-        (path, base_path, *base_document.files, *reader.tables),
+        (path, base_path, *base_document.files, *reader.files),
         spec.model_dump(exclude_none=True, exclude={"base"}),
-        tuple(hashlib.sha256(table.read_bytes()).hexdigest() for table in reader.tables),
+        tuple(reader.files.values()),
     )
 
 

@@ -1,10 +1,15 @@
 """Sweep files: what they say, and every mistake in them with its place."""
 
+import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
@@ -344,6 +349,122 @@ def test_rigid_bars_are_a_value(read: Read) -> None:
 def test_whole_numbers_of_units_count_as_whole(read: Read, axis: str) -> None:
     column = read(axis).space.designs(0, 3)["finger.units"]
     assert (column.dtype.kind, column.tolist()) == ("i", [2, 3, 4])
+
+
+@pytest.mark.parametrize(
+    ("axis", "found"),
+    [
+        ("{key: finger.units, linear: {from: 2, to: 5, count: 3}}", "3.5"),
+        ("{key: finger.units, log: {from: 2, to: 5, count: 3}}", "3.16228"),
+        ("sample: {method: sobol, count: 2, ranges: {finger.units: {from: 2, to: 3}}}", "2.40995"),
+    ],
+)
+def test_steps_of_units_that_are_not_whole_are_refused(read: Read, axis: str, found: str) -> None:
+    """Else every such design were an invalid row."""
+    (problem,) = problems(read, axis)
+    said = f"expected steps that are whole numbers of finger.units, found {found}"
+    assert problem.endswith(f"{said} (list them under values)")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_units_of_a_table_are_whole_though_it_writes_them_with_a_point(
+    read: Read, tmp_path: Path, suffix: str
+) -> None:
+    frame = pd.DataFrame({"finger.units": [3.0, 4.0]})
+    if suffix == "csv":
+        frame.to_csv(tmp_path / "t.csv", index=False)
+    else:
+        frame.to_parquet(tmp_path / "t.parquet")
+    column = read(f"table: t.{suffix}").space.designs(0, 2)["finger.units"]
+    assert (column.dtype.kind, column.tolist()) == ("i", [3, 4])
+
+
+INDICES = {
+    "values": pd.Index([6.0, 7.0], name=HEIGHT),
+    "range": pd.RangeIndex(6, 8, name=HEIGHT),
+    "levels": pd.MultiIndex.from_arrays([[6, 7], [2, 3]], names=[HEIGHT, SEPARATION]),
+}
+
+
+@pytest.mark.parametrize("kind", INDICES)
+def test_an_index_with_a_name_is_a_column(read: Read, tmp_path: Path, kind: str) -> None:
+    pd.DataFrame({"finger.units": [3, 4]}, INDICES[kind]).to_parquet(tmp_path / "t.parquet")
+    found = designs(read("table: t.parquet"))
+    levels = {SEPARATION: [2, 3]} if kind == "levels" else {}
+    assert found == {HEIGHT: [6, 7], **levels, "finger.units": [3, 4]}
+
+
+def test_an_index_without_a_name_is_none_in_parquet_and_refused_in_csv(
+    read: Read, tmp_path: Path
+) -> None:
+    """A data frame that was filtered has one; of a CSV nobody knows that it is one."""
+    frame = pd.DataFrame({HEIGHT: [6, 7, 8]}).loc[[0, 2]]
+    frame.to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {HEIGHT: [6, 8]}
+    frame.to_csv(tmp_path / "t.csv")
+    (problem,) = problems(read, "table: t.csv")
+    assert problem.endswith("found Unnamed: 0 (pandas writes no index where index=False)")
+
+
+def test_unsigned_numbers_beyond_signed_ones_are_refused(read: Read, tmp_path: Path) -> None:
+    frame = pd.DataFrame({HEIGHT: np.array([6, 2**64 - 1], np.uint64)})
+    frame.to_parquet(tmp_path / "t.parquet")
+    frame.to_csv(tmp_path / "t.csv", index=False)
+    for suffix in ("parquet", "csv"):
+        (problem,) = problems(read, f"table: t.{suffix}")
+        assert "found 18446744073709551615 in row 2" in problem
+
+
+def test_nullable_numbers_are_numbers_and_their_gaps_are_said(read: Read, tmp_path: Path) -> None:
+    pd.DataFrame({"finger.units": pd.array([3, 4], "Int64")}).to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {"finger.units": [3, 4]}
+    pd.DataFrame({"finger.units": pd.array([3, None], "Int64")}).to_parquet(tmp_path / "t.parquet")
+    assert 'found "<NA>" in row 2' in problems(read, "table: t.parquet")[0]
+
+
+@pytest.mark.parametrize(
+    "column",
+    [[[1.0], [2.0]], [{"a": 1}, {"a": 2}], [b"1", b"2"], ["1", "2"], pd.to_datetime([1, 2])],
+)
+def test_what_is_no_number_in_parquet_is_refused(
+    read: Read, tmp_path: Path, column: list[Any]
+) -> None:
+    pd.DataFrame({HEIGHT: column}).to_parquet(tmp_path / "t.parquet")
+    assert f"expected finite numbers in column {HEIGHT}" in problems(read, "table: t.parquet")[0]
+
+
+def test_columns_of_one_name_are_refused(read: Read, tmp_path: Path) -> None:
+    pq.write_table(pa.table([[6], [7]], names=[HEIGHT, HEIGHT]), tmp_path / "t.parquet")
+    assert "expected each column once" in problems(read, "table: t.parquet")[0]
+
+
+def test_quotes_in_the_midst_of_a_cell_are_refused(read: Read, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f'{HEIGHT}\n"3"4\n')
+    assert "expected a CSV or Parquet file" in problems(read, "table: t.csv")[0]
+    (tmp_path / "t.csv").write_text(f'"{HEIGHT}"\n"6.5"\n')
+    assert designs(read("table: t.csv")) == {HEIGHT: [6.5]}
+
+
+def test_a_table_is_a_file_and_nothing_else(read: Read, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "t.csv")
+    assert "found a device or pipe" in problems(read, "table: t.csv")[0]
+    assert "found a device or pipe" in problems(read, "table: /dev/zero")[0]
+
+
+def test_nothing_is_quoted_of_a_file_that_is_no_table_of_designs(
+    read: Read, tmp_path: Path
+) -> None:
+    (tmp_path / "secret").write_text("token,owner\nhunter2,root\n")
+    (problem,) = problems(read, "table: secret")
+    assert problem.endswith(
+        "columns that are keys of the spec, such as finger.units, found none in 2"
+    )
+
+
+def test_the_hash_is_of_the_bytes_that_were_read(read: Read, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{HEIGHT}\n6\n")
+    digest = hashlib.sha256((tmp_path / "t.csv").read_bytes()).hexdigest()
+    assert read("table: t.csv").digests == (digest,)
 
 
 def test_sweeps_that_say_the_same_are_the_same(read: Read) -> None:
