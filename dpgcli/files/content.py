@@ -1,12 +1,16 @@
 """Content of files as it is read: bounded, from names without control characters, UTF-8."""
 
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from dpgcli.errors import SpecError
 from dpgcli.files.places import Place, located
 from dpgcli.text import control_character
+
+MAX_BYTES = 256 * 1024  # of what people write
 
 
 def content_of(path: Path, place: Place, most: int | None = None, hint: str = "") -> bytes:
@@ -32,6 +36,23 @@ def content_of(path: Path, place: Place, most: int | None = None, hint: str = ""
     except (OSError, ValueError) as error:
         found = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
+
+
+@contextmanager
+def quoted_if(path: Path, word: bytes, expected: str) -> Iterator[None]:
+    """Keep problems in what a file says to files that have a word in them.
+
+    Whoever names a file in another one need not be allowed to read it: of what is no file of
+    the kind nothing is shown.
+    """
+    try:
+        yield
+    except SpecError:
+        place = Place(str(path))
+        content = content_of(path, place, MAX_BYTES)
+        if word in content or not content:
+            raise
+        raise SpecError((located(place, "file", expected, "something else"),)) from None
 
 
 def bounded(stream: BinaryIO, place: Place, most: int, hint: str = "") -> bytes:

@@ -89,7 +89,8 @@ def read_sheet(path: Path) -> Sheet:
     """
     file = str(path)
     content = content_of(path, Place(file), MAX_BYTES, "a curve or a table of states is short")
-    rows, lines, problems = [], [], []
+    rows: list[list[str]] = []
+    lines, problems = [], []
     text = io.StringIO(decoded(content, Place(file)), newline=None)
     for number, line in enumerate(map(str.strip, text), start=1):
         if line and not (COMMENT.match(line) if rows else line.startswith("#")):

@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.content import bounded, content_of, decoded
+from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
 from dpgcli.files.places import (
     MAX_SHOWN,
     KeyPath,
@@ -27,7 +27,6 @@ from dpgcli.files.places import (
     shown,
 )
 
-MAX_BYTES = 256 * 1024
 MAX_NODES = 10_000
 MAX_DEPTH = 20
 

@@ -1,6 +1,7 @@
 """The file of a sweep: a base spec and a space around it, read and checked."""
 
 import json
+import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -12,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from dpgcli.errors import Problem, SpecError
 from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
+from dpgcli.files.content import quoted_if
 from dpgcli.files.places import KeyPath, in_order, located, shown
 from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec import Spec, canonical_json, read_scene
@@ -28,6 +30,8 @@ from dpgcli.files.sweep.space import SpaceReader
 
 __all__ = ["Sweep", "read_sweep"]
 
+MOST_DESIGNS = 2**63 - 1  # as many as their numbers in tables can count
+MOST_DIGITS = 30
 TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
 
 
@@ -74,12 +78,16 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         for place, text in enumerate(spec.constraints or ())
     ]
     problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
+    space = Space(tuple(axis for axis in axes if axis is not None))
+    if space.size > MOST_DESIGNS:
+        expected, found = f"at most {MOST_DESIGNS:,} designs", _many(space.size)
+        problems.append(document.problem(("space",), expected, found, "take fewer values"))
     if problems or base is None:
         raise SpecError(in_order(problems))
     return Sweep(
         base,
         base_document.data,
-        Space(tuple(axis for axis in axes if axis is not None)),
+        space,
         tuple(rule for rule in rules if rule is not None),
         base_path,
         (path, base_path, *base_document.files, *reader.files),
@@ -94,11 +102,18 @@ def _base(
     """The data of the base and what they mean, None where `problems` now say why not."""
     document = None
     try:
-        document = read_scene(path, settings)
-        return document, checked(document)
+        with quoted_if(path, b"finger", "a spec, with a section finger"):
+            document = read_scene(path, settings)
+            return document, checked(document)
     except SpecError as error:
         problems += error.problems
     return document, None
+
+
+def _many(number: int) -> str:
+    """A large number in digits, or where these are many its power of ten."""
+    power = math.log10(number)
+    return f"{number:,}" if power < MOST_DIGITS else f"about 10^{power:.0f}"
 
 
 def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:

@@ -126,7 +126,7 @@ class SpaceReader:
             return None
         if not self.is_of_designs(path, frame):
             return None
-        columns = {str(key): numbers_in(column) for key, column in frame.items()}
+        columns: dict[str, Any] = {str(key): numbers_in(frame[key]) for key in frame}
         wrong = {key: found for key, found in columns.items() if isinstance(found, str)}
         for key, found in wrong.items():
             self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")

@@ -35,7 +35,7 @@ def frame_in(content: bytes) -> pd.DataFrame:
     """
     if not content.startswith(PARQUET):
         return _csv(content)
-    frame = pq.ParquetFile(pa.BufferReader(content)).read().to_pandas()
+    frame: pd.DataFrame = pq.ParquetFile(pa.BufferReader(content)).read().to_pandas()
     is_named = any(name is not None for name in frame.index.names)
     return frame.reset_index() if is_named else frame
 

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
+from dpgcli.files.sections import UnitGeometry
 from dpgcli.files.sweep import Sweep, read_sweep
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -459,6 +460,27 @@ def test_nothing_is_quoted_of_a_file_that_is_no_table_of_designs(
     assert problem.endswith(
         "columns that are keys of the spec, such as finger.units, found none in 2"
     )
+
+
+@pytest.mark.parametrize("secret", ["hunter2", "hunter2: 1", "- [hunter2", "hunter2: {a: 1}}"])
+def test_nothing_is_quoted_of_a_base_that_is_no_spec(
+    read: Read, tmp_path: Path, secret: str
+) -> None:
+    (tmp_path / "secret").write_text(secret)
+    (problem,) = problems(read, f"{{key: {HEIGHT}, values: [6]}}", head="base: secret")
+    assert problem.endswith("expected a spec, with a section finger, found something else")
+
+
+def test_more_designs_than_can_be_counted_are_counted_exactly(read: Read) -> None:
+    axes = [
+        f"{{key: finger.geometry.{key}, linear: {{from: 1, to: 2, count: 1000}}}}"
+        for key in sorted(UnitGeometry.model_fields)
+    ]
+    more = "{key: finger.linear_stiffness_N_per_mm, linear: {from: 1, to: 2, count: 10}}"
+    (problem,) = problems(read, *axes, more)
+    limit, found = "9,223,372,036,854,775,807", "10,000,000,000,000,000,000"
+    assert problem.startswith(f"2:1: space: expected at most {limit} designs, found {found}")
+    assert read(*axes).space.size == 10**18
 
 
 def test_the_hash_is_of_the_bytes_that_were_read(read: Read, tmp_path: Path) -> None:
