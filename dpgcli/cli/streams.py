@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TextIO
 
+from dpgcli.text import printable
+
 
 def open_streams() -> None:
     """Point closed streams to nowhere, so that no file gets their number and is written to.
@@ -36,7 +38,17 @@ def discard(stream: TextIO) -> None:
 def say(message: str) -> None:
     """Print on standard error; where that cannot be, the exit code has to do."""
     with suppress(OSError):
-        print(message, file=sys.stderr, flush=True)
+        print(_shown(message), file=sys.stderr, flush=True)
+
+
+def put(text: str) -> None:
+    """Print lines that may hold names and texts of others on standard output."""
+    print(_shown(text))
+
+
+def _shown(text: str) -> str:
+    """Lines in which nothing but their ends does anything to a terminal."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import typer
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Settings
+from dpgcli.cli.streams import put
 from dpgcli.errors import Problem
 
 MOST_ANNOTATIONS = 9  # GitHub shows ten per step
@@ -42,7 +43,7 @@ def validate(
             problems.extend(error.problems)
         else:
             if listed_as is ProblemFormat.TEXT:
-                print(f"{path}: ok")
+                put(f"{path}: ok")
     with suppress(BrokenPipeError):  # the verdict stands when nobody reads on
         _PRINTERS[listed_as](problems)
         sys.stdout.flush()

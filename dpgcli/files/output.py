@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
+from dpgcli.text import control_character
 
 
 @contextmanager
@@ -94,6 +95,8 @@ def sole_use(folder: Path) -> Iterator[None]:
     Raises UsageError where another is at work there, OutputError where there can be no such
     folder. A folder that was made and stayed empty is removed.
     """
+    if control := control_character(str(folder)):
+        raise OutputError(f"cannot write {folder}: {control} in it")
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -123,6 +126,8 @@ def _beside(path: Path) -> Path:
 
     Renaming over a device or pipe would replace it, /dev/null for the whole machine.
     """
+    if control := control_character(str(path)):
+        raise OSError(None, f"{control} in it")
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(None, "is a device or pipe, not a file")
     handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".tmp", dir=path.parent)
