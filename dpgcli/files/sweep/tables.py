@@ -52,6 +52,8 @@ def _csv(content: bytes) -> pd.DataFrame:
 def numbers_in(column: "pd.Series[Any]") -> NDArray[Any] | str:
     """The numbers of a column, whole ones as such; or what stands in place of the first."""
     types = pd.api.types
+    if isinstance(column.dtype, pd.CategoricalDtype):
+        column = pd.Series(column.to_numpy())
     is_number = types.is_numeric_dtype(column) and not types.is_bool_dtype(column)
     if not is_number or types.is_complex_dtype(column):
         numbers = pd.to_numeric(column.astype(str), errors="coerce").to_numpy(np.float64)

@@ -423,6 +423,12 @@ def test_nullable_numbers_are_numbers_and_their_gaps_are_said(read: Read, tmp_pa
     assert 'found "<NA>" in row 2' in problems(read, "table: t.parquet")[0]
 
 
+def test_categories_of_numbers_are_numbers(read: Read, tmp_path: Path) -> None:
+    frame = pd.DataFrame({"finger.units": pd.Categorical([4, 3, 4])})
+    frame.to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {"finger.units": [4, 3, 4]}
+
+
 @pytest.mark.parametrize(
     "column",
     [[[1.0], [2.0]], [{"a": 1}, {"a": 2}], [b"1", b"2"], ["1", "2"], pd.to_datetime([1, 2])],
