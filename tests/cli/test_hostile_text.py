@@ -81,6 +81,8 @@ def test_a_report_of_a_hostile_table(call: Any, folder: Path, tables: str) -> No
         ("predict", "a\u202eb.yaml"),
         ("predict", "a\u202eb.yaml", "--set", "finger.units=\x1b[2J"),
         ("validate", "no\x1b[2J.yaml"),
+        ("validate", "c\u202ed.yaml", "--format", "github"),
+        ("validate", "calibrated.yaml", "--format", "github", "-s", "finger.calibration=e\u202e"),
         ("predict", "a\u202eb.yaml", "-o", "no\u202e/t.parquet"),
         ("sweep", "no\u2028.yaml", "-o", "out"),
         ("report", "no\x1b[2J"),
@@ -103,6 +105,7 @@ def test_names_of_files_and_columns(
             "    hinge_stiffness_N_mm_per_rad: 24.2\n", ""
         )
     )
+    (folder / "e\u202e").write_text("x: 1")
     (folder / "c\u202ed.yaml").write_text(CALIBRATION)
     (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm,\x1b[2J\n100,51,-10,1\n")
     head = "dome_height_mm,bistable_stiffness_N_per_mm,\x1b[2Jx,[bold]y"
