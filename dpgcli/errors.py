@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from dpgcli.text import printable
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -18,7 +20,8 @@ class Problem:
     def __str__(self) -> str:
         place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
         hint = f" ({self.hint})" if self.hint else ""
-        return f"{place}: {self.key}: expected {self.expected}, found {self.found}{hint}"
+        said = f"{place}: {self.key}: expected {self.expected}, found {self.found}{hint}"
+        return printable(said)  # in one line, whatever names and values hold
 
 
 class SpecError(Exception):

@@ -12,6 +12,7 @@ FLOORS = {
     "errors": 0,
     "arrays": 0,
     "temporary": 0,
+    "text": 0,
     "mechanics": 1,
     "equilibrium": 2,
     "states": 3,

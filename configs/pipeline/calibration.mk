@@ -7,18 +7,19 @@ SPEC ?= ../three_unit.yaml
 MESH ?= coarse
 # How far a unit opens where its dome rests inverted, mm (assumed: dome height - unit separation).
 STROKE ?= 3.5
+export SPEC MESH STROKE
 
 .DELETE_ON_ERROR:
-.PHONY: all clean
+.PHONY: all clean force
 all: $(OUT)/states.parquet
 
-$(OUT)/dome/dome.csv: $(SPEC)
+$(OUT)/dome/dome.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value
 	$(DPG) fe dome $(SPEC) --out $(@D) --mesh $(MESH) --run
 
-$(OUT)/hinge/hinge.csv: $(SPEC)
+$(OUT)/hinge/hinge.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value
 	$(DPG) fe hinge $(SPEC) --out $(@D) --mesh $(MESH) --run
 
-$(OUT)/dome.yaml: $(OUT)/dome/dome.csv
+$(OUT)/dome.yaml: $(OUT)/dome/dome.csv $(OUT)/STROKE.value
 	$(DPG) fit bistable $< --spec $(SPEC) --travel-to-opening stroke:$(STROKE) \
 	  --branches quasi-static --output $@
 
@@ -28,6 +29,13 @@ $(OUT)/hinge.yaml: $(OUT)/hinge/hinge.csv
 $(OUT)/states.parquet: $(SPEC) $(OUT)/dome.yaml $(OUT)/hinge.yaml
 	$(DPG) predict $(SPEC) --set 'finger.calibration=[$(OUT)/dome.yaml, $(OUT)/hinge.yaml]' \
 	  --uncertainty --output $@
+
+# What a variable was: written where it changes, so that what was made with another is made anew.
+$(OUT)/%.value: force | $(OUT)
+	@printf '%s\n' "$$$*" | cmp -s - $@ || printf '%s\n' "$$$*" > $@
+
+$(OUT):
+	mkdir -p $@
 
 clean:
 	rm -rf $(OUT)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat, escaped
+from dpgcli.text import printable
 
 if TYPE_CHECKING:
     from dpgcli.report.requirements import Verdict
@@ -76,9 +77,9 @@ def append_summary(path: Path, text: str) -> None:
 
 def _print_text(verdicts: Sequence["Verdict"]) -> None:
     for verdict in verdicts:
-        print(verdict)
+        put(str(verdict))
         for failure in verdict.failures(MOST_LINES):
-            print(f"  {failure}")
+            put(f"  {failure}")
         if len(verdict.rows) > MOST_LINES:
             print(f"  and {len(verdict.rows) - MOST_LINES:,} more")
 
@@ -91,7 +92,7 @@ def _print_json(verdicts: Sequence["Verdict"]) -> None:
 
 def _print_github(verdicts: Sequence["Verdict"]) -> None:
     messages = [
-        f"{verdict.requirement.text}: {failure}"
+        f"{printable(verdict.requirement.text)}: {failure}"
         for verdict in verdicts
         for failure in verdict.failures(MOST_ANNOTATIONS)
     ]

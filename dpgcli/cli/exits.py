@@ -79,7 +79,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
 def fail(code: ExitCode, message: str) -> NoReturn:
     """Say why on standard error and end."""
-    for line in message.splitlines():
+    for line in message.split("\n") if message else ():
         say(f"dpg: {line}")
     raise typer.Exit(code)
 

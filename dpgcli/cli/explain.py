@@ -18,6 +18,7 @@ from dpgcli.cli.options import (
     WithUncertainty,
     request_of,
 )
+from dpgcli.cli.streams import put
 
 if TYPE_CHECKING:
     from dpgcli.mechanics.scene import Source
@@ -59,7 +60,7 @@ def explain(
 
         print(json.dumps(facts(made), indent=2))
     else:
-        print("\n".join(_lines(str(spec), made)))
+        put("\n".join(_lines(str(spec), made)))
 
 
 def facts(plan: "Plan") -> dict[str, Any]:

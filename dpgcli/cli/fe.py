@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.calibration.fe.models import Model
@@ -170,14 +170,14 @@ def _carry_out(
         for path in studies.write_deck(model, folder):
             say(f"{path}: removed, it came from another deck")
         if limits is None:
-            print(deck)
+            put(str(deck))
             return
         start = time.monotonic()
         try:
             finding = studies.run(model, folder, limits)
         finally:
-            print(deck)
-        print(curve)
+            put(str(deck))
+        put(str(curve))
     if not quiet:
         sys.stdout.flush()
         say(f"{finding} ({time.monotonic() - start:.3g} s)")

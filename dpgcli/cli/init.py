@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from dpgcli.cli.streams import say
+
 
 def init(
     path: Annotated[Path, typer.Argument(help="File to write; - for standard output")] = Path(
@@ -27,4 +29,4 @@ def init(
         raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
     with whole_file(path, Mark.ANY) as temporary:
         temporary.write_text(starter(), encoding="utf-8")
-    print(f"wrote {path}; next: dpg predict {path}", file=sys.stderr)
+    say(f"wrote {path}; next: dpg predict {path}")

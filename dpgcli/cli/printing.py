@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from dpgcli.states.columns import Column, Kind
+from dpgcli.text import printable
 
 if TYPE_CHECKING:
     from dpgcli.states.rows import Columns
@@ -151,9 +152,11 @@ def print_grid(
     for name, head in heads.items():
         table.add_column(head, justify="left" if name in left else "right", no_wrap=True)
     for row in zip(*(texts[name] for name in heads), strict=True):
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     lines = io.StringIO()
-    plain = Console(file=lines, width=10_000, color_system=None, force_terminal=False)
+    plain = Console(
+        file=lines, width=10_000, color_system=None, force_terminal=False, markup=False, emoji=False
+    )
     plain.print(table)  # never cropped
     print("\n".join(line.rstrip() for line in lines.getvalue().splitlines()))
 

@@ -6,6 +6,8 @@ import sys
 from select import select
 from typing import Any, TextIO
 
+from dpgcli.text import printable
+
 
 class Stream(io.RawIOBase):
     """A standard stream that takes everything: after its first error, all goes nowhere.
@@ -85,4 +87,14 @@ def _text(stream: Stream, before: TextIO | None, *, by_line: bool) -> TextIO:
 
 def say(message: str) -> None:
     """Print on standard error; where that cannot be, the exit code has to do."""
-    print(message, file=sys.stderr, flush=True)
+    print(_shown(message), file=sys.stderr, flush=True)
+
+
+def put(text: str) -> None:
+    """Print lines that may hold names and texts of others on standard output."""
+    print(_shown(text))
+
+
+def _shown(text: str) -> str:
+    """Lines in which nothing but their ends does anything to a terminal."""
+    return "\n".join(map(printable, text.split("\n")))

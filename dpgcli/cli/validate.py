@@ -8,7 +8,9 @@ import typer
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Settings
+from dpgcli.cli.streams import put
 from dpgcli.errors import Problem
+from dpgcli.text import printable
 
 MOST_ANNOTATIONS = 9  # GitHub shows ten per step
 
@@ -40,7 +42,7 @@ def validate(
             problems.extend(error.problems)
         else:
             if listed_as is ProblemFormat.TEXT:
-                print(f"{path}: ok")
+                put(f"{path}: ok")
     _PRINTERS[listed_as](problems)
     if problems:
         raise typer.Exit(ExitCode.USAGE)
@@ -63,7 +65,7 @@ def _print_json(problems: list[Problem]) -> None:
 def _print_github(problems: list[Problem]) -> None:
     """Workflow commands; property values and messages are escaped as GitHub asks."""
     for problem in problems[:MOST_ANNOTATIONS]:
-        place = f"file={escaped(problem.file, ':,')}"
+        place = f"file={escaped(printable(problem.file), ':,')}"
         place += f",line={problem.line}" if problem.line is not None else ""
         place += f",col={problem.column}" if problem.column is not None else ""
         print(f"::error {place}::{escaped(str(problem))}")

@@ -4,7 +4,8 @@ Storage: `band[k, j]` holds A[j+k, j] for the whole batch, shape (bandwidth + 1,
 `reach[j]` says how far down column j may be nonzero, fill-in included; less than the
 bandwidth where the matrix is sparser there. There is no pivoting: the signs of D are the
 signs of the eigenvalues (Sylvester's law of inertia), and a positive definite matrix
-needs none. One singular matrix spoils its own lane only.
+needs none. One singular matrix spoils its own lane only, and nobody is warned of it: the
+signs of its pivots tell.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array
+
+in_lanes = np.errstate(divide="ignore", invalid="ignore", over="ignore")  # a lane's own trouble
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class Factorization:
     reach: tuple[int, ...]
 
 
+@in_lanes
 def factorize(band: Array, reach: tuple[int, ...]) -> Factorization:
     """Factorize in place; `band` is used up.
 
@@ -40,6 +44,7 @@ def factorize(band: Array, reach: tuple[int, ...]) -> Factorization:
     return Factorization(band[1:], band[0], reach)
 
 
+@in_lanes
 def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
     """Overwrite b with y = L⁻¹ b; shape (size, batch) or (size, number, batch)."""
     y = right_hand_sides
@@ -53,6 +58,7 @@ def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
     return y
 
 
+@in_lanes
 def backward(factorization: Factorization, y: Array) -> Array:
     """Overwrite y with x = L⁻ᵀ y, shape (size, batch)."""
     lower = factorization.lower

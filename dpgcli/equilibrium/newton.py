@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
-from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward
+from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
 from dpgcli.mechanics.terms import Evaluation, Potential, evaluate
 
 SUFFICIENT_DECREASE = 1e-4
@@ -59,7 +59,7 @@ class Equilibrium:
         return Equilibrium(*(put(own, other) for own, other in parts))
 
 
-@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # a lane's own trouble
+@in_lanes
 def minimize(
     potential: Potential, guess: Array, tolerance: float, max_iterations: int = 200
 ) -> Equilibrium:

@@ -103,6 +103,7 @@ def check_scale(file: Path, known: KnownStates, length: float) -> None:
 def _unused(sheet: Sheet, n_units: int) -> tuple[str, ...]:
     used = {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units)}
     used |= {*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units)}
+    used -= set() if {*TIP} <= {*sheet.names} else {*TIP}  # one coordinate places no tip
     return tuple(name for name in sheet.names if name not in used)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.temporary import temporary_file
+from dpgcli.text import control_character
 
 ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
 
@@ -139,6 +140,8 @@ def sole_use(folder: Path) -> Iterator[None]:
     Raises UsageError where another is at work there, OutputError where there can be no such
     folder. A folder that was made and stayed empty is removed.
     """
+    if control := control_character(str(folder)):
+        raise OutputError(f"cannot write {folder}: {control} in it")
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -180,6 +183,8 @@ def _beside(path: Path) -> Iterator[Path]:
 
     Renaming over a device or pipe would replace it, /dev/null for the whole machine.
     """
+    if control := control_character(str(path)):
+        raise OSError(None, f"{control} in it")
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(None, "is a device or pipe, not a file")
     with temporary_file(path) as (temporary, handle):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dpgcli.errors import Problem
+from dpgcli.text import printable
 
 KeyPath = tuple[str | int, ...]
 
@@ -50,9 +51,8 @@ def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     >>> shortened("a" * 100, 10)
     'aaaaaaa...'
     """
-    head = text[: limit + 1]
-    printable = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in head)
-    return printable if len(printable) <= limit else printable[: limit - 3] + "..."
+    head = printable(text[: limit + 1])
+    return head if len(head) <= limit else head[: limit - 3] + "..."
 
 
 def shown(value: object) -> str:

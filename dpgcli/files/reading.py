@@ -3,7 +3,7 @@
 import json
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import pandas as pd
 import pyarrow as pa
@@ -15,6 +15,7 @@ from dpgcli.files.seal import is_whole_in
 TEXTS = ("calibration", "status", "reason", "rung")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
+DAMAGED = "damaged: its bytes are not those of its SHA-256; make it again"
 
 
 def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
@@ -48,19 +49,29 @@ def read_undamaged(path: Path) -> Any:
     """
     try:
         with path.open("rb") as stream:  # pyarrow takes no name that is not text
-            is_whole = is_whole_in(stream)
-            if is_whole is not False:  # nothing damaged is decoded
-                with pq.ParquetFile(stream, page_checksum_verification=True) as file:
-                    is_ours = b"dpg.content_sha256" in (file.metadata.metadata or {})
-                    table = file.read()
-                if is_whole or not is_ours:
-                    _ = table.column_names  # raises where they are no text
-                    return table
+            file = undamaged(stream)
+            if file is not None:
+                table = file.read()
+                _ = table.column_names  # raises where they are no text
+                return table
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read {path}: not a Parquet file") from error
-    raise UsageError(f"{path} is damaged: its bytes are not those of its SHA-256; make it again")
+    raise UsageError(f"{path} is {DAMAGED}")
+
+
+def undamaged(stream: BinaryIO) -> Any:
+    """A ParquetFile whose bytes are those of its seal, if `dpg` wrote it; None where they are not.
+
+    Raises OSError and ArrowException for what is no Parquet file.
+    """
+    is_whole = is_whole_in(stream)
+    if is_whole is False:  # nothing damaged is decoded
+        return None
+    file = pq.ParquetFile(stream, page_checksum_verification=True)
+    is_ours = b"dpg.content_sha256" in (file.metadata.metadata or {})
+    return file if is_whole or not is_ours else None
 
 
 def _plain(path: Path, table: Any) -> pd.DataFrame:

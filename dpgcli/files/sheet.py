@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import io
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -13,9 +14,13 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.content import content_of, decoded
 from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import LARGEST
 
+MAX_BYTES = 64 * 1024 * 1024
+COMMENT = re.compile(r"#+\s|#[-+.]?[0-9]|#$")
+TO_COMMENT = "behind the # of a comment stands a space"
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
@@ -79,14 +84,18 @@ class Sheet:
 def read_sheet(path: Path) -> Sheet:
     """Read a CSV file with a header; lines that start with # are comments.
 
+    Below the header a comment has a space or a number behind the #: spreadsheets write #DIV/0!.
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
-    file, content = str(path), _content(path)
-    rows, lines, problems = [], [], []
-    for number, line in enumerate(_text(file, content).splitlines(), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
+    file = str(path)
+    content = content_of(path, Place(file), MAX_BYTES, "a curve or a table of states is short")
+    rows: list[list[str]] = []
+    lines, problems = [], []
+    text = io.StringIO(decoded(content, Place(file)), newline=None)
+    for number, line in enumerate(map(str.strip, text), start=1):
+        if line and not (COMMENT.match(line) if rows else line.startswith("#")):
             try:
-                cells = next(csv.reader([line], skipinitialspace=True))
+                cells = next(csv.reader([line], skipinitialspace=True, strict=True))
             except csv.Error as error:
                 problems.append(located(Place(file, number), "row", "cells of a CSV", str(error)))
                 continue
@@ -104,24 +113,6 @@ def read_sheet(path: Path) -> Sheet:
     return sheet
 
 
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        wrong = located(Place(str(path)), "file", "a readable file", found)
-        raise SpecError((wrong,)) from None
-
-
-def _text(file: str, content: bytes) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        found = f"byte 0x{error.object[error.start]:02x}"
-        hint = "save the file as UTF-8"
-        raise SpecError((located(Place(file), "file", "text in UTF-8", found, hint),)) from None
-
-
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Place(sheet.file, header)
     if len(sheet.names) == 1 and (foreign := [c for c in ";\t" if c in sheet.names[0]]):
@@ -132,7 +123,8 @@ def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
         yield located(top, "header", "each column once", f"{shown(name)} again")
     for row, cells in enumerate(sheet.rows):
         if len(cells) != len(sheet.names):
-            yield sheet.problem(row, "row", f"{len(sheet.names)} cells", str(len(cells)))
+            hint = TO_COMMENT if cells[0].startswith("#") else ""
+            yield sheet.problem(row, "row", f"{len(sheet.names)} cells", str(len(cells)), hint)
     if not sheet.rows:
         yield located(top, "file", "rows below the header", "none")
 
@@ -151,5 +143,6 @@ def _no_number(cell: str) -> tuple[str, str, str]:
     """Expected, found and hint where there is no number."""
     if NUMBER.fullmatch(cell):
         return f"a number of at most {LARGEST:g}", shown(cell), "is the unit another one?"
-    is_comma = NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
-    return "a number", shown(cell), "write a decimal point" if is_comma else ""
+    if NUMBER.fullmatch(cell.replace(",", ".", 1)):
+        return "a number", shown(cell), "write a decimal point"
+    return "a number", shown(cell), TO_COMMENT if cell.startswith("#") else ""

@@ -2,12 +2,11 @@
 
 import math
 import os
-import stat
 import sys
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import MaxDepthExceededError
@@ -16,6 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
 from dpgcli.files.places import (
     MAX_SHOWN,
     KeyPath,
@@ -27,7 +27,6 @@ from dpgcli.files.places import (
     shown,
 )
 
-MAX_BYTES = 256 * 1024
 MAX_NODES = 10_000
 MAX_DEPTH = 20
 
@@ -81,7 +80,7 @@ def read_document(path: str | os.PathLike[str]) -> Document:
     """
     name = os.fspath(path)
     place = Place("<stdin>" if name == "-" else shortened(name, 4096))
-    return parse_document(place.file, _decoded(_content(name, place), place))
+    return parse_document(place.file, decoded(_content(name, place), place))
 
 
 def parse_document(file: str, text: str) -> Document:
@@ -104,43 +103,11 @@ def parse_value(text: str, place: Place) -> Any:
 
 
 def _content(name: str, place: Place) -> bytes:
-    """The bytes of a file, never more than the limit."""
-    try:
-        if name == "-":
-            return _bounded(sys.stdin.buffer, place)
-        status = Path(name).stat()
-        if stat.S_ISREG(status.st_mode) and status.st_size > MAX_BYTES:
-            raise _too_large(place, f"{status.st_size} bytes")
-        with Path(name).open("rb") as stream:
-            return _bounded(stream, place)
-    except IsADirectoryError:
-        raise SpecError((located(place, "file", "a YAML file", "a directory"),)) from None
-    except (OSError, ValueError) as error:
-        found = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
-
-
-def _bounded(stream: BinaryIO, place: Place) -> bytes:
-    content = stream.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        raise _too_large(place, "more")
-    return content
-
-
-def _too_large(place: Place, found: str) -> SpecError:
-    return SpecError((located(place, "file", "at most 256 KiB", found, "a spec is short text"),))
-
-
-def _decoded(content: bytes, place: Place) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = content[: error.start]
-        column = len(before) - (before.rfind(b"\n") + 1) + 1
-        here = Place(place.file, before.count(b"\n") + 1, column)
-        found = f"byte 0x{content[error.start]:02x}"
-        problem = located(here, "file", "text in UTF-8", found, "save the file as UTF-8")
-        raise SpecError((problem,)) from None
+    """The bytes of a file or of standard input, never more than the limit."""
+    hint = "a spec is short text"
+    if name == "-":
+        return bounded(sys.stdin.buffer, place, MAX_BYTES, hint)
+    return content_of(Path(name), place, MAX_BYTES, hint)
 
 
 @dataclass

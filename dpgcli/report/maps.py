@@ -4,6 +4,7 @@ import io
 from html import escape
 from typing import Any
 
+from dpgcli.report.drawing import titled
 from dpgcli.report.summary import DesignSpace, is_alike
 
 DRAWN = (
@@ -40,7 +41,7 @@ def figures(space: DesignSpace) -> str:
     with mpl.rc_context(SVG_SETTINGS):
         figure = Figure(figsize=(10.0, 3.6 * n_rows), layout="constrained", facecolor="white")
         for place, metric in enumerate(metrics, start=1):
-            axes = figure.add_subplot(n_rows, 2, place, xlabel=space.label(space.swept[0]))
+            axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
             _draw(axes, drawn, metric)
         figure.savefig(content, format="svg", metadata=NO_METADATA)
     text = content.getvalue()
@@ -68,7 +69,7 @@ def _draw(axes: Any, space: DesignSpace, metric: str) -> None:
         axes.grid(visible=True, alpha=0.25)
         return
     second = others[0]
-    axes.set_ylabel(space.label(second))
+    axes.set_ylabel(titled(space.label(second)))
     is_large = len(space.designs) > MOST_VECTORS
     if _is_grid(space):
         cells = space.designs.assign(**{metric: designs[metric]})

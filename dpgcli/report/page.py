@@ -10,6 +10,7 @@ import pandas as pd
 from dpgcli.report.maps import figures
 from dpgcli.report.requirements import Verdict
 from dpgcli.report.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
+from dpgcli.text import printable
 
 MARKDOWN_SPECIALS = re.compile(r"([\\`*|<>\[\]])")
 STYLE = """
@@ -74,19 +75,23 @@ def _markdown_table(table: Table) -> str:
 
 
 def _escaped(text: str) -> str:
-    return MARKDOWN_SPECIALS.sub(r"\\\1", " ".join(text.split()))
+    return MARKDOWN_SPECIALS.sub(r"\\\1", printable(" ".join(text.split())))
+
+
+def _entities(text: str) -> str:
+    return escape(printable(" ".join(text.split())))
 
 
 def _html(section: Section, level: int) -> str:
     blocks = [
-        f"<p>{escape(block)}</p>" if isinstance(block, str) else _html_table(block)
+        f"<p>{_entities(block)}</p>" if isinstance(block, str) else _html_table(block)
         for block in section.blocks
     ]
     return "\n".join((f"<h{level}>{escape(section.title)}</h{level}>", *blocks))
 
 
 def _html_table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in table.head)
-    rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in table.rows]
+    head = "".join(f'<th scope="col">{_entities(cell)}</th>' for cell in table.head)
+    rows = ["".join(f"<td>{_entities(cell)}</td>" for cell in row) for row in table.rows]
     lines = "\n".join(f"<tr>{row}</tr>" for row in (head, *rows))
     return f"<div><table>\n{lines}\n</table></div>"

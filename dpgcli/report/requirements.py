@@ -10,6 +10,7 @@ import pandas as pd
 from dpgcli.arrays import Flags, Indices
 from dpgcli.errors import NothingSelectedError, UsageError
 from dpgcli.exploration.expressions import Expression, ExpressionError, expression
+from dpgcli.text import printable
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,10 @@ class Failure:
     reason: str
 
     def __str__(self) -> str:
-        reason = " ".join(self.reason.split())  # one line whatever the table holds
+        reason = " ".join(self.reason.split())
         why = f"{self.status}: {reason}" if reason else _listed(self.found)
-        return f"design {self.design} ({_listed(self.values)}): {why}"
+        said = f"design {self.design} ({_listed(self.values)}): {why}"
+        return printable(said)  # in one line, whatever the table holds
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,12 @@ class Verdict:
 
     def __str__(self) -> str:
         if self.is_met:
-            return f"met: {self.requirement.text}: all {self.n_checked:,} designs"
-        return f"not met: {self.requirement.text}: {len(self.rows):,} of {self.n_checked:,} designs"
+            return f"met: {self._text}: all {self.n_checked:,} designs"
+        return f"not met: {self._text}: {len(self.rows):,} of {self.n_checked:,} designs"
+
+    @property
+    def _text(self) -> str:
+        return printable(self.requirement.text)
 
     def failures(self, limit: int | None = None) -> list[Failure]:
         """The designs that fail, in the order of the table; at most `limit`."""

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
-from dpgcli.equilibrium.banded import backward, factorize, forward
+from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.terms import Evaluation, evaluate
 from dpgcli.states.patterns import chunks, inverted_units
@@ -196,6 +196,7 @@ def _inner_joint(
     return Joint(own[-1], at_own.gradient[-1], factorization.pivots[-1], shift)
 
 
+@in_lanes
 def _outer_joint(batch: Batch, context: Chain, at_context: Evaluation, jacobian: Array) -> Joint:
     """A unit force on the strut moves context and outer half: what the context takes is known.
 

@@ -108,7 +108,7 @@ def _softness(units: Units) -> Array:
     """Σ F H/λ over the units: their turning by moments of the size of those in play."""
     finger = units.finger
     moment = finger.force_scale * finger.segment_height
-    with np.errstate(divide="ignore"):  # without hinges a unit is a mechanism
+    with np.errstate(divide="ignore", over="ignore"):  # without hinges a unit is a mechanism
         softness = moment / _corner_stiffness(units)
     return np.asarray(np.broadcast_to(softness, (finger.n_units, softness.shape[1])).sum(axis=0))
 

@@ -301,8 +301,8 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     finger = batch.formulation.finger
     pose, jacobian = batch.formulation.tip(equilibrium.coordinates)
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a mechanism has zero pivots
-        sides = forward(equilibrium.factorization, sides)
+    sides = forward(equilibrium.factorization, sides)
+    with np.errstate(all="ignore"):  # a mechanism has no stiffness, or nearly none
         scaled = sides * (1.0 / equilibrium.factorization.pivots)[:, None]
         step = [total(sides[:, p] * scaled[:, 3]) for p in range(3)]
         slenderness = (finger.stroke / finger.segment_height).max(axis=0)

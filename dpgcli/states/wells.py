@@ -182,6 +182,7 @@ def _bisected(finger: Finger, grid: Array, places: Indices, *, rises: bool) -> A
     return np.asarray(0.5 * (low + high))
 
 
+@np.errstate(over="ignore")  # a slope of nearly nothing
 def _roots(
     widest: Array, half_height: Array, hinge: Array, linearity: Array
 ) -> tuple[Array, Flags]:

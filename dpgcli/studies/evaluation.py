@@ -14,7 +14,7 @@ from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
 from dpgcli.files.sections import unit_of
 from dpgcli.files.spec import variant
-from dpgcli.files.sweep.space import flattened
+from dpgcli.files.sweep.space import UNITS, flattened
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared
@@ -103,7 +103,7 @@ class Evaluation:
         reasons: dict[int, str] = {}
         allowed = self.allowed(values)
         for place in np.flatnonzero(allowed).tolist():
-            changes = {key: column[place].item() for key, column in values.items()}
+            changes = {key: _said(key, column[place].item()) for key, column in values.items()}
             try:
                 scenes[place] = variant(self.base_data, changes)
             except SpecError as error:
@@ -263,6 +263,11 @@ def _calibration(scene: Scene | None) -> str:
         return ""
     origins = {source.origin for source in scene.sources}
     return next(str(origin) for origin in GRAVEST_FIRST if origin in origins)
+
+
+def _said(key: str, value: float) -> float:
+    """A value as a spec has it: numbers of units are whole, in a list with fractions, too."""
+    return int(value) if key == UNITS and float(value).is_integer() else value
 
 
 def _reason(problem: Problem) -> str:

@@ -19,7 +19,6 @@ from dpgcli.states.patterns import MOST_SELECTED
 DESIGN_SECONDS = 3e-4  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
 PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
-MOST_DESIGNS = 10**10 - 1  # as the names of parts count them
 MOST_CHUNKS = 10**6  # days of work, and a file each
 MOST_SENT = 2**22  # states of a design, about 250 MB
 MOST_ASKED = 10**6  # designs that are held against constraints before the work
@@ -81,10 +80,10 @@ class Extent:
         `is_sent` says that workers send what they have done, each design in one piece.
         """
         size, n_chunks = self.sweep.space.size, self.sweep.space.size // chunk_size
-        if size > MOST_DESIGNS or n_chunks > MOST_CHUNKS:
+        if n_chunks > MOST_CHUNKS:
             raise UsageError(
                 f"{size:,} designs in {n_chunks:,} chunks of work: expected at most "
-                f"{MOST_DESIGNS:,} in {MOST_CHUNKS:,}; take fewer values or units"
+                f"{MOST_CHUNKS:,}; take fewer values or units"
             )
         n_states, most = 2**self.most_units, MOST_SENT if is_sent else MOST_SELECTED
         if n_states > most:

@@ -64,3 +64,18 @@ def test_a_nan_lane_spoils_itself_only() -> None:
     pivots = factorize(spoiled, PROFILES[0]).pivots
     np.testing.assert_array_equal(pivots[:, [0, 2]], np.stack((alone, alone), axis=1))
     assert np.isnan(pivots[:, 1]).all()
+
+
+def test_a_singular_lane_spoils_itself_only_and_warns_nobody() -> None:
+    """Warnings are errors here: zero over zero, and infinities that cancel."""
+    _, band = random_matrix(PROFILES[0], 7, is_definite=True)
+    singular = np.zeros_like(band)
+    singular[1:, 0] = 1.0
+    alone = factorize(band.copy(), PROFILES[0])
+    together = factorize(np.concatenate((band, singular), axis=-1), PROFILES[0])
+    np.testing.assert_array_equal(together.pivots[:, 0], alone.pivots[:, 0])
+    right = np.stack((np.arange(12.0), np.zeros(12)), axis=1)  # an infinity times 0 is none
+    for sweep in (forward, backward):
+        solution, expected = sweep(together, right.copy()), sweep(alone, right[:, :1].copy())
+        np.testing.assert_array_equal(solution[:, 0], expected[:, 0])
+        assert np.isnan(solution[:, 1]).any()

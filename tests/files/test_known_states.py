@@ -92,6 +92,11 @@ def test_the_tips_angle_is_that_of_the_last_phalanx(write, n_units):
     assert read_states(write(both), n_units).angles[-1].tolist() == [-0.5, -0.1]
 
 
+def test_one_coordinate_of_tips_is_said_not_to_be_used(write):
+    known = read_states(write("pattern,tip_y_mm,tip_angle_rad\n10,-6,-0.3\n"), 2)
+    assert known.unused == ("tip_y_mm",)
+
+
 def test_files_as_spreadsheets_write_them(write):
     text = "\ufeffpattern, tip_x_mm, tip_y_mm\r\n\r\n10, 26, -6\r\n"
     assert read_states(write(text), 2).tip.tolist() == [[26], [-6]]
@@ -121,7 +126,7 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
         (HEAD, ["1: file: expected rows below the header, found none"]),
         (
             b"pattern\xff",
-            ["file: expected text in UTF-8, found byte 0xff (save the file as UTF-8)"],
+            ["1:8: file: expected text in UTF-8, found byte 0xff (save the file as UTF-8)"],
         ),
         (
             "patern,tip_x_mm,tip_y_mm\n10,1,2\n",
@@ -214,8 +219,11 @@ def test_what_is_wrong_with_shapes(problems, shapes, said):
 
 
 def test_a_file_that_is_not_there_or_no_file(tmp_path):
-    for path, said in ((tmp_path / "no.csv", "no such file"), (tmp_path, "is a directory")):
-        with pytest.raises(SpecError, match=f"expected a readable file, found {said}"):
+    for path, said in (
+        (tmp_path / "no.csv", "expected a readable file, found no such file"),
+        (tmp_path, "expected a file, found a directory"),
+    ):
+        with pytest.raises(SpecError, match=said):
             read_states(path, 2)
 
 

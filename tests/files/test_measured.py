@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import SpecError
+from dpgcli.files import sheet
 from dpgcli.files.measured import read_curve, read_moments, read_table
 
 DOME = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "elastic_modulus_MPa": 26.0}
@@ -40,6 +41,42 @@ def test_a_cell_without_end(path: Path) -> None:
     path.write_text(f"travel_mm,energy_mJ\n0,0\n{'1' * 200_000},2\nx,3\n", encoding="utf-8")
     with pytest.raises(SpecError, match="3: row: expected cells of a CSV, found field larger"):
         read_curve(path)
+
+
+@pytest.mark.parametrize("error", ["#DIV/0!", "#N/A", "#VALUE!", "#####", "#WERT!", "#NAME?"])
+def test_an_error_of_a_spreadsheet_in_the_first_cell_is_no_comment(path: Path, error: str) -> None:
+    path.write_text(f"# mine\n{GOOD}{error},60\n", encoding="utf-8")
+    with pytest.raises(SpecError) as caught:
+        read_curve(path)
+    said = f'6: travel_mm: expected a number, found "{error}" (behind the # of a comment'
+    assert problems(caught)[0].startswith(said)
+    path.write_text(f"{GOOD}{error}\n", encoding="utf-8")
+    with pytest.raises(SpecError, match="expected 2 cells, found 1"):
+        read_curve(path)
+
+
+def test_comments_below_the_header(path: Path) -> None:
+    path.write_text(f"{GOOD}# 14,60\n#15,60\n#-1,0\n ## a title\n#\n", encoding="utf-8")
+    assert read_curve(path).curve.travel.tolist() == [0.0, 1.0, 13.0]
+
+
+@pytest.mark.parametrize("mark", ["\x0b", "\x0c", "\x1c", "\x1e", "\x85", "\u2028", "\u2029"])
+def test_what_is_no_end_of_a_line_of_csv_starts_no_row(path: Path, mark: str) -> None:
+    path.write_text(f"{GOOD}# a note{mark}14,60\n", encoding="utf-8")
+    assert read_curve(path).curve.travel.tolist() == [0.0, 1.0, 13.0]
+
+
+@pytest.mark.parametrize("text", ['1.5,"2', '1.5,"2"0'])
+def test_an_open_quote_is_no_cell(path: Path, text: str) -> None:
+    path.write_text(f"{GOOD}{text}\n", encoding="utf-8")
+    with pytest.raises(SpecError, match="5: row: expected cells of a CSV"):
+        read_curve(path)
+
+
+def test_a_file_without_end_is_read_to_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sheet, "MAX_BYTES", 2**20)
+    with pytest.raises(SpecError, match="/dev/zero: file: expected at most 1,024 KiB, found more"):
+        read_moments(Path("/dev/zero"))
 
 
 def test_windows_line_ends(path: Path) -> None:
@@ -127,7 +164,7 @@ def test_not_utf8_and_not_there(path: Path) -> None:
         read_curve(path)
     with pytest.raises(SpecError, match="expected a readable file, found no such file"):
         read_curve(path.with_name("none.csv"))
-    with pytest.raises(SpecError, match="expected a readable file, found is a directory"):
+    with pytest.raises(SpecError, match="expected a file, found a directory"):
         read_curve(path.parent)
 
 

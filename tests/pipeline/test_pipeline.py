@@ -71,6 +71,53 @@ def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     assert not (checkout / "configs" / "pipeline" / "out" / "checked").exists()
 
 
+def test_a_stricter_gate_is_held_against_the_tables_that_are_there(checkout: Path) -> None:
+    assert make(checkout, "REQUIRE='min_barrier_mJ > 0.1'").returncode == 0
+    for _ in range(2):
+        stricter = make(checkout, "REQUIRE='min_barrier_mJ > 1e6'")
+        assert stricter.returncode == 2
+        assert "dpg sweep" not in stricter.stdout
+    assert make(checkout, "REQUIRE='min_barrier_mJ > 0.1'").returncode == 0
+    assert "dpg" not in make(checkout, "REQUIRE='min_barrier_mJ > 0.1'").stdout
+
+
+def test_another_sweep_is_no_longer_up_to_date(checkout: Path) -> None:
+    """Its file is older than the tables of the first one."""
+    sweeps = checkout / "configs" / "sweeps"
+    said = "base: ../three_unit.yaml\nspace: [{key: finger.units, values: [3]}]\n"
+    (sweeps / "few.yaml").write_text(said, encoding="utf-8")
+    assert make(checkout).returncode == 0
+    few = make(checkout, "SWEEP=../sweeps/few.yaml")
+    assert few.returncode == 0, few.stderr
+    out = checkout / "configs" / "pipeline" / "out"
+    assert len(pd.read_parquet(out / "designs.parquet")) == 1
+    assert "1 designs" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_other_choices_make_a_calibration_anew(checkout: Path) -> None:
+    """Dry runs: `dpg` prints what it would do, and makes what it is told to."""
+    program = checkout / "bin" / "dpg"
+    program.write_text(
+        '#!/bin/sh\necho ran "$@"\n'
+        'case "$1" in fe) mkdir -p "$5"; touch "$5/$2.csv";; esac\n'
+        'for last; do :; done\ncase "$1" in fit|predict) touch "$last";; esac\n',
+        encoding="utf-8",
+    )
+    folder = checkout / "configs" / "pipeline"
+
+    def ran(choices: str) -> list[str]:
+        done = shell(f"make -f calibration.mk {choices}", checkout, folder)
+        assert done.returncode == 0, done.stderr
+        return [line.split()[1] for line in done.stdout.splitlines() if line.startswith("ran ")]
+
+    everything = ["fe", "fit", "fe", "fit", "predict"]
+    assert sorted(ran("")) == sorted(everything)
+    assert ran("") == []
+    assert ran("STROKE=3.4") == ["fit", "predict"]
+    assert sorted(ran("STROKE=3.4 MESH=fine")) == sorted(everything)
+    assert sorted(ran("STROKE=3.4 MESH=fine SPEC=../five_unit.yaml")) == sorted(everything)
+
+
 def workflow() -> dict[str, Any]:
     text = (ROOT / "configs" / "pipeline" / "ci.yml").read_text(encoding="utf-8")
     loaded: dict[str, Any] = YAML(typ="safe", pure=True).load(text)
@@ -93,6 +140,12 @@ def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
             result = shell(step, checkout, checkout, **env)
             assert result.returncode == 0, (step, result.stderr)
     assert "|" in summary.read_text(encoding="utf-8")
+    (gate,) = [step for step in steps if step.startswith("dpg check")]
+    for threshold, code in (("1e6", 1), ("0.1", 0)):
+        command = gate.replace("> 0.1", f"> {threshold}")
+        assert (
+            shell(command, checkout, checkout, GITHUB_STEP_SUMMARY=str(summary)).returncode == code
+        )
 
 
 @pytest.mark.slow

@@ -56,11 +56,9 @@ def test_numbers_of_a_row_without_a_state_are_nan(graded_finger: Fingers) -> Non
 def test_a_finger_without_hinges_is_a_mechanism(
     reference_finger: Fingers, linear_stiffness: float
 ) -> None:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        finger = reference_finger(3, linear_stiffness, hinge_stiffness=0.0)
-        batch = solve(Units.of(finger), Chain, np.zeros((3, 1), bool), 1e-12)
-        status = certify(batch, Units.of(finger), 1e-12)
-    assert status.tolist() == [Status.MARGINAL]
+    finger = reference_finger(3, linear_stiffness, hinge_stiffness=0.0)
+    batch = solve(Units.of(finger), Chain, np.zeros((3, 1), bool), 1e-12)
+    assert certify(batch, Units.of(finger), 1e-12).tolist() == [Status.MARGINAL]
 
 
 @pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
@@ -74,10 +72,22 @@ def test_a_mechanism_is_predicted_without_warnings(
 def test_one_hingeless_unit_leaves_the_search_finite(reference_finger: Fingers) -> None:
     hinges = np.array([[24.2], [0.0], [24.2]])
     finger = Finger(3, **(reference_finger(3, 1e4).arrays() | {"hinge_stiffness": hinges}))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        units = Units.of(finger)
-        batch = solve(units, Chain, np.zeros((3, 1), bool), 1e-12)
-        assert certify(batch, units, 1e-12).tolist() == [Status.MARGINAL]
+    units = Units.of(finger)
+    batch = solve(units, Chain, np.zeros((3, 1), bool), 1e-12)
+    assert certify(batch, units, 1e-12).tolist() == [Status.MARGINAL]
+
+
+@pytest.mark.parametrize("n_units", [5, 14])  # solved one by one, and as pairs of halves
+@pytest.mark.parametrize("hingeless", [0, 1, 4])
+def test_one_hingeless_unit_is_predicted_without_warnings(
+    reference_finger: Fingers, n_units: int, hingeless: int
+) -> None:
+    """With every column: warnings are errors here, also of lanes that are mechanisms."""
+    hinges = np.full((n_units, 1), 24.2)
+    hinges[hingeless] = 0.0
+    finger = Finger(n_units, **(reference_finger(n_units).arrays() | {"hinge_stiffness": hinges}))
+    rows = predict(Scene(finger, ()), Request(patterns=("0*",), columns=("all",))).arrays()
+    assert set(rows["status"]) == {"marginal"}
 
 
 def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:

@@ -206,12 +206,21 @@ def test_halves_without_hinges_keep_the_energies_of_the_whole(
     hinges[hingeless] = 0.0
     arrays = reference_finger(13).arrays() | {"hinge_stiffness": hinges}
     columns = ("states", "energies")
-    with np.errstate(invalid="ignore", divide="ignore"):
-        prediction = predict(Scene(Finger(13, **arrays), ()), Request(columns=columns))
-        assert prediction.plan.method is Method.PAIRS
-        rows = prediction.arrays()
+    prediction = predict(Scene(Finger(13, **arrays), ()), Request(columns=columns))
+    assert prediction.plan.method is Method.PAIRS
+    rows = prediction.arrays()
     parts = rows["bistable_energy_mJ"] + rows["hinge_energy_mJ"]
     np.testing.assert_allclose(rows["energy_mJ"], parts, rtol=1e-12)
+
+
+@pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
+def test_halves_of_a_mechanism_warn_nobody(
+    reference_finger: Fingers, linear_stiffness: float
+) -> None:
+    """Warnings are errors here; whether the halves agree is found out by solving both."""
+    finger = reference_finger(13, linear_stiffness, hinge_stiffness=0.0)
+    rows = predict(Scene(finger, ()), Request(columns=("states",))).arrays()
+    assert set(rows["status"]) == {"marginal"}
 
 
 @pytest.mark.slow

@@ -165,6 +165,11 @@ def test_invalid_designs_are_rows_with_a_reason(study: Any, tables: Any, axis: s
     assert designs["reason"].str.contains("expected").tolist()[:4] == [True] * 4
 
 
+def test_whole_units_beside_fractions_are_designs(study: Any, tables: Any) -> None:
+    _, designs = tables(study("{key: finger.units, values: [3.5, 3.0, 2]}"))
+    assert designs["status"].tolist() == ["invalid", "stable", "stable"]
+
+
 @pytest.mark.parametrize("value", ["100000", "1000000000"])
 def test_an_absurd_number_of_units_is_an_invalid_design(
     study: Any, tables: Any, value: str

@@ -72,12 +72,10 @@ def test_what_a_cluster_would_have_to_send_at_once_is_refused(study: Any) -> Non
         made.extent.check(made.chunk_size, is_sent=True)
 
 
-@pytest.mark.parametrize("n_axes", [3, 5])
-def test_more_designs_than_anybody_can_wait_for_are_refused(study: Any, n_axes: int) -> None:
-    keys = ("dome_height_mm", "dome_thickness_mm", "channel_width_mm", "unit_separation_mm")
-    axes = [axis(key, 100_000) for key in (*keys, "chamber_length_mm")[:n_axes]]
-    made = study(*axes)
-    with pytest.raises(UsageError, match=f"{10 ** (5 * n_axes):,} designs in"):
+def test_more_designs_than_anybody_can_wait_for_are_refused(study: Any) -> None:
+    keys = ("dome_height_mm", "dome_thickness_mm", "channel_width_mm")
+    made = study(*(axis(key, 2000) for key in keys))
+    with pytest.raises(UsageError, match="8,000,000,000 designs in"):
         made.extent.check(made.chunk_size, is_sent=False)
 
 
@@ -86,12 +84,6 @@ def test_many_small_chunks_are_refused_where_they_are_too_many(study: Any) -> No
     made.extent.check(90, is_sent=False)
     with pytest.raises(UsageError, match=f"{MOST_CHUNKS:,}"):
         made.extent.check(89, is_sent=False)
-
-
-def test_more_designs_than_parts_can_name_are_refused_in_chunks_of_any_size(study: Any) -> None:
-    made = study(axis("dome_height_mm", 100_000), axis("dome_thickness_mm", 100_000))
-    with pytest.raises(UsageError, match=r"10,000,000,000 designs .* at most 9,999,999,999"):
-        made.extent.check(2**15, is_sent=False)
 
 
 def test_more_than_the_memory_of_the_machine_is_refused(

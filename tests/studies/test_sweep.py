@@ -330,8 +330,8 @@ def test_the_room_that_is_asked_for_is_enough_and_not_ten_times_too_much(
 
 def test_a_vast_space_is_refused_at_once(study: Any) -> None:
     axes = [
-        f"{{key: finger.geometry.{key}, linear: {{from: 1, to: 2, count: 1000000}}}}"
-        for key in ("dome_height_mm", "unit_separation_mm", "dome_thickness_mm", "channel_width_mm")
+        f"{{key: finger.geometry.{key}, linear: {{from: 1, to: 2, count: 2000}}}}"
+        for key in ("dome_height_mm", "unit_separation_mm", "dome_thickness_mm")
     ]
     made = study(*axes)
     with pytest.raises(UsageError, match="--force"):

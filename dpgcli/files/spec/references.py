@@ -6,6 +6,7 @@ from typing import Any
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
+from dpgcli.files.content import quoted_if
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
 from dpgcli.files.spec.rules import LINEAR_STIFFNESS, PUBLISHED
@@ -98,4 +99,5 @@ class _Reader:
             self.wrong(path, f"{shown(name)}: no such file")
             return None
         self.files.append(file)
-        return read_calibration(file).model_copy(update={"file": file.name})
+        with quoted_if(file, b"calibration_version", "a calibration file of dpg fit"):
+            return read_calibration(file).model_copy(update={"file": file.name})

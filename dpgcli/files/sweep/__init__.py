@@ -1,7 +1,7 @@
 """The file of a sweep: a base spec and a space around it, read and checked."""
 
-import hashlib
 import json
+import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,12 +13,14 @@ from pydantic import BaseModel, ValidationError
 from dpgcli.errors import Problem, SpecError
 from dpgcli.exploration.expressions import Expression
 from dpgcli.exploration.space import Space
+from dpgcli.files.content import quoted_if
 from dpgcli.files.places import KeyPath, in_order, located, shown
 from dpgcli.files.source import Document, read_document
 from dpgcli.files.spec import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.spec.problems import checked
 from dpgcli.files.spec.settings import SETTING
 from dpgcli.files.sweep.models import (
+    MOST_DESIGNS,
     AxisSpec,
     Between,
     Sample,
@@ -29,6 +31,7 @@ from dpgcli.files.sweep.space import SpaceReader
 
 __all__ = ["Sweep", "read_sweep"]
 
+MOST_DIGITS = 30
 TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
 
 
@@ -76,23 +79,22 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
         for place, text in enumerate(spec.constraints or ())
     ]
     problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
+    space = Space(tuple(axis for axis in axes if axis is not None))
+    if space.size > MOST_DESIGNS:
+        expected, found = f"at most {MOST_DESIGNS:,} designs", _many(space.size)
+        problems.append(document.problem(("space",), expected, found, "take fewer values"))
     if problems or base is None:
         raise SpecError(in_order(problems))
     return Sweep(
         base,
         base_document.data,
-        Space(tuple(axis for axis in axes if axis is not None)),
+        space,
         tuple(rule for rule in rules if rule is not None),
         base_path,
-        (path, base_path, *base_document.files, *reader.tables),
+        (path, base_path, *base_document.files, *reader.files),
         spec.model_dump(exclude_none=True, exclude={"base"}),
-        tuple(map(_digest, reader.tables)),
+        tuple(reader.files.values()),
     )
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _base(
@@ -101,11 +103,18 @@ def _base(
     """The data of the base and what they mean, None where `problems` now say why not."""
     document = None
     try:
-        document = read_scene(path, settings)
-        return document, checked(document)
+        with quoted_if(path, b"finger", "a spec, with a section finger"):
+            document = read_scene(path, settings)
+            return document, checked(document)
     except SpecError as error:
         problems += error.problems
     return document, None
+
+
+def _many(number: int) -> str:
+    """A large number in digits, or where these are many its power of ten."""
+    power = math.log10(number)
+    return f"{number:,}" if power < MOST_DIGITS else f"about 10^{power:.0f}"
 
 
 def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:

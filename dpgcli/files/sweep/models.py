@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+MOST_DESIGNS = 10**10 - 1  # as the names of parts count them
 MOST_POINTS = 10_000_000  # of an axis
 MOST_NUMBERS = 25_000_000  # of all axes: they are held in memory, 8 bytes each
 MOST_KEYS = 256  # each of which is a column of both tables

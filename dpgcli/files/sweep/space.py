@@ -1,18 +1,19 @@
 """The space of a sweep: axes from what its file says, and constraints over their keys."""
 
-import warnings
+import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.errors import Problem, UsageError
+from dpgcli.errors import Problem, SpecError
 from dpgcli.exploration.expressions import Expression, ExpressionError, expression
 from dpgcli.exploration.space import Axis, Range, linear, listed, logarithmic, sampled
+from dpgcli.files.content import content_of
 from dpgcli.files.places import KeyPath, shown
 from dpgcli.files.source import Document
 from dpgcli.files.spec.problems import unknown_key
@@ -27,7 +28,13 @@ from dpgcli.files.sweep.models import (
     Sample,
 )
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 UNITS = "finger.units"
+LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
+INDEX = "pandas writes no index where index=False"
+TABLE = "a CSV or Parquet file of designs"
 
 
 @dataclass
@@ -40,7 +47,7 @@ class SpaceReader:
 
     def __post_init__(self) -> None:
         self.problems: list[Problem] = []
-        self.tables: list[Path] = []
+        self.files: dict[Path, str] = {}  # tables with the SHA-256 of what was read
         self.keys: set[str] = set()
         self.n_numbers = self.n_keys = 0
 
@@ -73,11 +80,28 @@ class SpaceReader:
         made = self.made(path, said, kinds[0]) if self.has_room(path, *_size(said)) else None
         if made is not None:
             self.check_keys((*path, "key" if said.key else kinds[0]), list(made.values))
+            made = self.whole((*path, kinds[0]), made)
         return made
+
+    def whole(self, path: KeyPath, axis: Axis) -> Axis | None:
+        """The axis with numbers of units as whole numbers; None with a problem.
+
+        Fractions that a list or a table has are designs of their own, invalid ones.
+        """
+        if UNITS not in axis.values:
+            return axis
+        units = np.asarray(axis.values[UNITS])
+        fractions = units[(units != np.rint(units)) | ~(np.abs(units) < LARGEST_UNITS)]
+        if not len(fractions):
+            return Axis({**axis.values, UNITS: units.astype(np.int64)})
+        if path[-1] in ("linear", "log", "sample"):
+            expected = f"steps that are whole numbers of {UNITS}"
+            self.wrong(path, expected, f"{fractions[0]:g}", "list them under values")
+        return axis
 
     def made(self, path: KeyPath, said: AxisSpec, kind: str) -> Axis | None:
         if said.key is not None and said.values is not None:
-            return listed(said.key, _numbers(said.key, said.values))
+            return listed(said.key, _numbers(said.values))
         if said.key is not None and (between := said.linear or said.log):
             return self.spaced((*path, kind), said.key, between, is_log=said.log is not None)
         if said.paired is not None:
@@ -91,17 +115,14 @@ class SpaceReader:
             self.wrong(path, "bounds above zero", f"{between.first:g} and {between.last:g}")
             return None
         make = logarithmic if is_log else linear
-        axis = make(key, between.first, between.last, between.count)
-        values = axis.values[key]
-        is_count = key == UNITS and bool((values == np.rint(values)).all())
-        return Axis({key: values.astype(np.int64)}) if is_count else axis
+        return make(key, between.first, between.last, between.count)
 
     def paired(self, path: KeyPath, columns: dict[str, list[int | float]]) -> Axis | None:
         lengths = {key: len(values) for key, values in columns.items()}
         if len(set(lengths.values())) > 1:
             self.wrong(path, "lists of one length", ", ".join(map(str, lengths.values())))
             return None
-        return Axis({key: _numbers(key, values) for key, values in columns.items()})
+        return Axis({key: _numbers(values) for key, values in columns.items()})
 
     def sampled(self, path: KeyPath, sample: Sample) -> Axis | None:
         for key, bounds in sample.ranges.items():
@@ -112,73 +133,58 @@ class SpaceReader:
         return sampled(sample.method, ranges, sample.count, sample.seed)
 
     def tabulated(self, path: KeyPath, name: str) -> Axis | None:
-        """Columns of a CSV or Parquet file; pandas reads both."""
-        import pandas as pd
+        """Columns of a CSV or Parquet file, which is read once."""
+        from dpgcli.files.sweep.tables import UNREADABLE, Wrong, frame_in, numbers_in
 
-        from dpgcli.files.reading import read_undamaged
-
-        table = self.folder / name
+        file = self.folder / name
+        if file.is_file() and (size := file.stat().st_size) > MOST_BYTES:
+            expected = f"at most {MOST_BYTES // 2**20} MiB of CSV or Parquet"
+            found = f"{size // 2**20:,} MiB"
+            self.wrong(path, expected, found, "take fewer designs, or several sweeps")
+            return None
         try:
-            if not self.table_has_room(path, table):
-                return None
-            if table.suffix == ".parquet":
-                frame = read_undamaged(table).to_pandas()
-            else:
-                with warnings.catch_warnings():  # rows that do not fit the header
-                    warnings.simplefilter("error", pd.errors.ParserWarning)
-                    frame = pd.read_csv(table, index_col=False)
-        except (OSError, ValueError, UsageError, pd.errors.ParserWarning) as error:
-            self.wrong(path, "a CSV or Parquet file of designs", shown(str(error)))
+            content = content_of(file, self.document.place(path))
+            frame = frame_in(content, lambda *shape: self.has_room(path, *shape))
+        except SpecError as error:
+            self.wrong(path, TABLE, error.problems[0].found)
             return None
-        if not self.has_room(path, *frame.shape):
+        except UNREADABLE as error:
+            self.wrong(path, TABLE, shown(str(error)))
             return None
-        if frame.empty:
-            self.wrong(path, "rows of finite numbers", "no rows")
+        if frame is None or not self.is_of_designs(path, frame):
             return None
-        columns = {str(key): frame[key].to_numpy() for key in frame.columns}
-        n_before = len(self.problems)
-        for key, column in columns.items():
-            numbers = pd.to_numeric(pd.Series(column), errors="coerce").to_numpy(np.float64)
-            wrong = np.flatnonzero(~np.isfinite(numbers))
-            if len(wrong) or column.dtype.kind not in "iuf":
-                row = int(wrong[0]) if len(wrong) else 0
-                found = f"{shown(str(column[row]))} in row {row + 1}"
-                self.wrong(path, f"finite numbers in column {key}", found, "no text, no gaps")
-            elif column.dtype.kind == "u" and int(column.max()) >= 2**63:
-                found = str(column.max())
-                self.wrong(path, f"whole numbers below 2^63 in column {key}", found)
-        if len(self.problems) > n_before:
+        columns: dict[str, Any] = {str(key): numbers_in(frame[key]) for key in frame}
+        wrong = {key: found for key, found in columns.items() if isinstance(found, Wrong)}
+        for key, (kind, found, hint) in wrong.items():
+            self.wrong(path, f"{kind} in column {key}", found, hint)
+        if wrong:
             return None
-        self.tables.append(table)
+        self.files[file] = hashlib.sha256(content).hexdigest()
         return Axis(columns)
 
-    def table_has_room(self, path: KeyPath, table: Path) -> bool:
-        """Whether a table can be read; False, with a problem, where it is too large for that.
+    def is_of_designs(self, path: KeyPath, frame: "pd.DataFrame") -> bool:
+        """Whether there are rows, and keys as columns, each once; False with a problem.
 
-        Raises OSError and ValueError for what is no table.
+        Of a file that has no such column nothing is quoted: anything may have been named.
         """
-        import pyarrow.parquet as pq
-
-        if table.suffix == ".parquet":
-            with table.open("rb") as stream:
-                facts = pq.read_metadata(stream)
-            n_numbers, n_keys = facts.num_rows * facts.num_columns, facts.num_columns
-            if n_numbers > MOST_NUMBERS or n_keys > MOST_KEYS:
-                return self.has_room(path, facts.num_rows, n_keys)
-        elif (n_bytes := table.stat().st_size) > MOST_BYTES:
-            expected, found = (
-                f"at most {MOST_BYTES // 2**20} MiB of CSV",
-                f"{n_bytes // 2**20:,} MiB",
-            )
-            self.wrong(path, expected, found, "write Parquet, or several sweeps")
-            return False
-        return True
+        keys = [str(key) for key in frame.columns]
+        if all(unknown_key(tuple(key.split("."))) for key in keys):
+            found = f"none in {len(keys)}"
+            self.wrong(path, f"columns that are keys of the spec, such as {UNITS}", found)
+        elif twice := [key for key, count in Counter(keys).items() if count > 1]:
+            self.wrong(path, "each column once", f"{twice[0]} again")
+        elif frame.empty:
+            self.wrong(path, "rows of finite numbers", "no rows")
+        else:
+            return True
+        return False
 
     def check_keys(self, path: KeyPath, keys: list[str]) -> None:
         """Keys must be known to the spec, and vary on one axis only."""
         for key in keys:
             if unknown := unknown_key(tuple(key.split("."))):
-                self.wrong(path, *unknown)
+                expected, found, hint = unknown
+                self.wrong(path, expected, found, INDEX if key.startswith("Unnamed: ") else hint)
             elif key.startswith("gripper.") and not self.has_gripper:
                 self.wrong(path, "keys of a base that has them", key, "the base has no gripper")
             if key in self.keys:
@@ -217,10 +223,9 @@ def _size(said: AxisSpec) -> tuple[int, int]:
     return (between.count if between else len(said.values or ())), int(said.key is not None)
 
 
-def _numbers(key: str, values: Sequence[int | float]) -> Any:
-    """Values as an array: whole numbers stay whole, and those of units become so."""
-    whole = all(float(value).is_integer() and abs(value) < 2**53 for value in values)
-    counts = whole and (key == UNITS or all(isinstance(value, int) for value in values))
+def _numbers(values: Sequence[int | float]) -> Any:
+    """Values as an array: whole numbers stay whole."""
+    counts = all(isinstance(value, int) and abs(value) < 2**53 for value in values)
     return np.array(values, np.int64 if counts else np.float64)
 
 

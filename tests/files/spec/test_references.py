@@ -472,6 +472,30 @@ def test_wrong_files_have_their_own_places_all_at_once(write, problems):
     ]
 
 
+SECRETS = [
+    "root:$6$hunter2:19000:0:99999:7:::\n",
+    "-----BEGIN OPENSSH PRIVATE KEY-----\nhunter2\n-----END OPENSSH PRIVATE KEY-----\n",
+    "hunter2: hunter2\n",
+    "values: {hunter2: 1}\nmade_by: [hunter2]\n",
+    "TOKEN=hunter2\n",
+    "- hunter2\n",
+    "*hunter2\n",
+    "%hunter2 1\n---\n",
+    "a: !hunter2 1\n",
+    "a: 1\na: hunter2: 2\n",
+    "hunter2\x01\n",
+    "\x00\xffhunter2",
+]
+
+
+@pytest.mark.parametrize("secret", SECRETS)
+def test_nothing_is_quoted_of_a_file_that_is_no_calibration(write, problems, secret):
+    """Whoever names a file in a spec need not be allowed to read it."""
+    write("secret", secret)
+    found = problems("secret")
+    assert found == ["secret: file: expected a calibration file of dpg fit, found something else"]
+
+
 def test_the_schema_knows_names_of_files_only():
     schema = json_schema()
     (finger,) = (d for d in schema["$defs"].values() if "calibration" in d["properties"])

@@ -1,10 +1,13 @@
 """Sweep files: what they say, and every mistake in them with its place."""
 
+import hashlib
 import json
+import os
 import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
+from dpgcli.files.sections import UnitGeometry
 from dpgcli.files.sweep import Sweep, read_sweep
+from dpgcli.files.tables import record_batch, schema, write_table
+from dpgcli.states.columns import Column, Group, Kind
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 HEIGHT = "finger.geometry.dome_height_mm"
@@ -115,7 +121,7 @@ def test_whole_numbers_beyond_63_bits_are_refused(read: Read, tmp_path: Path, su
     (problem,) = problems(read, f"table: t.{suffix}")
     assert problem == (
         f"3:5: space.0.table: expected whole numbers below 2^63 in column {HEIGHT}, "
-        "found 18446744073709551615"
+        "found 18446744073709551615 in row 2"
     )
     whole = pd.DataFrame({HEIGHT: np.array([6, 2**63 - 1], np.uint64)})
     whole.to_parquet(tmp_path / "t.parquet")
@@ -385,6 +391,154 @@ def test_whole_numbers_of_units_count_as_whole(read: Read, axis: str) -> None:
     assert (column.dtype.kind, column.tolist()) == ("i", [2, 3, 4])
 
 
+@pytest.mark.parametrize(
+    ("axis", "found"),
+    [
+        ("{key: finger.units, linear: {from: 2, to: 5, count: 3}}", "3.5"),
+        ("{key: finger.units, log: {from: 2, to: 5, count: 3}}", "3.16228"),
+        ("sample: {method: sobol, count: 2, ranges: {finger.units: {from: 2, to: 3}}}", "2.40995"),
+    ],
+)
+def test_steps_of_units_that_are_not_whole_are_refused(read: Read, axis: str, found: str) -> None:
+    """Else every such design were an invalid row."""
+    (problem,) = problems(read, axis)
+    said = f"expected steps that are whole numbers of finger.units, found {found}"
+    assert problem.endswith(f"{said} (list them under values)")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_units_of_a_table_are_whole_though_it_writes_them_with_a_point(
+    read: Read, tmp_path: Path, suffix: str
+) -> None:
+    frame = pd.DataFrame({"finger.units": [3.0, 4.0]})
+    if suffix == "csv":
+        frame.to_csv(tmp_path / "t.csv", index=False)
+    else:
+        frame.to_parquet(tmp_path / "t.parquet")
+    column = read(f"table: t.{suffix}").space.designs(0, 2)["finger.units"]
+    assert (column.dtype.kind, column.tolist()) == ("i", [3, 4])
+
+
+INDICES = {
+    "values": pd.Index([6.0, 7.0], name=HEIGHT),
+    "range": pd.RangeIndex(6, 8, name=HEIGHT),
+    "levels": pd.MultiIndex.from_arrays([[6, 7], [2, 3]], names=[HEIGHT, SEPARATION]),
+}
+
+
+@pytest.mark.parametrize("kind", INDICES)
+def test_an_index_with_a_name_is_a_column(read: Read, tmp_path: Path, kind: str) -> None:
+    pd.DataFrame({"finger.units": [3, 4]}, INDICES[kind]).to_parquet(tmp_path / "t.parquet")
+    found = designs(read("table: t.parquet"))
+    levels = {SEPARATION: [2, 3]} if kind == "levels" else {}
+    assert found == {HEIGHT: [6, 7], **levels, "finger.units": [3, 4]}
+
+
+def test_an_index_without_a_name_is_none_in_parquet_and_refused_in_csv(
+    read: Read, tmp_path: Path
+) -> None:
+    """A data frame that was filtered has one; of a CSV nobody knows that it is one."""
+    frame = pd.DataFrame({HEIGHT: [6, 7, 8]}).loc[[0, 2]]
+    frame.to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {HEIGHT: [6, 8]}
+    frame.to_csv(tmp_path / "t.csv")
+    (problem,) = problems(read, "table: t.csv")
+    assert problem.endswith("found Unnamed: 0 (pandas writes no index where index=False)")
+
+
+def test_nullable_numbers_are_numbers_and_their_gaps_are_said(read: Read, tmp_path: Path) -> None:
+    pd.DataFrame({"finger.units": pd.array([3, 4], "Int64")}).to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {"finger.units": [3, 4]}
+    pd.DataFrame({"finger.units": pd.array([3, None], "Int64")}).to_parquet(tmp_path / "t.parquet")
+    assert 'found "<NA>" in row 2' in problems(read, "table: t.parquet")[0]
+
+
+def test_categories_of_numbers_are_numbers(read: Read, tmp_path: Path) -> None:
+    frame = pd.DataFrame({"finger.units": pd.Categorical([4, 3, 4])})
+    frame.to_parquet(tmp_path / "t.parquet")
+    assert designs(read("table: t.parquet")) == {"finger.units": [4, 3, 4]}
+
+
+@pytest.mark.parametrize(
+    "column",
+    [[[1.0], [2.0]], [{"a": 1}, {"a": 2}], [b"1", b"2"], ["1", "2"], pd.to_datetime([1, 2])],
+)
+def test_what_is_no_number_in_parquet_is_refused(
+    read: Read, tmp_path: Path, column: list[Any]
+) -> None:
+    pd.DataFrame({HEIGHT: column}).to_parquet(tmp_path / "t.parquet")
+    assert f"expected finite numbers in column {HEIGHT}" in problems(read, "table: t.parquet")[0]
+
+
+def test_columns_of_one_name_are_refused(read: Read, tmp_path: Path) -> None:
+    pq.write_table(pa.table([[6], [7]], names=[HEIGHT, HEIGHT]), tmp_path / "t.parquet")
+    assert "expected each column once" in problems(read, "table: t.parquet")[0]
+
+
+def test_quotes_in_the_midst_of_a_cell_are_refused(read: Read, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f'{HEIGHT}\n"3"4\n')
+    assert "expected a CSV or Parquet file" in problems(read, "table: t.csv")[0]
+    (tmp_path / "t.csv").write_text(f'"{HEIGHT}"\n"6.5"\n')
+    assert designs(read("table: t.csv")) == {HEIGHT: [6.5]}
+
+
+def test_a_table_is_a_file_and_nothing_else(read: Read, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "t.csv")
+    assert "found a device or pipe" in problems(read, "table: t.csv")[0]
+    assert "found a device or pipe" in problems(read, "table: /dev/zero")[0]
+
+
+def test_nothing_is_quoted_of_a_file_that_is_no_table_of_designs(
+    read: Read, tmp_path: Path
+) -> None:
+    (tmp_path / "secret").write_text("token,owner\nhunter2,root\n")
+    (problem,) = problems(read, "table: secret")
+    assert problem.endswith(
+        "columns that are keys of the spec, such as finger.units, found none in 2"
+    )
+
+
+@pytest.mark.parametrize("secret", ["hunter2", "hunter2: 1", "- [hunter2", "hunter2: {a: 1}}"])
+def test_nothing_is_quoted_of_a_base_that_is_no_spec(
+    read: Read, tmp_path: Path, secret: str
+) -> None:
+    (tmp_path / "secret").write_text(secret)
+    (problem,) = problems(read, f"{{key: {HEIGHT}, values: [6]}}", head="base: secret")
+    assert problem.endswith("expected a spec, with a section finger, found something else")
+
+
+def test_more_designs_than_can_be_counted_are_counted_exactly(read: Read) -> None:
+    axes = [
+        f"{{key: finger.geometry.{key}, linear: {{from: 1, to: 2, count: 1000}}}}"
+        for key in sorted(UnitGeometry.model_fields)
+    ]
+    more = "{key: finger.linear_stiffness_N_per_mm, linear: {from: 1, to: 2, count: 10}}"
+    (problem,) = problems(read, *axes, more)
+    limit, found = "9,999,999,999", "10,000,000,000,000,000,000"
+    assert problem.startswith(f"2:1: space: expected at most {limit} designs, found {found}")
+
+
+@pytest.mark.parametrize(("last", "size"), [(100_001, "9,999,999,999"), (100_002, None)])
+def test_more_designs_than_parts_can_name_are_refused(
+    read: Read, last: int, size: str | None
+) -> None:
+    """The names of parts have ten digits for the number of a design."""
+    axes = [
+        f"{{key: {key}, linear: {{from: 1, to: 2, count: {count}}}}}"
+        for key, count in ((HEIGHT, 99_999), (SEPARATION, last))
+    ]
+    if size is not None:
+        assert f"{read(*axes).space.size:,}" == size
+    else:
+        assert "at most 9,999,999,999 designs, found 10,000,099,998" in problems(read, *axes)[0]
+
+
+def test_the_hash_is_of_the_bytes_that_were_read(read: Read, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{HEIGHT}\n6\n")
+    digest = hashlib.sha256((tmp_path / "t.csv").read_bytes()).hexdigest()
+    assert read("table: t.csv").digests == (digest,)
+
+
 def test_sweeps_that_say_the_same_are_the_same(read: Read) -> None:
     axis = f"{{key: {HEIGHT}, values: [6]}}"
     said = read(axis).canonical_json()
@@ -484,7 +638,7 @@ def test_a_parquet_table_of_too_many_numbers_is_not_read(
         pa.array(np.zeros(26_000_000, np.int8)), pa.array([6.5])
     )
     pq.write_table(pa.table({HEIGHT: values}), tmp_path / "long.parquet")
-    monkeypatch.setattr(pd, "read_parquet", lambda _: pytest.fail("read"))
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda _: pytest.fail("read"))
     assert "26,000,000 numbers of 1 keys" in problems(read, "table: long.parquet")[0]
 
 
@@ -495,4 +649,16 @@ def test_a_csv_table_of_too_many_bytes_is_not_read(
         file.truncate(2**29 + 2**20)
     monkeypatch.setattr(pd, "read_csv", lambda *_, **__: pytest.fail("read"))
     (problem,) = problems(read, "table: long.csv")
-    assert "at most 512 MiB of CSV, found 513 MiB" in problem
+    assert "at most 512 MiB of CSV or Parquet, found 513 MiB" in problem
+
+
+def test_a_damaged_table_is_refused(read: Read, tmp_path: Path) -> None:
+    """One that dpg wrote, and so has its SHA-256 in it."""
+    columns = (Column(HEIGHT, "mm", "", Group.STATES, Kind.NUMBER),)
+    batch = record_batch(columns, {HEIGHT: np.array([6.0, 7.0])})
+    write_table(tmp_path / "t.parquet", schema(columns), [batch], {})
+    assert designs(read("table: t.parquet")) == {HEIGHT: [6, 7]}
+    content = bytearray((tmp_path / "t.parquet").read_bytes())
+    content[50] ^= 1
+    (tmp_path / "t.parquet").write_bytes(content)
+    assert 'found "damaged: its bytes are not those' in problems(read, "table: t.parquet")[0]

@@ -1,0 +1,80 @@
+"""Content of files as it is read: bounded, from names without control characters, UTF-8."""
+
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from dpgcli.errors import SpecError
+from dpgcli.files.places import Place, located
+from dpgcli.text import control_character
+
+MAX_BYTES = 256 * 1024  # of what people write
+
+
+def content_of(path: Path, place: Place, most: int | None = None, hint: str = "") -> bytes:
+    """The bytes of a file, at most `most`; of a regular file, which has an end, all by default.
+
+    Raises SpecError for what cannot be read.
+    """
+    if control := control_character(str(path)):
+        expected = "a name without control characters"
+        raise SpecError((located(place, "file", expected, f"{control} in it"),))
+    try:
+        status = path.stat()
+        is_regular = stat.S_ISREG(status.st_mode)
+        if stat.S_ISDIR(status.st_mode) or (most is None and not is_regular):
+            found = "a directory" if stat.S_ISDIR(status.st_mode) else "a device or pipe"
+            raise SpecError((located(place, "file", "a file", found),))
+        if most is None:
+            return path.read_bytes()
+        if is_regular and status.st_size > most:
+            raise _too_large(place, most, f"{status.st_size} bytes", hint)
+        with path.open("rb") as stream:
+            return bounded(stream, place, most, hint)
+    except (OSError, ValueError) as error:
+        found = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
+
+
+@contextmanager
+def quoted_if(path: Path, word: bytes, expected: str) -> Iterator[None]:
+    """Keep problems in what a file says to files that have a word in them.
+
+    Whoever names a file in another one need not be allowed to read it: of what is no file of
+    the kind nothing is shown.
+    """
+    try:
+        yield
+    except SpecError:
+        place = Place(str(path))
+        content = content_of(path, place, MAX_BYTES)
+        if word in content or not content:
+            raise
+        raise SpecError((located(place, "file", expected, "something else"),)) from None
+
+
+def bounded(stream: BinaryIO, place: Place, most: int, hint: str = "") -> bytes:
+    """What a stream holds, at most `most` bytes; raises SpecError for more."""
+    content = stream.read(most + 1)
+    if len(content) > most:
+        raise _too_large(place, most, "more", hint)
+    return content
+
+
+def _too_large(place: Place, most: int, found: str, hint: str) -> SpecError:
+    return SpecError((located(place, "file", f"at most {most // 1024:,} KiB", found, hint),))
+
+
+def decoded(content: bytes, place: Place) -> str:
+    """The text of a file. Raises SpecError for what is not UTF-8."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = content[: error.start]
+        column = len(before) - (before.rfind(b"\n") + 1) + 1
+        here = Place(place.file, before.count(b"\n") + 1, column)
+        found = f"byte 0x{content[error.start]:02x}"
+        problem = located(here, "file", "text in UTF-8", found, "save the file as UTF-8")
+        raise SpecError((problem,)) from None

@@ -1,0 +1,87 @@
+"""Tables of designs, CSV or Parquet: their columns as numbers, none lost and none changed."""
+
+import csv
+import io
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from dpgcli.files.places import shown
+from dpgcli.files.reading import DAMAGED, undamaged
+
+LARGEST_WHOLE = 2**63 - 1
+PARQUET = b"PAR1"
+UNREADABLE = (  # what pandas and pyarrow raise for content that is no table
+    OSError,
+    csv.Error,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    NotImplementedError,
+    pa.ArrowException,
+    pd.errors.ParserWarning,
+)
+
+
+def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFrame | None:
+    """The table in a file's content, None where there is no room; raises one of UNREADABLE.
+
+    An index with a name is a column like the others, as it was before it was made the index.
+    """
+    if not content.startswith(PARQUET):
+        rows = _csv(content)
+        return rows if has_room(*rows.shape) else None
+    file = undamaged(io.BytesIO(content))
+    if file is None:
+        raise ValueError(DAMAGED)
+    if not has_room(file.metadata.num_rows, file.metadata.num_columns):
+        return None
+    frame: pd.DataFrame = file.read().to_pandas()
+    is_named = any(name is not None for name in frame.index.names)
+    return frame.reset_index() if is_named else frame
+
+
+def _csv(content: bytes) -> pd.DataFrame:
+    if b'"' in content:  # pandas reads "3"4 as 34
+        for _ in csv.reader(io.StringIO(content.decode("utf-8")), strict=True):
+            pass
+    with warnings.catch_warnings():  # rows that do not fit the header
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        return pd.read_csv(io.BytesIO(content), index_col=False)
+
+
+class Wrong(NamedTuple):
+    """What a column should have, what stands there instead, and a hint."""
+
+    expected: str
+    found: str
+    hint: str = ""
+
+
+def numbers_in(column: "pd.Series[Any]") -> NDArray[Any] | Wrong:
+    """The numbers of a column, whole ones as such; or what is wrong with the first."""
+    types = pd.api.types
+    if isinstance(column.dtype, pd.CategoricalDtype):
+        column = pd.Series(column.to_numpy())
+    is_number = types.is_numeric_dtype(column) and not types.is_bool_dtype(column)
+    if not is_number or types.is_complex_dtype(column):
+        numbers = pd.to_numeric(column.astype(str), errors="coerce").to_numpy(np.float64)
+    else:
+        numbers = column.to_numpy(np.float64, na_value=np.nan)
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if len(wrong) or not is_number:
+        row = int(wrong[0]) if len(wrong) else 0
+        found = f"{shown(str(column.iloc[row]))} in row {row + 1}"
+        return Wrong("finite numbers", found, "no text, no gaps")
+    if not types.is_integer_dtype(column):
+        return numbers
+    if column.max() > LARGEST_WHOLE:
+        row = int(column.to_numpy().argmax())
+        return Wrong("whole numbers below 2^63", f"{column.iloc[row]} in row {row + 1}")
+    return column.to_numpy(np.int64)

@@ -1,0 +1,23 @@
+"""Text from outside made fit to print: nothing in it moves a cursor or ends a line."""
+
+
+def printable(text: str) -> str:
+    """Text in one line, escaped where a terminal would obey it rather than show it.
+
+    Control characters, line ends and marks of writing direction are spelled out.
+
+    >>> printable("a\\x1b[2Jb\\n\\u202ec é")
+    'a\\\\x1b[2Jb\\\\n\\\\u202ec é'
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def control_character(name: str) -> str:
+    """The first control character in a name, spelled out; empty if there is none.
+
+    >>> control_character("a\\tb"), control_character("größe 1.csv")
+    ('\\\\t', '')
+    """
+    return next((ascii(c)[1:-1] for c in name if c < " " or "\x7f" <= c < "\xa0"), "")

@@ -1,0 +1,157 @@
+"""Dependency files: what `make` itself makes of names with every special character."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from dpgcli.cli.depfile import write_depfile
+from dpgcli.errors import UsageError
+from dpgcli.files.sweep import read_sweep
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SPECIALS = "#$%:*?[]~!@^+-,'\"`<>{}()& é."
+NAMES = [
+    *(f"a{character}b.csv" for character in SPECIALS),
+    *(f"{character}b.csv" for character in SPECIALS if character != "~"),
+    *(f"a{character}" for character in SPECIALS if character not in " &"),
+    "a  b c.csv",
+    *(f"a{character}b%c.csv" for character in SPECIALS if character not in "*?["),
+    "a: b#c$d*e?f[g].csv",
+    "a(b).csv",
+    "define x.csv",
+    "include",
+    ".designs.csv",
+    "a\udcff.csv",  # a byte that is no UTF-8
+]
+UNFIT = {
+    "a\nb:;touch pwned": r'"\n"',
+    "a\tb": r'"\t"',
+    "a\rb": r'"\r"',
+    "a\x1bb": r'"\u001b"',
+    "a\x85b": r'"\x85"',
+    "a=b.csv": '"="',
+    "a;b.csv": '";"',
+    "a|b.csv": '"|"',
+    "a\\b.csv": r'"\\"',
+    "~root": '"~"',
+    "~": '"~"',
+    "-lm": '"-l"',
+    ".IGNORE": '".IGNORE"',
+    ".DELETE_ON_ERROR": '".DELETE_ON_ERROR"',
+    "a(b)": '"(b)"',
+    "$(shell touch pwned)": '"(shell touch pwned)"',
+    "a ": '" "',
+    "a&": '"&"',
+    "a%b*c": '"%b*"',
+    "a?b%c": '"?b%"',
+    "a[b]%": '"[b]%"',
+}
+OLD, CHANGED, NEW = 1_000_000_000, 1_500_000_000, 1_400_000_000  # seconds
+needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def depend(folder: str, *files: str) -> None:
+    """A depfile of tables in a folder, made from these files."""
+    sweep = SimpleNamespace(files=tuple(map(Path, files)))
+    study = cast("Any", SimpleNamespace(sweep=sweep, folder=Path(folder)))
+    write_depfile(Path("sweep.d"), study)
+
+
+def make() -> str:
+    """What Make does about the first target of the depfile."""
+    targets = Path("sweep.d").read_bytes().split(b".parquet", 1)[0] + b".parquet"
+    rule = b"all: " + targets.replace(rb"\%", b"%") + b"\n\n" + targets + b":\n\t@echo again\n\n"
+    Path("Makefile").write_bytes(rule + b"include sweep.d\n")
+    done = subprocess.run(
+        ["make", "--no-print-directory"],
+        env={"PATH": os.environ["PATH"], "LC_ALL": "C"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.stdout + done.stderr
+
+
+def aged(path: Path, seconds: float) -> None:
+    os.utime(path, (seconds, seconds))
+
+
+@needs_make
+@pytest.mark.parametrize("name", NAMES, ids=ascii)
+def test_make_reads_the_name_of_a_file_that_is_read(here: Path, name: str) -> None:
+    (here / name).touch()
+    (here / "other.csv").touch()
+    depend("out", "other.csv", name)
+    (here / "out" / "states.parquet").touch()
+    for each, seconds in ((name, OLD), ("other.csv", OLD), ("out/states.parquet", NEW)):
+        aged(here / each, seconds)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    aged(here / name, CHANGED)
+    assert make() == "again\n"
+    (here / name).unlink()
+    assert make() == "again\n"
+
+
+@needs_make
+@pytest.mark.parametrize("name", NAMES, ids=ascii)
+def test_make_reads_the_name_of_the_folder(here: Path, name: str) -> None:
+    (here / "read.csv").touch()
+    depend(name, "read.csv")
+    assert make() == "again\n"
+    table = here / name / "states.parquet"
+    table.touch()
+    aged(here / "read.csv", OLD)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    aged(table, OLD - 1.0)
+    assert make() == "again\n"
+
+
+@pytest.mark.parametrize("name", UNFIT, ids=ascii)
+def test_what_make_cannot_take_is_named(here: Path, name: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        depend("out", "other.csv", name)
+    assert str(raised.value).startswith(f"--depfile: Make cannot take {UNFIT[name]} in the name")
+    assert not list(here.iterdir())
+
+
+@needs_make
+@pytest.mark.parametrize(
+    "character", [c for c in map(chr, range(1, 128)) if not c.isalnum() and c != "/"]
+)
+def test_every_character_is_spelled_or_refused(here: Path, character: str) -> None:
+    """Wherever it stands, and nothing is ever run by it."""
+    for name in (f"a{character}touch pwned", f"{character}touch pwned", f"touch pwned{character}"):
+        (here / "out").mkdir(exist_ok=True)
+        (here / "out" / "states.parquet").touch()
+        (here / name).touch()
+        aged(here / name, OLD)
+        try:
+            depend("out", name)
+        except UsageError:
+            continue
+        assert make() == "make: Nothing to be done for 'all'.\n", name
+        (here / name).unlink()
+        assert make() == "again\n", name
+        assert not (here / "pwned").exists()
+
+
+def test_a_name_with_a_control_character_is_refused_in_a_sweep(here: Path) -> None:
+    name = "\n.DEFAULT_GOAL:=x\nx:;touch\tpwned\nz:=1"
+    (here / name).write_text("finger.units\n3\n", encoding="utf-8")
+    (here / "base.yaml").write_bytes((CONFIGS / "three_unit.yaml").read_bytes())
+    table = name.replace("\n", "\\n").replace("\t", "\\t")
+    said = f'base: base.yaml\nspace: [{{table: "{table}"}}]\n'
+    (here / "sweep.yaml").write_text(said, encoding="utf-8")
+    with pytest.raises(Exception, match=r"table: expected .*, found .n in it"):
+        read_sweep(here / "sweep.yaml")
