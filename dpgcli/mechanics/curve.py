@@ -58,15 +58,18 @@ class Curve:
 def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     """The C² cubic spline through points of increasing travel.
 
-    Where the first point is rest, at travel 0, the slope vanishes there: a dome at rest exerts
-    no force. Raises ValueError for fewer than four points or travels that do not increase.
+    Where the first point is rest, at travel 0, values are counted from the one there, and the slope
+    vanishes: a dome at rest exerts no force, and an energy is known but for a constant. Raises
+    ValueError for fewer than four points or travels that do not increase.
     """
     from scipy.interpolate import CubicSpline
 
     if len(travel) < FEWEST_POINTS or np.any(np.diff(travel) <= 0.0):
         raise ValueError(f"travel: expected {FEWEST_POINTS} or more increasing values: {travel}")
-    rest: Any = (1, 0.0) if travel[0] == 0.0 else "not-a-knot"
-    cubic = CubicSpline(travel, value, bc_type=(rest, "not-a-knot"))
+    starts_at_rest = travel[0] == 0.0
+    rest: Any = (1, 0.0) if starts_at_rest else "not-a-knot"
+    counted = np.subtract(value, value[0] if starts_at_rest else 0.0)
+    cubic = CubicSpline(travel, counted, bc_type=(rest, "not-a-knot"))
     ends = [np.array([0.5 * cubic(x, 2), cubic(x, 1), cubic(x)]) for x in (travel[0], travel[-1])]
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
     coefficients = np.concatenate((before, cubic.c, after), axis=1)

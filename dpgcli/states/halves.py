@@ -125,7 +125,7 @@ class Split:
     def _solved(
         self, first: int, stop: int, own: slice
     ) -> Iterator[tuple[Batch, NDArray[np.uint8]]]:
-        units = Units.of(self.units.finger.units(first, stop))
+        units = self.units.section(first, stop)
         for codes in chunks(2 ** (stop - first), lanes_at_once(stop - first)):
             batch = solve(units, Chain, inverted_units(codes, stop - first), self.tolerance)
             yield batch, certify(batch, units, self.tolerance, own)

@@ -76,7 +76,7 @@ def error_bounds(units: Units) -> Array:
         + (dropped_bars(units) if rung.drops_bars else 0.0)
         for rung in RUNGS
     ]
-    return np.where(units.has_soft_bars, np.inf, np.stack(bounds))
+    return np.where(units.are_soft.any(axis=0), np.inf, np.stack(bounds))
 
 
 def cheapest(bounds: Array, target: float) -> Indices:

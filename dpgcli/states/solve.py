@@ -103,27 +103,25 @@ class Units:
     first_order: FirstOrder
 
     @property
-    def has_soft_bars(self) -> Flags:
-        """Where units with rigid bars do not show what the finger does, shape (design,).
+    def are_soft(self) -> Flags:
+        """Units that with rigid bars do not show what the finger does, (unit, design).
 
-        Bars turn a unit too far, or its stroke leads to where only bars that give way can follow.
+        Bars turn them too far, or a stroke leads to where only bars that give way can follow.
         """
         if self.finger.is_rigid:
-            return np.zeros(1, bool)
+            return np.zeros((1, 1), bool)
         with np.errstate(invalid="ignore"):
             is_turned = self.first_order.turn > LARGEST_TURN * self.wells.angle
-        is_beyond = ~self.wells.exists & (self.wells.angle > WIDE_ANGLE)
-        return np.asarray((is_turned | is_beyond).any(axis=0))
+        return is_turned | (~self.wells.exists & (self.wells.angle > WIDE_ANGLE))
 
     @property
-    def are_not_bistable(self) -> Flags:
+    def have_no_well(self) -> Flags:
         """Units that certainly have no second well, (unit, design).
 
         Between soft bars one may exist where there is none between rigid ones, unless the dome
         by itself has none.
         """
-        has_none = ~self.wells.exists
-        soft = self.has_soft_bars
+        has_none, soft = ~self.wells.exists, self.are_soft
         if soft.any():
             has_none = has_none & (~soft | np.isnan(self.finger.law.rests(self.finger.domes).well))
         return has_none
@@ -132,6 +130,11 @@ class Units:
     def of(cls, finger: Finger) -> "Units":
         wells = inverted_wells(finger)
         return cls(finger, wells, first_order(finger, wells))
+
+    def section(self, first: int, stop: int) -> "Units":
+        """Units first+1 … stop, counted from the base, with all that is known of them."""
+        finger = self.finger.units(first, stop)
+        return Units(finger, self.wells.units(first, stop), self.first_order.units(first, stop))
 
     def designs(self, index: Indices) -> "Units":
         """One design for each lane, by index, so that designs and patterns share a batch."""
@@ -160,10 +163,11 @@ def solve(
         return search(units, formulation, inverted, formulation.coordinates(guess), tolerance)
     guess = geometric_guess(units.finger, inverted, units.first_order)
     batch = search(units, formulation, inverted, formulation.coordinates(guess), tolerance)
-    if not units.has_soft_bars.any():
+    soft = units.are_soft.any(axis=0)
+    if not soft.any():
         return batch
     missed = certify(batch, units, tolerance) != Status.STABLE
-    lanes = np.flatnonzero(missed & units.has_soft_bars)
+    lanes = np.flatnonzero(missed & soft)
     return _searched_again(units, formulate, batch, tolerance, lanes) if len(lanes) else batch
 
 
@@ -232,13 +236,13 @@ def certify(
     """
     equilibrium = batch.equilibrium
     inverted, reached = batch.inverted[own], batch.reached[own]
-    elsewhere = (reached != inverted).any(axis=0)
-    has_none = np.broadcast_to(units.are_not_bistable, batch.inverted.shape)[own]
+    elsewhere = reached != inverted
+    has_none = np.broadcast_to(units.have_no_well, batch.inverted.shape)[own]
     is_curved = equilibrium.curvature > MARGINAL_CURVATURE
     checks = (
         (~is_curved, Status.MARGINAL),
-        (elsewhere, Status.ANOTHER_PATTERN),
-        (elsewhere & (inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
+        (elsewhere.any(axis=0), Status.ANOTHER_PATTERN),
+        ((elsewhere & inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
         (batch.is_folded, Status.FOLDED),
         (is_curved & ~is_balanced(batch, units.wells), Status.NOT_CONVERGED),
         (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),

@@ -21,13 +21,13 @@ from dpgcli.mechanics.terms import evaluate
 
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
 SEARCHED = 512  # extensions at which the slope of a tabulated law is looked at
-WIDEST = 1.5  # strokes: beyond it no well is looked for, unless a curve says more
+WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
 INFLECTION_BISECTIONS = 24
 BISECTIONS = 48  # of one 512th of the range: down to rounding
 
 
 @dataclass(frozen=True)
-class ByDesign:
+class ByUnit:
     """Arrays of shape (unit or 1, design or 1)."""
 
     def designs(self, index: Indices) -> Self:
@@ -35,9 +35,14 @@ class ByDesign:
         arrays = (getattr(self, field.name) for field in fields(self))
         return type(self)(*(v if v.shape[1] == 1 else np.take(v, index, axis=1) for v in arrays))
 
+    def units(self, first: int, stop: int) -> Self:
+        """The units first+1 … stop, counted from the base."""
+        arrays = (getattr(self, field.name) for field in fields(self))
+        return type(self)(*(v if len(v) == 1 else v[first:stop] for v in arrays))
+
 
 @dataclass(frozen=True)
-class Wells(ByDesign):
+class Wells(ByUnit):
     """The inverted well of each unit, arrays of shape (unit or 1, design).
 
     `exists` says whether there is one; `angle` is its corner angle m (rad), `extension` its
@@ -118,8 +123,9 @@ def _searched_wells(finger: Finger) -> Wells:
     lever = 2.0 * finger.segment_height
     domes = finger.domes
     whole = domes.stroke + domes.contact
-    known = max(WIDEST, float(finger.law.curve.knots[-1])) if finger.law.curve else WIDEST
-    widest = np.minimum(known * whole - domes.contact, (1.0 - 1e-9) * lever)
+    well = finger.law.rests(domes).well + domes.contact  # a travel; the unit's own is shorter
+    furthest = WIDEST * np.where(np.isnan(well), whole, well)
+    widest = np.minimum(furthest - domes.contact, (1.0 - 1e-9) * lever)
     lowest = finger.law.rests(domes).top if finger.law.pushes_only else 0.0 * widest
     lowest = np.where(np.isnan(lowest), 0.0, lowest)
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
@@ -241,7 +247,7 @@ def _rigid_energy(finger: Finger, extension: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class FirstOrder(ByDesign):
+class FirstOrder(ByUnit):
     """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
 
     `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Internal
-from dpgcli.mechanics.lattice import FINEST_TOLERANCE, Lattice
+from dpgcli.mechanics.lattice import FINEST_TOLERANCE, Lattice, vectors
 from dpgcli.mechanics.terms import evaluate
 
 FORMULATIONS = pytest.mark.parametrize("formulation", [Chain, Lattice])
@@ -49,6 +49,40 @@ def test_forces_are_the_same_in_both_formulations(
     on_bars = evaluate(chain, bars).gradient[:, 0]
     through_nodes = chain.station_jacobian(bars)[:, :, 0] @ on_nodes
     assert through_nodes == pytest.approx(on_bars, rel=1e-11, abs=1e-11 * np.abs(on_bars).max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_corner_moments_are_the_same_in_both_formulations(
+    seed: int, graded_finger: Callable[..., Finger], random_shape: Callable[..., Internal]
+) -> None:
+    finger, shape = graded_finger(4, seed), random_shape(4, 60 + seed)
+    chain, lattice = Chain(finger), Lattice(finger)
+    bars, nodes = chain.coordinates(shape), lattice.coordinates(shape)
+    on_nodes = lattice.corner_moments(nodes, evaluate(lattice, nodes).gradient)
+    on_bars = chain.corner_moments(bars, evaluate(chain, bars).gradient)
+    assert on_nodes == pytest.approx(on_bars, rel=1e-10, abs=1e-10 * np.abs(on_bars).max())
+
+
+def test_forces_along_bars_do_no_work_at_corners(
+    graded_finger: Callable[..., Finger], random_shape: Callable[..., Internal]
+) -> None:
+    """100 N between the ends of every bar, as rounding leaves them: no corner feels it."""
+    finger = graded_finger(5, 7)
+    lattice = Lattice(finger)
+    nodes = lattice.coordinates(random_shape(5, 8))
+    cell = vectors(finger, nodes)
+    pulls = np.zeros((5, 4, 1))
+    for vector, ends in ((cell.chord, (None, 0)), (cell.far, (0, 2))):
+        along = (100.0 * vector / np.hypot(*vector)).transpose(1, 0, 2)
+        start, stop = ends
+        pulls[:, stop : stop + 2] += along
+        if start is None:
+            pulls[:-1, 0:2] -= along[1:]
+        else:
+            pulls[:, start : start + 2] -= along
+    moments = lattice.corner_moments(nodes, pulls.reshape(-1, 1))
+    assert np.abs(pulls).max() > 50.0
+    assert np.abs(moments).max() < 1e-10
 
 
 def test_tip_angle_counts_full_turns(reference_finger: Callable[..., Finger]) -> None:

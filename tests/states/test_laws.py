@@ -174,3 +174,38 @@ def test_ripples_at_the_end_of_a_curve_are_no_wells(reference_finger: Fingers) -
     )
     assert rippled.extension == pytest.approx(clean.extension, abs=1e-3)
     assert rippled.barrier == pytest.approx(clean.barrier, abs=1e-6)
+
+
+def stretched(strokes: float, offset: float = 0.0) -> Tabulated:
+    """A curve whose well lies at so many strokes, its energy counted from anywhere."""
+    energy = 0.5 * TRAVEL**2 * (0.043 + 0.957 * (1.0 - TRAVEL) ** 2) * strokes**2
+    return Tabulated(spline(tuple(TRAVEL * strokes), tuple(energy + offset)))
+
+
+@pytest.mark.parametrize("strokes", [0.05, 0.3, 1.6, 2.5, 6.0])
+@pytest.mark.parametrize("pushes_only", [False, True])
+def test_a_well_is_found_wherever_the_curve_has_it(
+    reference_finger: Fingers, strokes: float, pushes_only: bool
+) -> None:
+    """3.5/s mm of stroke under a curve stretched by s: the same dome as 3.5 mm under its own."""
+    own, other = stretched(1.0), stretched(strokes)
+    same = reference_finger(3, 1e4), reference_finger(3, 1e4, stroke=3.5 / strokes)
+    laws = [PushOnly(law) if pushes_only else law for law in (own, other)]
+    fingers = [replace(finger, law=law) for finger, law in zip(same, laws, strict=True)]
+    expected, found = (rows(finger) for finger in fingers)
+    assert (found["status"] == "stable").all()
+    assert found["tip_y_mm"] == pytest.approx(expected["tip_y_mm"], abs=1e-9)
+    least = [barriers(finger, inverted_wells(finger))[0] for finger in fingers]
+    assert least[1] == pytest.approx(least[0], rel=1e-9)
+    assert least[0] > 1.5
+
+
+@pytest.mark.parametrize("offset", [-5.0, 0.7])
+def test_an_energy_is_counted_from_rest(reference_finger: Fingers, offset: float) -> None:
+    """A constant changes no state and no barrier."""
+    expected, found = (
+        replace(reference_finger(2, 1e4), law=stretched(1.0, by)) for by in (0.0, offset)
+    )
+    assert rows(found)["energy_mJ"] == pytest.approx(rows(expected)["energy_mJ"], rel=1e-12)
+    least = [barriers(finger, inverted_wells(finger))[0] for finger in (expected, found)]
+    assert least[1] == pytest.approx(least[0], rel=1e-12)

@@ -1,0 +1,241 @@
+"""Each check of the certificate alone: what it refuses, and nothing else is wrong."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dpgcli.accuracy.network import SpringNetwork
+from dpgcli.arrays import Flags
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.lattice import Lattice
+from dpgcli.states.halves import Half, Split
+from dpgcli.states.pairs import _Block, _fit, paired_states
+from dpgcli.states.solve import Batch, Status, Units, certify, is_balanced, search, solve
+from dpgcli.states.wells import geometric_guess, inverted_wells
+
+Fingers = Callable[..., Finger]
+Patterns = Callable[[int], Flags]
+
+
+@pytest.fixture
+def stable(reference_finger: Fingers) -> tuple[Batch, Units]:
+    units = Units.of(reference_finger(3, 1e4))
+    batch = solve(units, Chain, np.array([[True], [False], [True]]), 1e-12)
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
+    return batch, units
+
+
+def status_with(stable: tuple[Batch, Units], **changes: object) -> Status:
+    """The status if some numbers of the equilibrium were others."""
+    batch, units = stable
+    equilibrium = replace(batch.equilibrium, **changes)  # type: ignore[arg-type]
+    return Status(certify(replace(batch, equilibrium=equilibrium), units, 1e-12)[0])
+
+
+@pytest.mark.parametrize("residual", [np.nan, np.inf, 1.1e-12])
+def test_a_residual_above_the_tolerance_or_none_at_all(
+    stable: tuple[Batch, Units], residual: float
+) -> None:
+    relative = np.array([residual])
+    assert status_with(stable, relative_residual=relative) is Status.NOT_CONVERGED
+
+
+@pytest.mark.parametrize("curvature", [np.nan, -1.0, 0.0, 1.4e-8])
+def test_a_curvature_that_is_not_safely_positive(
+    stable: tuple[Batch, Units], curvature: float
+) -> None:
+    assert status_with(stable, curvature=np.array([curvature])) is Status.MARGINAL
+
+
+def test_the_gravest_reason_is_given(stable: tuple[Batch, Units]) -> None:
+    batch, units = stable
+    folded = replace(batch, is_folded=np.ones(1, bool))
+    assert certify(folded, units, 1e-12).tolist() == [Status.FOLDED]
+    astray = replace(folded, equilibrium=replace(batch.equilibrium, relative_residual=np.ones(1)))
+    assert certify(astray, units, 1e-12).tolist() == [Status.NOT_CONVERGED]
+    elsewhere = replace(folded, inverted=~batch.inverted)
+    assert certify(elsewhere, units, 1e-12).tolist() == [Status.FOLDED]
+    elsewhere = replace(elsewhere, is_folded=np.zeros(1, bool))
+    assert certify(elsewhere, units, 1e-12).tolist() == [Status.ANOTHER_PATTERN]
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.09, "STABLE"), (0.11, "NOT_CONVERGED")])
+def test_an_unbalance_that_a_weak_well_would_not_bear(
+    stable: tuple[Batch, Units], share: float, status: str
+) -> None:
+    """A moment of 1e-6 N times H is small against the forces in play, not against that well."""
+    batch, units = stable
+    gradient = batch.equilibrium.gradient.copy()
+    gradient[1] = 1e-6 * 10.75
+    weak = np.array([[1e-6 / share], [2.05], [2.05]])
+    units = replace(units, wells=replace(units.wells, reset_force=weak))
+    assert status_with((batch, units), gradient=gradient) is Status[status]
+
+
+@pytest.mark.parametrize(("part", "status"), [(0.9, "STABLE"), (1.1, "NOT_CONVERGED")])
+def test_an_unbalance_that_a_fold_so_near_would_not_bear(
+    stable: tuple[Batch, Units], part: float, status: str
+) -> None:
+    """Curvature 1e-3: a tenth of κ²/96 of (k_b + k_θ/H²) d, which is 45.67 N."""
+    gradient = stable[0].equilibrium.gradient.copy()
+    gradient[6] = part * 0.1 * 1e-6 / 96.0 * 45.6729 * 10.75
+    curvature = np.array([1e-3])
+    assert status_with(stable, gradient=gradient, curvature=curvature) is Status[status]
+
+
+def test_a_faint_hinge_is_no_fold(stable: tuple[Batch, Units]) -> None:
+    """Rounding is allowed whatever the curvature."""
+    gradient = stable[0].equilibrium.gradient.copy()
+    gradient[2] = 0.9e-14 * 45.6729 * 10.75
+    assert status_with(stable, gradient=gradient, curvature=np.array([1e-7])) is Status.STABLE
+
+
+def test_forces_of_a_single_unit_by_the_reference(reference_finger: Fingers) -> None:
+    """4.72618 N to snap, 2.054675 N to reset: on the opening, hinge included."""
+    wells = inverted_wells(reference_finger(1))
+    assert wells.snap_force[0, 0] == pytest.approx(4.72618, abs=5e-6)
+    assert wells.reset_force[0, 0] == pytest.approx(2.054675, abs=5e-7)
+
+
+def test_a_unit_without_a_second_well_lacks_a_force(reference_finger: Fingers) -> None:
+    """Where α passes its limit the force to reset passes zero, to first order in between."""
+    limit = 0.0964682337467354
+    below, above = (
+        inverted_wells(reference_finger(1, force_linearity=limit + by)).reset_force[0, 0]
+        for by in (-1e-7, 1e-7)
+    )
+    assert below > 0.0 > above
+    assert -above == pytest.approx(below, rel=1e-3)
+    # dF/dα at the fold: k_b x (1 − β-part): k_b d u [1 − (1−u)(1−2u)] with u ≈ 0.75
+    assert below == pytest.approx(1e-7 * 12.84 * 3.5 * 0.75 * 1.125, rel=0.02)
+
+
+STIFF = {
+    "segment_length": 11.0,
+    "segment_height": 20.0,
+    "stroke": 1.4,
+    "bistable_stiffness": 6.0,
+    "force_linearity": 0.02,
+    "hinge_stiffness": 300.0,
+}
+
+
+@pytest.mark.parametrize("ratio", [1e13, 1e14, 1e15 / 6.0])
+def test_between_very_stiff_bars_no_state_is_certified_that_is_none(ratio: float) -> None:
+    """What rounding leaves of the bars' forces exceeds all that the dome can do."""
+    units = Units.of(uniform_finger(1, **STIFF, linear_stiffness=6.0 * ratio))
+    inverted = np.ones((1, 1), bool)
+    chain = solve(units, Chain, inverted, 1e-12)
+    assert certify(chain, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
+    lattice = solve(units, Lattice, inverted, 1e-12)
+    assert certify(lattice, units, 1e-12)[0] != Status.STABLE
+    assert not is_balanced(lattice, units.wells)[0] or not lattice.reached[0, 0]
+
+
+def test_a_strut_pulled_through_its_base_is_folded() -> None:
+    """The chain has a minimum with a strut of −2.5 mm; what soft bars really do is found next."""
+    finger = uniform_finger(
+        2,
+        segment_length=1.0,
+        segment_height=10.0,
+        stroke=15.0,
+        bistable_stiffness=10.0,
+        force_linearity=0.05,
+        hinge_stiffness=100.0,
+        linear_stiffness=0.2,
+    )
+    units, chain, inverted = Units.of(finger), Chain(finger), np.ones((2, 1), bool)
+    guess = chain.coordinates(geometric_guess(finger, inverted, units.first_order))
+    astray = search(units, chain, inverted, guess, 1e-12)
+    assert 10.0 + astray.equilibrium.coordinates[3, 0] == pytest.approx(-2.4958, abs=1e-4)
+    assert astray.equilibrium.relative_residual[0] < 1e-12
+    assert certify(astray, units, 1e-12).tolist() == [Status.FOLDED]
+    found = solve(units, Chain, inverted, 1e-12)
+    assert certify(found, units, 1e-12).tolist() == [Status.STABLE]
+    nodes = np.stack(found.formulation.stations(found.equilibrium.coordinates), axis=1).ravel()
+    network = SpringNetwork.of(finger)
+    assert np.abs(network.energy_and_gradient(nodes)[1]).max() < 1e-10
+    assert np.linalg.eigvalsh(network.hessian(nodes))[0] > 1e-3
+
+
+def half_with(half: Half, **joint: float) -> Half:
+    assert half.joint is not None
+    changed = {name: np.full_like(half.joint.stiffness, value) for name, value in joint.items()}
+    return replace(half, joint=replace(half.joint, **changed))
+
+
+class OfHalves(Split):
+    """A split whose halves are given."""
+
+    def inner(self) -> Half:
+        return half_with(super().inner(), stiffness=-3e7)
+
+
+def test_a_pair_that_is_not_convex_is_marginal(reference_finger: Fingers) -> None:
+    """Both halves are minima with their strut held; what is negative is their sum at the strut."""
+    own = Split(Units.of(reference_finger(4, 1e7)), 2, 1, 1e-12)
+    (states,) = paired_states(own)
+    fits = states.status == Status.STABLE
+    assert fits.sum() == 12
+    (states,) = paired_states(OfHalves(own.units, 2, 1, 1e-12))
+    assert (states.status[fits] == Status.MARGINAL).all()
+
+
+@pytest.mark.parametrize("pull", [3.0, -3.0])
+def test_the_shared_strut_feels_both_halves_and_their_disagreement(
+    reference_finger: Fingers, pull: float
+) -> None:
+    """Force at the strut: pulls of both, and of the held outer half per mm times the gap."""
+    split = Split(Units.of(reference_finger(4, 1e4)), 2, 1, 1e-12)
+    inner, outer = split.inner(), split.outer()
+    assert inner.joint is not None
+    assert outer.joint is not None
+    assert outer.held is not None
+    gap = 1e-3
+    inner = half_with(inner, extension=gap, pull=2.0)
+    outer = half_with(outer, extension=0.0, pull=1.0)
+    held = replace(outer.held, pull=np.full_like(outer.held.pull, 1e3 * pull), force=0.0 * gap)
+    held = replace(held, force=np.zeros_like(outer.held.force))
+    block = _Block(np.arange(4), 2, 1)
+    fit = _fit(split, inner, replace(outer, held=held), block)
+    assert fit.residual == pytest.approx(abs(2.0 + 1.0 + pull), abs=1e-9)
+
+
+def test_units_of_halves_are_those_of_the_whole(
+    graded_finger: Fingers, all_patterns: Patterns
+) -> None:
+    """A soft unit in one half does not change what is said of the other."""
+    finger = graded_finger(6, 3, 12.84, force_linearity=[0.04, 0.105, 0.04, 0.04, 0.12, 0.04])
+    split = Split(Units.of(finger), 3, 2, 1e-12)
+    (pairs,) = paired_states(split)
+    batch = solve(split.units, Chain, all_patterns(6), 1e-12)
+    direct = certify(batch, split.units, 1e-12)
+    fits = pairs.status != Status.NOT_CONVERGED
+    assert fits.sum() > 16
+    assert len(set(direct[fits])) > 1
+    assert (pairs.status[fits] == direct[fits]).all()
+
+
+def test_a_walk_near_a_fold_goes_on_to_where_rounding_ends_it(reference_finger: Fingers) -> None:
+    """There, a tolerance of 1e-3 would let a unit stop that has nowhere to rest."""
+    finger = reference_finger(1, force_linearity=0.0964682337467354 + 1e-5)
+    units, chain = Units.of(finger), Chain(finger)
+    start = np.full((2, 1), np.arcsin(0.765 * 3.5 / 21.5))
+    assert np.abs(chain.corner_moments(start, start * 0.0)).max() == 0.0
+    batch = search(units, chain, np.ones((1, 1), bool), start, 1e-3)
+    assert certify(batch, units, 1e-3)[0] != Status.STABLE
+
+
+def test_soft_bars_do_not_prove_that_there_is_no_well(reference_finger: Fingers) -> None:
+    """A unit between rigid bars has none; between soft ones that is not said, and it may rest."""
+    soft = Units.of(reference_finger(1, 0.5, force_linearity=0.1))
+    assert not soft.wells.exists.any()
+    assert soft.are_soft.all()
+    assert not soft.have_no_well.any()
+    stiff = Units.of(reference_finger(1, 1e4, force_linearity=0.1))
+    assert stiff.have_no_well.all()
+    never = Units.of(reference_finger(1, 0.5, force_linearity=0.112))
+    assert never.have_no_well.all(), "the dome itself turns over nowhere"
