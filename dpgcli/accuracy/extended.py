@@ -52,8 +52,8 @@ class ExtendedStates:
     of the Hessian in the unknowns are NaN where it is not positive definite. `is_minimum`:
     converged, and the Hessian is positive definite. `in_pattern`: every unit is on its
     pattern's side of where its dome's spring turns over, no corner is turned by 90° or
-    more, and no strut's opening would shorten its spring. All numbers of a state that did not
-    converge are NaN.
+    more, no strut's opening would shorten its spring, and the finger does not meet itself. All
+    numbers of a state that did not converge are NaN.
     """
 
     pose: ExtendedArray
@@ -254,8 +254,27 @@ def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
         _long_doubles(openings),
         *_spectrum(found),
         factorization.is_positive,
-        sides == pattern.tolist() and all(is_ahead) and is_upright,
+        sides == pattern.tolist()
+        and all(is_ahead)
+        and is_upright
+        and not _meets_itself(bars, nodes),
     )
+
+
+def _meets_itself(bars: ElasticBars | RigidBars, nodes: list["mpf"]) -> bool:
+    """Whether sides of the outline cross that have no corner in common, by orientation."""
+    height = float(bars.units[0].height)
+    stations = np.concatenate(([0.0, 0.0, 0.0, height], np.array(nodes, float))).reshape(-1, 4)
+    corners = np.concatenate((stations[:, :2], stations[::-1, 2:])) @ np.array([1.0, 1j])
+    start, stop = corners, np.roll(corners, -1)
+
+    def is_left(of: NDArray[np.complex128], end: Any, point: Any) -> Flags:
+        across = (end - of)[:, None].conj() * (point[None] - of[:, None])
+        return np.asarray(across.imag > 0.0)
+
+    parts = is_left(start, stop, start) != is_left(start, stop, stop)
+    apart = np.abs(np.subtract.outer(np.arange(len(start)), np.arange(len(start))))
+    return bool((parts & parts.T & (apart > 1) & (apart < len(start) - 1)).any())
 
 
 def _missing(n_units: int) -> tuple[Any, ...]:

@@ -96,14 +96,18 @@ def _both(label: str, finger: Finger, **more: Any) -> Iterator[Variant]:
 
 
 def few_patterns(n_units: int, *, with_ground: bool = False) -> tuple[str, ...]:
-    """All units inverted, and every other one; of a long finger only the first.
+    """All units inverted, and every other one; of a long finger one unit in four.
+
+    With all inverted a long finger would run into itself.
 
     >>> few_patterns(3), few_patterns(1, with_ground=True)
     (('111', '101'), ('1', '0'))
     """
+    if n_units >= LONG:
+        return (("1000" * n_units)[:n_units],)
     ground = ("0" * n_units,) if with_ground else ()
     patterns = ("1" * n_units, ("10" * n_units)[:n_units], *ground)
-    return tuple(dict.fromkeys(patterns))[: 1 if n_units >= LONG else None]
+    return tuple(dict.fromkeys(patterns))
 
 
 def _patterns(base: Finger) -> Iterator[Variant]:
@@ -146,6 +150,7 @@ def _stroke(base: Finger) -> Iterator[Variant]:
 def _length(base: Finger) -> Iterator[Variant]:
     for n in (1, 2, 5, 8, 13, 32, 64):
         yield from _both(f"n = {n}", repeated(base, n))
+    yield Variant(f"n = {LONG}, in a ring", repeated(base, LONG), ("1" * LONG,))
 
 
 def _hinge(base: Finger) -> Iterator[Variant]:

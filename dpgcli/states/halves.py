@@ -14,7 +14,7 @@ is known exactly at the shared strut, and every state is certified by it (our de
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.terms import Evaluation, evaluate
+from dpgcli.states.crossing import Outline, outline
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.solve import (
     Batch,
@@ -69,7 +70,8 @@ class Half:
     """A table of half-fingers: all states of some units, each in every context.
 
     Entries count through the patterns of all units solved, context included. `pose` is that
-    of the half's last station seen from its first. Rigid bars share nothing: no joint.
+    of the half's last station seen from its first. Rigid bars share nothing: no joint. `around`
+    is the half's outline, where the finger may run into itself.
     """
 
     status: NDArray[np.uint8]
@@ -81,6 +83,7 @@ class Half:
     tip_error: Array
     joint: Joint | None = None
     held: Held | None = None
+    around: Outline | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,8 @@ class Split:
             beyond = reach(self._cut(self.n_inner, self.n_units).finger)[0]
             joint = _inner_joint(chain, own, at_own, jacobian, beyond)
         lever = reach(self.units.finger)[0]  # an error of the angle moves all that is beyond
-        return self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
+        half = self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
+        return self._with_outline(half, chain, own)
 
     def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
         chain = self._cut(self.n_inner, self.n_units)
@@ -157,7 +161,15 @@ class Split:
             held = _held(batch, at_context)
             joint = _outer_joint(batch, context, at_context, jacobian)
         own = slice(self.context, None)
-        return self._half(batch, status, own, pose, energies, 0.0, joint, held)
+        half = self._half(batch, status, own, pose, energies, 0.0, joint, held)
+        return self._with_outline(half, chain, coordinates[-len(chain.reach) :])
+
+    def _with_outline(self, half: Half, chain: Chain, own: Array) -> Half:
+        """The half with its outline, as if its first strut were upright, if that is needed."""
+        if self.units.shortest_loop is None:
+            return half
+        around = outline(chain.stations(own), chain.finger.segment_height)
+        return replace(half, around=around)
 
     def _half(
         self,

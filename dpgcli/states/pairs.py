@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain
+from dpgcli.states.crossing import Outline, diagonals, is_simple
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.solve import MARGINAL_CURVATURE, SMALL_SHARE, States, Status
@@ -80,18 +81,48 @@ def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
     status = np.where(fit.is_convex, status, np.maximum(status, Status.MARGINAL))
     is_small = fit.residual <= SMALL_SHARE * split.weakest
     fits = (fit.relative_residual <= split.tolerance) & is_small
-    status = np.where(fits, status, np.uint8(Status.NOT_CONVERGED))
+    status = block.flat(np.where(fits, status, np.uint8(Status.NOT_CONVERGED))).copy()
+    crosses = _cross(split, inner, outer, block)
+    status[crosses & (status != Status.NOT_CONVERGED)] = Status.FOLDED
     codes = (block.patterns[:, None] << split.n_outer) + np.arange(2**split.n_outer)
     reached = (block.flat(block.inner(inner.reached)), block.flat(block.outer(outer.reached)))
     return States(
         inverted=inverted_units(codes.ravel().astype(np.uint64), split.n_units),
         reached=np.concatenate(reached),
-        status=block.flat(status),
+        status=status,
         pose=pose,
         tip_error=block.flat(fit.tip_error),
         energies=_added(inner, outer, block),
         residual=block.flat(fit.residual),
     )
+
+
+def _cross(split: Split, inner: Half, outer: Half, block: _Block) -> Flags:
+    """Whether the outer half runs into the inner one, (state,); each by itself is certified."""
+    loop, near_part, far_part = split.units.shortest_loop, inner.around, outer.around
+    if loop is None or near_part is None or far_part is None:
+        return block.flat(np.zeros((1, 1, 1), bool))
+    x, y, turn = block.inner(inner.pose)
+    joint, direction = x + 1j * y, np.exp(1j * turn)
+
+    def whole(near: Array, far: Array) -> Array:
+        """All stations of each pair, (station, …)."""
+        parts = block.inner(near), joint + direction * block.outer(far[1:])
+        return np.concatenate([block.flat(part) for part in parts])
+
+    touching = max(diagonals(part).max() for part in (near_part, far_part))
+    base = block.inner(near_part.base)
+    near = np.zeros((1, 1, 1), bool)
+    for beyond in range(1, split.n_outer + 1):
+        station = joint + direction * block.outer(far_part.base[beyond])
+        far_enough = base[: max(0, split.n_inner + beyond - loop + 1)]
+        near = near | (np.abs(far_enough - station) < touching).any(axis=0)
+    crosses = block.flat(near).copy()
+    lanes = np.flatnonzero(crosses)
+    if len(lanes):  # few, so that a closer look is cheap
+        around = whole(near_part.base, far_part.base), whole(near_part.top, far_part.top)
+        crosses[lanes] = ~is_simple(Outline(*(nodes[:, lanes] for nodes in around)))
+    return crosses
 
 
 def _added(inner: Half, outer: Half, block: _Block) -> dict[str, Array]:

@@ -12,6 +12,7 @@ from dpgcli.equilibrium.banded import forward
 from dpgcli.equilibrium.newton import Equilibrium, minimize
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
+from dpgcli.states.crossing import crosses_itself, fewest_in_loop, outline
 from dpgcli.states.wells import (
     FirstOrder,
     Wells,
@@ -115,6 +116,14 @@ class Units:
         return is_turned | (~self.wells.exists & (self.wells.angle > WIDE_ANGLE))
 
     @property
+    def shortest_loop(self) -> int | None:
+        """Units that the finger needs to run into itself; None where it has too few."""
+        finger = self.finger
+        widest = np.arcsin(np.minimum(0.5 * finger.stroke / finger.segment_height, 1.0))
+        turn = 2.0 * np.where(self.are_soft, widest, self.wells.angle)
+        return fewest_in_loop(turn, finger.segment_length, finger.n_units)
+
+    @property
     def have_no_well(self) -> Flags:
         """Units that certainly have no second well, (unit, design).
 
@@ -194,11 +203,15 @@ def search(
 def _reached(
     units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
 ) -> Batch:
-    springs = formulation.springs(equilibrium.coordinates)
-    reached = springs.extension > units.wells.spring_barrier
+    extension, is_folded = formulation.springs(equilibrium.coordinates)
+    reached = extension > units.wells.spring_barrier
     if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
         reached = reached & inverted
-    return Batch(formulation, equilibrium, inverted, reached, springs.is_folded)
+    loop = units.shortest_loop
+    if loop is not None:
+        nodes = formulation.stations(equilibrium.coordinates)
+        is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
+    return Batch(formulation, equilibrium, inverted, reached, is_folded)
 
 
 def _searched_again(

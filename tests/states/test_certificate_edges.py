@@ -8,6 +8,7 @@ import pytest
 
 from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.arrays import Flags
+from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
@@ -239,3 +240,24 @@ def test_soft_bars_do_not_prove_that_there_is_no_well(reference_finger: Fingers)
     assert stiff.have_no_well.all()
     never = Units.of(reference_finger(1, 0.5, force_linearity=0.112))
     assert never.have_no_well.all(), "the dome itself turns over nowhere"
+
+
+def test_a_unit_in_its_well_is_there_whatever_rigid_bars_say(stable: tuple[Batch, Units]) -> None:
+    """Beyond a rigid fold, elastic bars may still leave a well: who rests in it is bistable."""
+    batch, units = stable
+    none = replace(units.wells, exists=np.zeros((1, 1), bool))
+    assert certify(batch, replace(units, wells=none), 1e-12).tolist() == [Status.STABLE]
+
+
+@pytest.mark.parametrize("past", [-1e-12, 1e-12])
+def test_at_a_rigid_fold_the_walk_goes_on_until_the_elastic_well_is_sure(
+    reference_finger: Fingers, past: float
+) -> None:
+    """What rigid bars lack is 1e-13 of the forces in play; a residual of 1e-12 would not do."""
+    linearity = 0.0964682337467354 * (1.0 + past)
+    finger = reference_finger(1, 12.84e9, force_linearity=linearity)
+    units, inverted = Units.of(finger), np.ones((1, 1), bool)
+    batch = solve(units, Chain, inverted, 1e-12)
+    assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
+    far = minimize(Chain(finger), batch.equilibrium.coordinates * 1.0001, 1e-12)
+    assert not is_balanced(replace(batch, equilibrium=far), units.wells)[0]

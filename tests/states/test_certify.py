@@ -149,7 +149,7 @@ def test_the_lattice_calls_stable_what_the_chain_does(
     reference_finger: Fingers, n_units: int, linear_stiffness: float
 ) -> None:
     scene = Scene(reference_finger(n_units, linear_stiffness), ())
-    request = Request((n_units * "1",), ("states",), "lattice")
+    request = Request((("1000" * n_units)[:n_units],), ("states",), "lattice")
     assert predict(scene, request).arrays()["status"].tolist() == ["stable"]
 
 
