@@ -115,6 +115,8 @@ def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     Raises OutputError for what cannot be written, UsageError for one of the files that are read.
     """
     check_not_read(sources, (path,))
+    if control := control_character(str(path)):
+        raise OutputError(f"cannot write {path}: {control} in it")
     try:
         path.open("ab").close()
     except OSError as error:

@@ -127,7 +127,9 @@ def test_a_grid_prints_what_looks_like_markup_as_it_is(call: Any, folder: Path) 
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\x1bb", "a\x9bb", "a\tb"])
-@pytest.mark.parametrize("kind", ["spec", "base", "calibration", "curve", "table", "output", "out"])
+@pytest.mark.parametrize(
+    "kind", ["spec", "base", "calibration", "curve", "table", "output", "out", "summary"]
+)
 def test_names_with_control_characters_are_refused(
     call: Any, folder: Path, kind: str, name: str
 ) -> None:
@@ -146,6 +148,7 @@ def test_names_with_control_characters_are_refused(
         "curve": ("fit", "hinge", name),
         "output": ("predict", "three_unit.yaml", "-o", f"{name}.parquet"),
         "out": ("sweep", "configs.yaml", "-o", f"{name}.out", "--executor", "serial"),
+        "summary": ("sweep", "configs.yaml", "-o", "o", "--summary-file", f"{name}.out"),
     }[kind]
     config = "base: three_unit.yaml\nspace: [{key: finger.units, values: [2]}]\n"
     (folder / "configs.yaml").write_text(config)
