@@ -21,3 +21,12 @@ def test_a_part_that_is_interrupted_is_none(tmp_path: Path) -> None:
         file.write(b"half")
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_part_that_is_there_is_made_again(tmp_path: Path) -> None:
+    """As after a worker that was killed between its last byte and its answer."""
+    for _ in range(2):
+        with PartStore(tmp_path).part(0, 4) as file:
+            file.write(b"whole")
+    (part,) = tmp_path.iterdir()
+    assert part.read_bytes() == b"whole"
