@@ -187,7 +187,7 @@ def test_the_bound_of_a_tolerance_by_hand(reference_finger: Fingers) -> None:
         spring = 0.5 * 12.84 * x * x * (1.0 + 0.957 * (u * u - 2.0 * u))
         return float(spring + 24.2 * (near * near + far * far))
 
-    def softest(corner: float, step: float = 1e-3) -> float:
+    def softest(corner: float, step: float = 1e-4) -> float:
         by = [[(a, b) for b in (-step, step)] for a in (-step, step)]
         e = [[energy(corner + a, corner + b) for a, b in row] for row in by]
         mixed = (e[1][1] - e[1][0] - e[0][1] + e[0][0]) / (4.0 * step * step)
