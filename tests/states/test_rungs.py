@@ -170,3 +170,34 @@ def test_a_marginal_state_has_no_error_estimate(reference_finger: Fingers) -> No
     rows = predict(scene, Request(formulation="lattice", columns=("states",))).arrays()
     assert set(rows["status"]) == {"marginal"}
     assert np.isinf(rows["tip_error_mm"]).all()
+
+
+def test_the_bound_of_a_tolerance_by_hand(reference_finger: Fingers) -> None:
+    """Twice twice τ F H/λ L for one unit: λ the softer of its corners' stiffnesses, in any well.
+
+    By the moments of a unit with rigid bars, M = k_c m + F H cos(…), differentiated numerically.
+    """
+    unit = reference_finger(1, 1e9)
+
+    def energy(near: float, far: float) -> float:
+        z = 10.75 * (np.sin(near) + np.sin(far))
+        v = 10.75 * (np.cos(far) - np.cos(near))
+        x = np.hypot(13.5 + z, v) - 13.5
+        u = x / 3.5
+        spring = 0.5 * 12.84 * x * x * (1.0 + 0.957 * (u * u - 2.0 * u))
+        return float(spring + 24.2 * (near * near + far * far))
+
+    def softest(corner: float, step: float = 1e-4) -> float:
+        by = [[(a, b) for b in (-step, step)] for a in (-step, step)]
+        e = [[energy(corner + a, corner + b) for a, b in row] for row in by]
+        mixed = (e[1][1] - e[1][0] - e[0][1] + e[0][0]) / (4.0 * step * step)
+        along = energy(corner + step, corner) + energy(corner - step, corner)
+        own = (along - 2.0 * energy(corner, corner)) / step**2
+        return own - abs(mixed)
+
+    well = float(np.arcsin(3.2450151985 / 21.5))
+    stiffness = min(softest(0.0), softest(well))
+    forces = (12.84 + 24.2 / 10.75**2) * 3.5
+    expected = 4.0 * forces * 10.75 / stiffness * 13.5
+    coarse, fine = error_bounds(Units.of(unit))[[1, 2], 0]
+    assert coarse - fine == pytest.approx((1e-3 - 1e-6) * expected, rel=1e-4)
