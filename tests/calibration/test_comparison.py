@@ -102,7 +102,8 @@ def test_shapes_are_held_against_the_layer(reference_finger: Fingers) -> None:
 
 
 def test_a_shape_of_many_points_takes_the_memory_of_some(reference_finger: Fingers) -> None:
-    finger, patterns = reference_finger(40, 1e4), np.ones((40, 1), bool)
+    finger, patterns = reference_finger(40, 1e4), np.zeros((40, 1), bool)
+    patterns[:3] = True  # all of them would run it into itself
     own = lattice_states(finger, patterns, Frame())
     shape = np.repeat(own.layer[:, :, 0], 5000, axis=1)
     known = replace(KnownStates.of_tips(patterns, own.tip), shapes=(shape,))
