@@ -54,13 +54,13 @@ class Status(IntEnum):
 
 
 _MEANINGS = {
-    Status.STABLE: "certified: residual, curvature, and every unit in the well the pattern says",
-    Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
-    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.STABLE: "certified: residual, curvature, wells and shape",
     Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
+    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
-    "bears before it leaves its well",
+    "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",
 }
 
 
