@@ -148,7 +148,7 @@ def _write(
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
-    """States, error and time in one line; where values come from in another."""
+    """States, error and time in one line, why some are not stable, and where values come from."""
     from dpgcli.states.solve import Status
 
     summary, plan = prediction.summary, prediction.plan
@@ -161,6 +161,9 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
         yield _chosen(plan.rung, plan.error_bound, plan.request.target_error or 0.0)
     worst = worst if summary.statuses[Status.STABLE] else "no stable state"
     yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
+    for status, n in summary.statuses.items():
+        if n and status is not Status.STABLE:
+            yield f"{status.text}: {status.meaning}"
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"

@@ -105,7 +105,7 @@ class Split:
 
     @property
     def weakest(self) -> float:
-        """What the weakest unit bears in its weaker well, N; see `solve.is_balanced`."""
+        """What the weakest unit bears in its weaker well, N; see `Batch.is_balanced`."""
         wells = self.units.wells
         return float(np.minimum(np.abs(wells.reset_force), wells.snap_force).min())
 

@@ -1,7 +1,7 @@
 """From patterns to certified states of one batch of fingers, and what is known of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -54,13 +54,13 @@ class Status(IntEnum):
 
 
 _MEANINGS = {
-    Status.STABLE: "certified: residual, curvature, and every unit in the well the pattern says",
-    Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
-    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.STABLE: "certified: residual, curvature, wells and shape",
     Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
+    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
-    "bears before it leaves its well",
+    "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",
 }
 
 
@@ -68,7 +68,8 @@ _MEANINGS = {
 class Batch:
     """States of one finger (or one per lane), each at an equilibrium, shape (…, batch).
 
-    `reached` says which wells the units ended in, `is_folded` which lanes are no finger.
+    `reached` says which wells the units ended in, `is_folded` which lanes are no finger, and
+    `is_balanced` where what is left of the forces is too small to matter.
     """
 
     formulation: Formulation
@@ -76,6 +77,7 @@ class Batch:
     inverted: Flags
     reached: Flags
     is_folded: Flags
+    is_balanced: Flags
 
 
 @dataclass(frozen=True)
@@ -187,9 +189,9 @@ def search(
 
     Near a fold the tolerance may not do: there the walk goes on to where rounding ends it.
     """
-    batch = _reached(units, formulation, inverted, minimize(formulation, start, tolerance))
+    batch = batch_at(units, formulation, inverted, minimize(formulation, start, tolerance))
     is_close = batch.equilibrium.relative_residual <= tolerance
-    lanes = np.flatnonzero(is_close & ~is_balanced(batch, units.wells))
+    lanes = np.flatnonzero(is_close & ~batch.is_balanced)
     if not len(lanes):
         return batch
     few = formulation.designs(lanes)
@@ -197,12 +199,13 @@ def search(
     further = minimize(few, here, FINEST_TOLERANCE)
     everywhere = np.arange(len(lanes))
     equilibrium = batch.equilibrium.with_lanes(lanes, further, everywhere)
-    return _reached(units, formulation, inverted, equilibrium)
+    return batch_at(units, formulation, inverted, equilibrium)
 
 
-def _reached(
+def batch_at(
     units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
 ) -> Batch:
+    """What the certificate needs to know of shapes, as found for these patterns."""
     extension, is_folded = formulation.springs(equilibrium.coordinates)
     reached = extension > units.wells.spring_barrier
     if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
@@ -211,7 +214,8 @@ def _reached(
     if loop is not None:
         nodes = formulation.stations(equilibrium.coordinates)
         is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
-    return Batch(formulation, equilibrium, inverted, reached, is_folded)
+    is_balanced = _is_balanced(formulation, equilibrium, reached, units.wells)
+    return Batch(formulation, equilibrium, inverted, reached, is_folded, is_balanced)
 
 
 def _searched_again(
@@ -233,11 +237,10 @@ def _searched_again(
     formulation = formulate(few.finger.with_pattern(inverted))
     again = search(few, formulation, inverted, settled, tolerance)
     found = np.flatnonzero(certify(again, few, tolerance) == Status.STABLE)
-    reached, is_folded = batch.reached.copy(), batch.is_folded.copy()
-    reached[:, lanes[found]] = again.reached[:, found]
-    is_folded[lanes[found]] = again.is_folded[found]
+    if not len(found):
+        return batch
     equilibrium = batch.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
-    return replace(batch, equilibrium=equilibrium, reached=reached, is_folded=is_folded)
+    return batch_at(units, batch.formulation, batch.inverted, equilibrium)
 
 
 def certify(
@@ -257,7 +260,7 @@ def certify(
         (elsewhere.any(axis=0), Status.ANOTHER_PATTERN),
         ((elsewhere & inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
         (batch.is_folded, Status.FOLDED),
-        (is_curved & ~is_balanced(batch, units.wells), Status.NOT_CONVERGED),
+        (is_curved & ~batch.is_balanced, Status.NOT_CONVERGED),
         (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),
     )
     status = np.full(inverted.shape[1], Status.STABLE, np.uint8)
@@ -266,7 +269,9 @@ def certify(
     return status
 
 
-def is_balanced(batch: Batch, wells: Wells) -> Flags:
+def _is_balanced(
+    formulation: Formulation, equilibrium: Equilibrium, reached: Flags, wells: Wells
+) -> Flags:
     """Whether what is left of the forces is too small to decide that there is a state, (batch,).
 
     The moment about a unit's corners, over its lever H, has to be small against
@@ -280,11 +285,10 @@ def is_balanced(batch: Batch, wells: Wells) -> Flags:
 
     The residual would not do: stiff bars leave rounding in it that does not move a corner.
     """
-    formulation, equilibrium = batch.formulation, batch.equilibrium
     finger = formulation.finger
     moments = formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient)
     unbalance = np.abs(moments).max(axis=0) / finger.segment_height
-    borne = np.where(batch.reached, np.abs(wells.reset_force), wells.snap_force)
+    borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)
     curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
     by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
     return np.asarray((unbalance <= SMALL_SHARE * np.minimum(borne, by_fold)).all(axis=0))

@@ -172,10 +172,11 @@ def _rigid_slope(finger: Finger, extension: Array) -> Array:
 
 def _rigid_stiffness(finger: Finger, extension: Array) -> Array:
     """d²e/dx² of a unit with rigid bars, N/mm: with x = 2H sin m, dm/dx = 1/(2H cos m)."""
-    half_turn = np.arcsin(extension / (2.0 * finger.segment_height))
-    cosine, sine = np.cos(half_turn), np.sin(half_turn)
-    hinge = finger.hinge_stiffness / (finger.segment_height * cosine) ** 2
-    return finger.springs(extension).stiffness + hinge * (1.0 + half_turn * sine / cosine)
+    sine = extension / (2.0 * finger.segment_height)
+    squared = 1.0 - sine * sine  # of the cosine
+    hinge = finger.hinge_stiffness / (finger.segment_height**2 * squared)
+    curved = 1.0 + np.arcsin(sine) * sine / np.sqrt(squared)
+    return finger.springs(extension).stiffness + hinge * curved
 
 
 def _bisected(finger: Finger, grid: Array, places: Indices, *, rises: bool) -> Array:

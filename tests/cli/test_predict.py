@@ -138,6 +138,8 @@ def test_a_pattern_without_a_state_says_why(call: Call) -> None:
     table = call("predict", "three_unit.yaml", *ONE_WELL)
     assert "reached_pattern" in table.stdout
     assert "7 not_bistable" in table.stderr
+    assert "not_bistable: a unit that the pattern inverts has no second well" in table.stderr
+    assert "marginal: " not in table.stderr
     alone = call("predict", "three_unit.yaml", *ONE_WELL, "--pattern", "1*")
     assert (alone.exit_code, "no stable state" in alone.stderr) == (0, True)
 

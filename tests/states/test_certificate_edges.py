@@ -14,7 +14,7 @@ from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.pairs import _Block, _fit, paired_states
-from dpgcli.states.solve import Batch, Status, Units, certify, is_balanced, search, solve
+from dpgcli.states.solve import Batch, Status, Units, batch_at, certify, search, solve
 from dpgcli.states.wells import geometric_guess, inverted_wells
 
 Fingers = Callable[..., Finger]
@@ -33,7 +33,8 @@ def status_with(stable: tuple[Batch, Units], **changes: object) -> Status:
     """The status if some numbers of the equilibrium were others."""
     batch, units = stable
     equilibrium = replace(batch.equilibrium, **changes)  # type: ignore[arg-type]
-    return Status(certify(replace(batch, equilibrium=equilibrium), units, 1e-12)[0])
+    changed = batch_at(units, batch.formulation, batch.inverted, equilibrium)
+    return Status(certify(changed, units, 1e-12)[0])
 
 
 @pytest.mark.parametrize("residual", [np.nan, np.inf, 1.1e-12])
@@ -133,7 +134,7 @@ def test_between_very_stiff_bars_no_state_is_certified_that_is_none(ratio: float
     assert certify(chain, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
     lattice = solve(units, Lattice, inverted, 1e-12)
     assert certify(lattice, units, 1e-12)[0] != Status.STABLE
-    assert not is_balanced(lattice, units.wells)[0] or not lattice.reached[0, 0]
+    assert not lattice.is_balanced[0] or not lattice.reached[0, 0]
 
 
 def test_a_strut_pulled_through_its_base_is_folded() -> None:
@@ -263,4 +264,4 @@ def test_at_a_rigid_fold_the_walk_goes_on_until_the_elastic_well_is_sure(
     batch = solve(units, Chain, inverted, 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     far = minimize(Chain(finger), batch.equilibrium.coordinates * 1.0001, 1e-12)
-    assert not is_balanced(replace(batch, equilibrium=far), units.wells)[0]
+    assert not batch_at(units, Chain(finger), inverted, far).is_balanced[0]

@@ -13,7 +13,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Batch, Status, Units, certify, search, solve
+from dpgcli.states.solve import Status, Units, batch_at, certify, search, solve
 
 Fingers = Callable[..., Finger]
 
@@ -96,7 +96,8 @@ def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:
     chain, units = Chain(finger), Units.of(finger)
     at_barrier = minimize(chain, np.full((2, 1), half), 1e-3, max_iterations=1)
     reached = np.ones((1, 1), bool)
-    batch = Batch(chain, at_barrier, reached, reached, np.zeros(1, bool))
+    batch = batch_at(units, chain, reached, at_barrier)
+    assert batch.reached.tolist() == [[True]]
     assert certify(batch, units, 1e-3).tolist() == [Status.MARGINAL]
 
 
