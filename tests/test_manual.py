@@ -39,9 +39,9 @@ from dpgcli.cli.main import app
 from dpgcli.files.spec import json_schema, read_spec
 from dpgcli.files.sweep import read_sweep
 from dpgcli.mechanics.scene import Origin
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group, declared
 from dpgcli.states.metrics import DESIGN_COLUMNS
-from dpgcli.states.solve import Status
 from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.studies.kept import KEEPABLE
 

@@ -11,9 +11,11 @@ from dpgcli.accuracy.margins import limits, margins
 from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
 ALL_PATTERNS_UP_TO = 4  # units

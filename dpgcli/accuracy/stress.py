@@ -16,9 +16,12 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Internal
 from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.certify import Batch, Status, certify
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import Batch, Status, Units, certify, search, solve, tip
+from dpgcli.states.solve import search, solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
 AT_FOLD = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of

@@ -10,7 +10,6 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.rows import Columns
-from dpgcli.states.solve import reach
 
 POINTS_AT_ONCE = 2**12
 STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight finger
@@ -55,7 +54,7 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
     1.0
     """
     states = lattice_states(finger, known.patterns, frame)
-    straight = frame.tips(np.array([reach(finger), [0.0], [0.0]]))
+    straight = frame.tips(np.array([finger.straight_length, [0.0], [0.0]]))
     angles = np.abs(states.angles - known.angles)
     has_more = np.isfinite(known.angles[:-1]).any(axis=0)  # than that of the tip
     return Comparison(
@@ -66,7 +65,9 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
         angle=np.where(has_more, _largest(angles), np.nan),
         opening=_largest(np.abs(states.openings - known.openings)),
         push=_largest(np.abs(states.pushes - known.pushes)),
-        shape=_shape_errors(_from_clamp(states.layer, float(reach(finger)[0])), known.shapes),
+        shape=_shape_errors(
+            _from_clamp(states.layer, float(finger.straight_length[0])), known.shapes
+        ),
     )
 
 

@@ -21,9 +21,9 @@ from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_
 from dpgcli.calibration.search import Parameter
 from dpgcli.errors import FitError
 from dpgcli.mechanics.finger import KEYS, Finger
+from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import STEP, sensitivities
-from dpgcli.states.solve import Status, reach
 
 EDGE = 1e-3  # of a value: a fit that ends closer than this to where states end is none
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
@@ -116,7 +116,7 @@ class FingerFit:
         """What the straight finger would have, (…, 1): R² is of the deflections."""
         if self.target == Target.ANGLES:
             return np.zeros((1, 1))
-        return self.frame.tips(np.array([reach(self.finger), [0.0], [0.0]]))
+        return self.frame.tips(np.array([self.finger.straight_length, [0.0], [0.0]]))
 
     @cached_property
     def _given(self) -> Flags:

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain, internal
 from dpgcli.mechanics.finger import Finger
+from dpgcli.states.certify import Batch, Status, certify
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import Batch, Status, Units, certify, solve
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 
 
 @dataclass(frozen=True)

@@ -149,7 +149,7 @@ def _write(
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
     """States, error and time in one line, why some are not stable, and where values come from."""
-    from dpgcli.states.solve import Status
+    from dpgcli.states.certify import Status
 
     summary, plan = prediction.summary, prediction.plan
     counts = ", ".join(f"{n:,} {status.text}" for status, n in summary.statuses.items() if n)

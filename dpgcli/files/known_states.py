@@ -12,7 +12,6 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, in_order, located
 from dpgcli.files.sheet import Sheet, read_sheet
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.solve import reach
 
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
@@ -76,7 +75,7 @@ def states_of(finger: Finger, path: Path, shapes: Path | None = None) -> KnownSt
     Raises SpecError as `read_states` and `check_scale` do.
     """
     known = read_states(path, finger.n_units, shapes)
-    check_scale(path, known, float(reach(finger)[0]))
+    check_scale(path, known, float(finger.straight_length[0]))
     return known
 
 

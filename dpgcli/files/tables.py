@@ -19,12 +19,12 @@ from dpgcli import __version__
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.files.spec import spelled
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 from dpgcli.states.rows import Columns
-from dpgcli.states.solve import Status
 
 SCHEMA_VERSION = 1
 DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, Law, SpringResponse
 
 ARRAYS = (
@@ -90,6 +90,12 @@ class Finger:
         """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design)."""
         hinge = self.hinge_stiffness / self.segment_height**2
         return (self.bistable_stiffness + hinge) * self.stroke
+
+    @property
+    def straight_length(self) -> Array:
+        """Length of the straight finger, Σ L, mm, shape (design,)."""
+        shape = (self.n_units, self.segment_length.shape[1])
+        return total(np.broadcast_to(self.segment_length, shape))
 
     @property
     def domes(self) -> Dome:

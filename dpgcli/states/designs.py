@@ -15,7 +15,8 @@ from dpgcli.states.metrics import Metrics
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.rows import Columns, Wanted, solved_rows
 from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
-from dpgcli.states.solve import Units, lanes_at_once
+from dpgcli.states.solve import lanes_at_once
+from dpgcli.states.units import Units
 
 ROWS_AT_ONCE = 2**15  # of one design
 

@@ -24,17 +24,12 @@ from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.terms import Evaluation, evaluate
+from dpgcli.states.certify import Batch, certify
 from dpgcli.states.crossing import Outline, outline
 from dpgcli.states.patterns import chunks, inverted_units
-from dpgcli.states.solve import (
-    Batch,
-    Units,
-    certify,
-    lanes_at_once,
-    reach,
-    solve,
-    tip,
-)
+from dpgcli.states.solve import lanes_at_once, solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 
 @dataclass(frozen=True)
@@ -143,9 +138,10 @@ class Split:
         pose, jacobian = chain.tip(own)
         energies, joint = at_own.energies, None
         if not chain.finger.is_rigid:
-            beyond = reach(self._cut(self.n_inner, self.n_units).finger)[0]
+            beyond = self._cut(self.n_inner, self.n_units).finger.straight_length[0]
             joint = _inner_joint(chain, own, at_own, jacobian, beyond)
-        lever = reach(self.units.finger)[0]  # an error of the angle moves all that is beyond
+        # an error of the angle moves all that is beyond
+        lever = self.units.finger.straight_length[0]
         half = self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
         return self._with_outline(half, chain, own)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.rows import Columns
-from dpgcli.states.solve import Status, Units, reach
+from dpgcli.states.units import Units
 from dpgcli.states.wells import barriers
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
@@ -72,7 +73,7 @@ class Metrics:
 
     def __post_init__(self) -> None:
         self.n_stable = np.zeros(self.n_designs, np.int64)
-        self.length = np.broadcast_to(reach(self.units.finger), self.n_designs)
+        self.length = np.broadcast_to(self.units.finger.straight_length, self.n_designs)
         self.corners: list[tuple[Indices, Array]] = []
         self.tips = _Distinct()
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain import Chain
+from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, States, Status
 from dpgcli.states.crossing import Outline, diagonals, is_simple
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.solve import MARGINAL_CURVATURE, SMALL_SHARE, States, Status
 
 STATES_AT_ONCE = 2**16
 

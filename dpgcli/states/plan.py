@@ -12,6 +12,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, declared, named
 from dpgcli.states.costs import peak_bytes, seconds
 from dpgcli.states.halves import Split
@@ -27,7 +28,7 @@ from dpgcli.states.rungs import (
     check_exactness,
     error_bounds,
 )
-from dpgcli.states.solve import Status, Units
+from dpgcli.states.units import Units
 
 FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
 FEWEST_PAIRED_STATES = 2**13

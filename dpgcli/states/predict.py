@@ -8,11 +8,12 @@ import numpy as np
 
 from dpgcli.arrays import Codes, keep_freed_memory
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.rows import Columns, as_text, solved_rows, state_columns
-from dpgcli.states.solve import Status, lanes_at_once
+from dpgcli.states.solve import lanes_at_once
 
 
 @dataclass

@@ -11,21 +11,14 @@ from dpgcli.arrays import Array, Flags, total
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Stations
 from dpgcli.mechanics.scene import Gripper, Uncertainty
+from dpgcli.states.certify import Batch, States, Status, certify
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.gripper import grip
 from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import sensitivities
-from dpgcli.states.solve import (
-    Batch,
-    States,
-    Status,
-    Tip,
-    Units,
-    certify,
-    min_eigenvalues,
-    solve,
-    tip,
-)
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import Tip, min_eigenvalues, tip
+from dpgcli.states.units import Units
 
 Columns = dict[str, NDArray[Any]]
 

@@ -21,7 +21,8 @@ from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.terms import evaluate
-from dpgcli.states.solve import TIP_ROUNDING, Units, reach
+from dpgcli.states.tip import TIP_ROUNDING
+from dpgcli.states.units import Units
 from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
@@ -68,7 +69,7 @@ def error_bounds(units: Units) -> Array:
     The first rung needs elastic bars to drop, and a second well of every unit without them.
     """
     finger = units.finger
-    softness, length = _softness(units), reach(finger)
+    softness, length = _softness(units), finger.straight_length
     rounding = 10.0 * TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + softness) * length
     bounds = [
         SAFETY * 2.0 * rung.tolerance * softness * length
@@ -99,7 +100,7 @@ def bar_flexibility(units: Units) -> Array:
     Twice the sum, over units, of what each unit's bars do to first order.
     """
     unit = units.first_order
-    per_unit = np.abs(unit.chord) + reach(units.finger) * unit.turn
+    per_unit = np.abs(unit.chord) + units.finger.straight_length * unit.turn
     shape = (units.finger.n_units, per_unit.shape[1])
     return np.asarray(SAFETY * np.broadcast_to(per_unit, shape).sum(axis=0))
 

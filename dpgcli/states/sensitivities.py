@@ -17,7 +17,7 @@ from dpgcli.equilibrium.banded import backward, forward
 from dpgcli.mechanics.chain import Chain, internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import evaluate
-from dpgcli.states.solve import Batch
+from dpgcli.states.certify import Batch
 
 STEP = 1e-100
 Direction = Mapping[str, Array]
@@ -42,7 +42,8 @@ def sensitivities(batch: Batch, directions: Sequence[Direction]) -> Sensitivitie
     arrays by name, each (1 or unit, 1 or design).
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
-    >>> from dpgcli.states.solve import Units, solve
+    >>> from dpgcli.states.solve import solve
+    >>> from dpgcli.states.units import Units
     >>> units = Units.of(uniform_finger(1, **STUDY))
     >>> batch = solve(units, Chain, np.array([[True]]), 1e-12)
     >>> found = sensitivities(batch, [{"segment_length": np.ones((1, 1))}])

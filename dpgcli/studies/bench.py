@@ -25,13 +25,16 @@ from dpgcli.files.tables import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import certify
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.rows import Columns
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
-from dpgcli.states.solve import Units, certify, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 from dpgcli.studies.kept import check_kept, kept_ways
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time

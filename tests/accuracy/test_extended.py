@@ -20,7 +20,9 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import ARRAYS, Finger, uniform_finger
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.laws import bistable
-from dpgcli.states.solve import Units, min_eigenvalues, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import min_eigenvalues, tip
+from dpgcli.states.units import Units
 
 FOLD = 0.0964682337467354  # α at which the reference unit with rigid bars loses its second well
 LONG_DOUBLE = 4.0 * float(np.finfo(np.longdouble).eps)

@@ -19,7 +19,9 @@ from dpgcli.arrays import Array
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 
 NAMES = [family.name for family in FAMILIES]
 

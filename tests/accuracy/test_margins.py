@@ -12,7 +12,9 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.finger import Finger, uniform_finger
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well

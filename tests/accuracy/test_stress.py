@@ -16,9 +16,11 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.certify import MARGINAL_CURVATURE, Status, certify
 from dpgcli.states.columns import Kind
 from dpgcli.states.plan import FORMULATIONS
-from dpgcli.states.solve import MARGINAL_CURVATURE, Status, Units, certify, search, solve
+from dpgcli.states.solve import search, solve
+from dpgcli.states.units import Units
 
 UNIT = rigid(study_finger().with_units([0]))
 

@@ -17,9 +17,12 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Status, Units, certify, lanes_at_once, solve, tip
+from dpgcli.states.solve import lanes_at_once, solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 pytestmark = pytest.mark.benchmark
 REFERENCE = {**STUDY, "linear_stiffness": 1e4}

@@ -12,9 +12,11 @@ from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.states.certify import Batch, Status, batch_at, certify
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.pairs import _Block, _fit, paired_states
-from dpgcli.states.solve import Batch, Status, Units, batch_at, certify, search, solve
+from dpgcli.states.solve import search, solve
+from dpgcli.states.units import Units
 from dpgcli.states.wells import geometric_guess, inverted_wells
 
 Fingers = Callable[..., Finger]

@@ -11,9 +11,11 @@ from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status, batch_at, certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Status, Units, batch_at, certify, search, solve
+from dpgcli.states.solve import search, solve
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 

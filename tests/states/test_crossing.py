@@ -11,9 +11,11 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Stations
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
-from dpgcli.states.solve import Status, Units, certify, search, solve
+from dpgcli.states.solve import search, solve
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]

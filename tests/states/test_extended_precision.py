@@ -12,7 +12,10 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.states.solve import Status, Units, certify, solve, tip
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 Extended = Callable[[Finger, Array], Any]
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well

@@ -8,8 +8,10 @@ import pytest
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 
 TOLERANCE = 1e-12
 

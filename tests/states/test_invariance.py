@@ -10,9 +10,12 @@ from dpgcli.arrays import Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Units, certify, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 EXPONENTS = st.floats(-3.0, 3.0)

@@ -9,11 +9,12 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.designs import design_states
 from dpgcli.states.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics
 from dpgcli.states.rows import Columns
-from dpgcli.states.solve import Status, Units
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 GROUPS = frozenset({Group.STATES, Group.STIFFNESS})

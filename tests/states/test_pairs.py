@@ -11,11 +11,14 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.certify import States, Status, certify
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import Prediction, Summary, predict
-from dpgcli.states.solve import States, Status, Units, certify, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]

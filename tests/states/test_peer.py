@@ -11,7 +11,8 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.terms import evaluate
-from dpgcli.states.solve import Units, solve
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 from dpgcli.states.wells import geometric_guess
 
 

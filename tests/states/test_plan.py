@@ -18,7 +18,7 @@ from dpgcli.states import solve as solve_module
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.rungs import bar_flexibility
-from dpgcli.states.solve import Units
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 

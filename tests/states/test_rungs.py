@@ -9,10 +9,13 @@ from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.rungs import RUNGS, cheapest, error_bounds
-from dpgcli.states.solve import Status, Units, certify, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well
 Fingers = Callable[..., Finger]

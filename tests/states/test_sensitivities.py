@@ -11,8 +11,11 @@ from dpgcli.mechanics.chain import Chain, internal
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import ARRAYS, STUDY, Finger
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.states.certify import Batch
 from dpgcli.states.sensitivities import sensitivities
-from dpgcli.states.solve import Batch, Units, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 PATTERNS = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 0, 1, 1]], bool)

@@ -11,7 +11,9 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 from dpgcli.states.wells import stroke_guess
 
 Fingers = Callable[..., Finger]

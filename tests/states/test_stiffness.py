@@ -16,7 +16,9 @@ from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import Term, evaluate
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Units, min_eigenvalues, solve
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import min_eigenvalues
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[..., Flags]

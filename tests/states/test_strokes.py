@@ -9,7 +9,9 @@ from dpgcli.arrays import Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.states.solve import Status, Units, certify, solve
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.solve import solve
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]

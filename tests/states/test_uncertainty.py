@@ -12,7 +12,9 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Gripper, Scene, Uncertainty
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import Units, solve, tip
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 NAMES = ("segment_height", "hinge_stiffness", "stroke")

@@ -1,0 +1,149 @@
+"""Whether an equilibrium is a stable state of its pattern: residual, curvature, wells, shape."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.equilibrium.newton import Equilibrium
+from dpgcli.mechanics.formulation import Formulation
+from dpgcli.states.crossing import crosses_itself, outline
+from dpgcli.states.units import Units
+from dpgcli.states.wells import Wells
+
+MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))
+SMALL_SHARE = 0.1  # of what a unit bears: a residual below it cannot decide whether it holds
+LARGEST_CURVATURE = 1.0  # a shape of more than that is far from any fold
+FINEST_BALANCE = 1e-13  # of the forces in play: rounding's
+
+
+class Status(IntEnum):
+    """What a state turned out to be, the graver the greater; `text` is what tables say."""
+
+    STABLE = 0
+    MARGINAL = 1
+    ANOTHER_PATTERN = 2
+    NOT_BISTABLE = 3
+    FOLDED = 4
+    NOT_CONVERGED = 5
+
+    @property
+    def text(self) -> str:
+        return self.name.lower()
+
+    @property
+    def meaning(self) -> str:
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Status.STABLE: "certified: residual, curvature, wells and shape",
+    Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
+    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
+    Status.FOLDED: "a minimum of the equations whose shape no finger can take",
+    Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
+    "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",
+}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """States of one finger (or one per lane), each at an equilibrium, shape (…, batch).
+
+    `reached` says which wells the units ended in, `is_folded` which lanes are no finger, and
+    `is_balanced` where what is left of the forces is too small to matter.
+    """
+
+    formulation: Formulation
+    equilibrium: Equilibrium
+    inverted: Flags
+    reached: Flags
+    is_folded: Flags
+    is_balanced: Flags
+
+
+@dataclass(frozen=True)
+class States:
+    """Certified states, arrays of shape (…, state): what every method gives.
+
+    `status` holds `Status` codes. `pose` is tip x, y (mm) and angle (rad), `tip_error` in mm,
+    `energies` in mJ by kind, `residual` in N.
+    """
+
+    inverted: Flags
+    reached: Flags
+    status: NDArray[np.uint8]
+    pose: Array
+    tip_error: Array
+    energies: dict[str, Array]
+    residual: Array
+
+
+def batch_at(
+    units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
+) -> Batch:
+    """What the certificate needs to know of shapes, as found for these patterns."""
+    extension, is_folded = formulation.springs(equilibrium.coordinates)
+    reached = extension > units.wells.spring_barrier
+    if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
+        reached = reached & inverted
+    loop = units.shortest_loop
+    if loop is not None:
+        nodes = formulation.stations(equilibrium.coordinates)
+        is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
+    is_balanced = _is_balanced(formulation, equilibrium, reached, units.wells)
+    return Batch(formulation, equilibrium, inverted, reached, is_folded, is_balanced)
+
+
+def certify(
+    batch: Batch, units: Units, tolerance: float, own: slice = slice(None)
+) -> NDArray[np.uint8]:
+    """The gravest reason why a lane is not a certified state of its pattern.
+
+    `own` are the units that must have reached their wells; `units` are all.
+    """
+    equilibrium = batch.equilibrium
+    inverted, reached = batch.inverted[own], batch.reached[own]
+    elsewhere = reached != inverted
+    has_none = np.broadcast_to(units.have_no_well, batch.inverted.shape)[own]
+    is_curved = equilibrium.curvature > MARGINAL_CURVATURE
+    checks = (
+        (~is_curved, Status.MARGINAL),
+        (elsewhere.any(axis=0), Status.ANOTHER_PATTERN),
+        ((elsewhere & inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
+        (batch.is_folded, Status.FOLDED),
+        (is_curved & ~batch.is_balanced, Status.NOT_CONVERGED),
+        (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),
+    )
+    status = np.full(inverted.shape[1], Status.STABLE, np.uint8)
+    for failed, reason in checks:
+        status[failed] = reason
+    return status
+
+
+def _is_balanced(
+    formulation: Formulation, equilibrium: Equilibrium, reached: Flags, wells: Wells
+) -> Flags:
+    """Whether what is left of the forces is too small to decide that there is a state, (batch,).
+
+    The moment about a unit's corners, over its lever H, has to be small against
+
+    - what the unit bears, or lacks for a second well, between rigid bars: more could hold it
+      where it does not rest
+    - what a fold as near as the curvature κ allows would bear: where the opening has a stiffness λ
+      whose slope is c, a minimum bears a force of λ²/2c; for equal corners λ = κ k/4, and near
+      the spring's inflection c = 3 k/d, k being k_b + k_θ/H² (our derivation). A low curvature
+      may come from a faint hinge as well, so that rounding is always allowed.
+
+    The residual would not do: stiff bars leave rounding in it that does not move a corner.
+    """
+    finger = formulation.finger
+    moments = formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient)
+    unbalance = np.abs(moments).max(axis=0) / finger.segment_height
+    borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)
+    curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
+    by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
+    return np.asarray((unbalance <= SMALL_SHARE * np.minimum(borne, by_fold)).all(axis=0))

@@ -1,0 +1,70 @@
+"""What is known of a finger's units before any pattern is solved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Flags, Indices
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.crossing import fewest_in_loop
+from dpgcli.states.wells import FirstOrder, Wells, first_order, inverted_wells
+
+LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are soft
+WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twice the height
+
+
+@dataclass(frozen=True)
+class Units:
+    """What is known of a finger's units before any pattern is solved."""
+
+    finger: Finger
+    wells: Wells
+    first_order: FirstOrder
+
+    @property
+    def are_soft(self) -> Flags:
+        """Units that with rigid bars do not show what the finger does, (unit, design).
+
+        Bars turn them too far, or a stroke leads to where only bars that give way can follow.
+        """
+        if self.finger.is_rigid:
+            return np.zeros((1, 1), bool)
+        with np.errstate(invalid="ignore"):
+            is_turned = self.first_order.turn > LARGEST_TURN * self.wells.angle
+        return is_turned | (~self.wells.exists & (self.wells.angle > WIDE_ANGLE))
+
+    @property
+    def shortest_loop(self) -> int | None:
+        """Units that the finger needs to run into itself; None where it has too few."""
+        finger = self.finger
+        widest = np.arcsin(np.minimum(0.5 * finger.stroke / finger.segment_height, 1.0))
+        turn = 2.0 * np.where(self.are_soft, widest, self.wells.angle)
+        return fewest_in_loop(turn, finger.segment_length, finger.n_units)
+
+    @property
+    def have_no_well(self) -> Flags:
+        """Units that certainly have no second well, (unit, design).
+
+        Between soft bars one may exist where there is none between rigid ones, unless the dome
+        by itself has none.
+        """
+        has_none, soft = ~self.wells.exists, self.are_soft
+        if soft.any():
+            has_none = has_none & (~soft | np.isnan(self.finger.law.rests(self.finger.domes).well))
+        return has_none
+
+    @classmethod
+    def of(cls, finger: Finger) -> "Units":
+        wells = inverted_wells(finger)
+        return cls(finger, wells, first_order(finger, wells))
+
+    def section(self, first: int, stop: int) -> "Units":
+        """Units first+1 … stop, counted from the base, with all that is known of them."""
+        finger = self.finger.units(first, stop)
+        return Units(finger, self.wells.units(first, stop), self.first_order.units(first, stop))
+
+    def designs(self, index: Indices) -> "Units":
+        """One design for each lane, by index, so that designs and patterns share a batch."""
+        return Units(
+            self.finger.designs(index), self.wells.designs(index), self.first_order.designs(index)
+        )
