@@ -17,11 +17,11 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Internal
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.states.certify import Status, certify
+from dpgcli.states.guess import geometric_guess, stroke_guess
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, RUNGS
 from dpgcli.states.solve import solve
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
-from dpgcli.states.wells import geometric_guess, stroke_guess
 
 PEERS_START = 1.0  # strokes: where the peers begin
 

@@ -9,8 +9,8 @@ from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.states.certify import Batch, Status, batch_at, certify
+from dpgcli.states.guess import geometric_guess, stroke_guess
 from dpgcli.states.units import Units
-from dpgcli.states.wells import geometric_guess, stroke_guess
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured

@@ -7,7 +7,8 @@ import numpy as np
 from dpgcli.arrays import Flags, Indices
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.crossing import fewest_in_loop
-from dpgcli.states.wells import FirstOrder, Wells, first_order, inverted_wells
+from dpgcli.states.guess import FirstOrder, first_order
+from dpgcli.states.wells import Wells, inverted_wells
 
 LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are soft
 WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twice the height

@@ -15,9 +15,9 @@ from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.guess import stroke_guess
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
-from dpgcli.states.wells import stroke_guess
 
 REFERENCE = {**STUDY, "linear_stiffness": 1e4}
 TOLERANCES = {  # mm, of the tip; 10 to 1000 times what was measured

@@ -13,11 +13,12 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.states.certify import Batch, Status, batch_at, certify
+from dpgcli.states.guess import geometric_guess
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.pairs import _Block, _fit, paired_states
 from dpgcli.states.solve import search, solve
 from dpgcli.states.units import Units
-from dpgcli.states.wells import geometric_guess, inverted_wells
+from dpgcli.states.wells import inverted_wells
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]

@@ -11,9 +11,9 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.guess import geometric_guess
 from dpgcli.states.solve import solve
 from dpgcli.states.units import Units
-from dpgcli.states.wells import geometric_guess
 
 
 @pytest.mark.parametrize(("method", "tolerance"), [("trust-exact", 1e-7), ("BFGS", 1e-4)])

@@ -12,9 +12,9 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.states.certify import Status, certify
+from dpgcli.states.guess import stroke_guess
 from dpgcli.states.solve import solve
 from dpgcli.states.units import Units
-from dpgcli.states.wells import stroke_guess
 
 Fingers = Callable[..., Finger]
 

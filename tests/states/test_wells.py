@@ -10,9 +10,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
+from dpgcli.states.guess import FirstOrder, first_order, geometric_guess
 from dpgcli.states.solve import solve
 from dpgcli.states.units import Units
-from dpgcli.states.wells import FirstOrder, first_order, geometric_guess, inverted_wells
+from dpgcli.states.wells import inverted_wells
 
 Reference = Callable[..., Finger]
 

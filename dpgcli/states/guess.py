@@ -1,0 +1,113 @@
+"""Where searches begin: units in their own wells, bars to first order, or opened by strokes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.formulation import Internal
+from dpgcli.mechanics.terms import evaluate
+from dpgcli.states.wells import ByUnit, Wells, single_units
+
+
+@dataclass(frozen=True)
+class FirstOrder(ByUnit):
+    """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
+
+    `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,
+    a strut's by one of its two units; `by_chord`, `by_near_strut`, `by_far_strut` the answer of
+    the near corner to those, rad/mm (of the far corner: near and far exchanged). A ground unit
+    carries no force and has all of them zero. Close to the loss of bistability, and without a
+    hinge, the answers grow without bound: they are then scaled down to a tenth of m. `turn` is
+    what both corners may turn by in any pattern (rad), not scaled down. Shapes as in `Wells`.
+    """
+
+    rigid_angle: Array
+    chord: Array
+    strut: Array
+    by_chord: Array
+    by_near_strut: Array
+    by_far_strut: Array
+    turn: Array
+
+
+def first_order(finger: Finger, wells: Wells) -> FirstOrder:
+    """Answer of each inverted unit to the flexibility of its bars (our derivation).
+
+    With A the Hessian by the two corners, C its columns by a bar and g the force on the bar,
+    a bar extends by −g/k_L and the corners follow by −A⁻¹C times that.
+    """
+    flat, (units, designs) = single_units(finger)
+    rigid_angle = np.broadcast_to(wells.angle, (units, designs))
+    zero = np.zeros((units, designs))
+    if finger.is_rigid:
+        return FirstOrder(rigid_angle, zero, zero, zero, zero, zero, zero)
+    angle = rigid_angle.reshape(1, -1)
+    rest = np.zeros_like(angle)
+    chain = Chain(flat)
+    at_well = evaluate(chain, chain.coordinates(Internal(rest, angle, angle, rest)))
+    stiffness = np.broadcast_to(finger.linear_stiffness, (units, designs))
+    # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
+    band, gradient = at_well.hessian, at_well.gradient
+    chord, strut = (-gradient[row].reshape(units, designs) / stiffness for row in (0, 3))
+    answers = [part.reshape(units, designs) for part in _corner_answers(band)]
+    by_chord, by_near_strut, by_far_strut = answers
+    with np.errstate(invalid="ignore"):  # an infinite answer to no force
+        turn = 2.0 * (
+            np.abs(by_chord * chord)
+            + (np.abs(by_near_strut) + np.abs(by_far_strut)) * 2.0 * np.abs(strut).max(axis=0)
+        )
+    turn = np.where(np.isnan(turn), np.inf, turn)  # of both corners
+    scale = np.minimum(1.0, 0.2 * rigid_angle / np.maximum(turn, np.finfo(float).tiny))
+    scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
+    by_chord, by_near_strut, by_far_strut = scaled
+    return FirstOrder(rigid_angle, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+
+
+def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
+    """−A⁻¹C for the near corner, by chord, near and far strut; infinite where A is singular."""
+    corner, mixed = band[0, 1], band[1, 1]
+    chord_near, strut_near, strut_far = band[1, 0], band[2, 1], band[1, 2]
+    opening, leaning = corner + mixed, corner - mixed  # the eigenvalues of A
+    smallest = np.finfo(float).eps * corner
+    is_singular = (np.abs(opening) <= smallest) | (np.abs(leaning) <= smallest)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        determinant = np.where(is_singular, 0.0, opening * leaning)
+        answers = (
+            -chord_near / np.where(is_singular, 0.0, opening),
+            # by mirror symmetry the near strut acts on the near corner as the far on the far
+            -(corner * strut_far - mixed * strut_near) / determinant,
+            -(corner * strut_near - mixed * strut_far) / determinant,
+        )
+    by_chord, by_near, by_far = (np.where(is_singular, np.inf, part) for part in answers)
+    return by_chord, by_near, by_far
+
+
+def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Internal:
+    """The shape of a pattern, (unit, batch), with each unit in its own well.
+
+    Bars extend, and corners follow, to first order; the error left is of order (k_b/k_L)².
+    """
+    on = inverted.astype(float)
+    if finger.is_rigid:
+        rest = np.zeros((1, 1))
+        angle = unit.rigid_angle * on
+        return Internal(rest, angle, angle, rest)
+    strut = unit.strut * on
+    strut[:-1] += (unit.strut * on)[1:]
+    near_strut = np.zeros_like(strut)
+    near_strut[1:] = strut[:-1]
+    common = unit.rigid_angle + unit.by_chord * unit.chord
+    near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut)
+    far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut)
+    return Internal(unit.chord * on, near, far, strut)
+
+
+def stroke_guess(finger: Finger, inverted: Flags, strokes: float) -> Internal:
+    """The shape with every inverted unit opened by `strokes` times its stroke."""
+    half = np.minimum(strokes * finger.stroke / (2.0 * finger.segment_height), 1.0)
+    rest = np.zeros((1, 1))
+    angle = np.arcsin(half) * inverted
+    return Internal(rest, angle, angle, rest)
