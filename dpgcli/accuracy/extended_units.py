@@ -67,17 +67,18 @@ def inverted_angle(unit: Unit) -> "mpf":
 
 
 def spring_barrier(unit: Unit) -> "mpf":
-    """The opening (mm) at which the dome's spring alone turns over; 3/4 stroke if it never does.
+    """The opening (mm) at which the dome's spring alone turns over; infinite if it never does.
 
     A root of 1 + β(2u² − 3u) with β = 1 − α. Bars and hinges pull an open unit back, so that it
     rests inverted only beyond.
     """
-    from mpmath import sqrt
+    from mpmath import inf, sqrt
 
     beta = 1 - unit.linearity
     squared = 9 * beta**2 - 8 * beta
-    share = (3 * beta - sqrt(squared)) / (4 * beta) if squared > 0 else 0.75
-    return share * unit.stroke
+    if not squared > 0:
+        return inf
+    return (3 * beta - sqrt(squared)) / (4 * beta) * unit.stroke
 
 
 def _bisected(function: Callable[["mpf"], "mpf"], low: "mpf", high: "mpf") -> "mpf":

@@ -262,8 +262,9 @@ class Chain:
         cell = cells(self.finger, coordinates)
         chord, near, far, _ = internal(coordinates, self.finger.is_rigid)
         length = self.finger.segment_length + chord
-        shape = CellShape(length, cell.far_strut, near, far, cell.along_near, cell.along_far)
-        return Springs(cell.extension, impossible(shape))
+        levers = cell.near_strut * cell.along_near, cell.far_strut * cell.along_far
+        shape = CellShape(length, cell.far_strut, near, far, *levers)
+        return Springs(cell.extension, impossible(shape), np.stack(levers))
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
         _, near, far, _ = internal(gradient, self.finger.is_rigid)

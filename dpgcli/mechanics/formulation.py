@@ -23,26 +23,30 @@ class Internal(NamedTuple):
 
 
 class Springs(NamedTuple):
-    """Extension x of every bistable spring (mm), (unit, batch); `impossible` shapes, (batch,)."""
+    """Extension x of every bistable spring (mm), (unit, batch); `impossible` shapes, (batch,).
+
+    `lever` is how far a spring extends as its near and its far corner open, mm/rad, (2, unit,
+    batch): H in the straight finger, nothing where a strut lies along the spring.
+    """
 
     extension: Array
     is_folded: Flags
+    lever: Array
 
 
 class CellShape(NamedTuple):
     """What decides whether a cell can exist, arrays that broadcast to (unit, batch).
 
-    Lengths of the chord and of the far strut (mm), the corner angles (rad), and the cosines
-    between the dome's spring and the ways in which the tops of its two struts swing as they
-    open (any positive factor will do).
+    Lengths of the chord and of the far strut (mm), the corner angles (rad), and how far the
+    dome's spring extends as the near and the far corner open (mm/rad).
     """
 
     chord: Array
     strut: Array
     near_angle: Array
     far_angle: Array
-    near_swing: Array
-    far_swing: Array
+    near_lever: Array
+    far_lever: Array
 
 
 def impossible(cell: CellShape) -> Flags:
@@ -59,8 +63,8 @@ def impossible(cell: CellShape) -> Flags:
     """
     shortest = np.minimum(cell.chord, cell.strut).min(axis=0)
     turned = np.maximum(np.abs(cell.near_angle), np.abs(cell.far_angle)).max(axis=0)
-    swing = np.minimum(cell.near_swing, cell.far_swing).min(axis=0)
-    return np.asarray((shortest <= 0.0) | (turned >= 0.5 * np.pi) | (swing <= 0.0))
+    lever = np.minimum(cell.near_lever, cell.far_lever).min(axis=0)
+    return np.asarray((shortest <= 0.0) | (turned >= 0.5 * np.pi) | (lever <= 0.0))
 
 
 class Stations(NamedTuple):

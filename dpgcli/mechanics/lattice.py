@@ -326,10 +326,11 @@ class Lattice:
 
     def springs(self, coordinates: Array) -> Springs:
         cell = vectors(self.finger, coordinates)
-        swings = _cross(cell.top, cell.near), _cross(cell.top, cell.far)
-        shape = CellShape(np.hypot(*cell.chord), np.hypot(*cell.far), *corners(cell), *swings)
+        along = cell.top / np.hypot(*cell.top)
+        levers = _cross(along, cell.near), _cross(along, cell.far)
+        shape = CellShape(np.hypot(*cell.chord), np.hypot(*cell.far), *corners(cell), *levers)
         extension = _extension(cell.top, self.finger.segment_length, 0)
-        return Springs(extension, impossible(shape))
+        return Springs(extension, impossible(shape), np.stack(levers))
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
         base, top = coordinates.reshape(-1, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)

@@ -86,7 +86,7 @@ def batch_at(
     units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
 ) -> Batch:
     """What the certificate needs to know of shapes, as found for these patterns."""
-    extension, is_folded = formulation.springs(equilibrium.coordinates)
+    extension, is_folded, lever = formulation.springs(equilibrium.coordinates)
     reached = extension > units.wells.spring_barrier
     if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
         reached = reached & inverted
@@ -94,7 +94,7 @@ def batch_at(
     if loop is not None:
         nodes = formulation.stations(equilibrium.coordinates)
         is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
-    is_balanced = _is_balanced(formulation, equilibrium, reached, units.wells)
+    is_balanced = _is_balanced(formulation, equilibrium, lever, reached, units.wells)
     return Batch(formulation, equilibrium, inverted, reached, is_folded, is_balanced)
 
 
@@ -125,25 +125,27 @@ def certify(
 
 
 def _is_balanced(
-    formulation: Formulation, equilibrium: Equilibrium, reached: Flags, wells: Wells
+    formulation: Formulation, equilibrium: Equilibrium, lever: Array, reached: Flags, wells: Wells
 ) -> Flags:
     """Whether what is left of the forces is too small to decide that there is a state, (batch,).
 
-    The moment about a unit's corners, over its lever H, has to be small against
+    The moments about a unit's corners have to be small against
 
-    - what the unit bears, or lacks for a second well, between rigid bars: more could hold it
-      where it does not rest
-    - what a fold as near as the curvature κ allows would bear: where the opening has a stiffness λ
-      whose slope is c, a minimum bears a force of λ²/2c; for equal corners λ = κ k/4, and near
-      the spring's inflection c = 3 k/d, k being k_b + k_θ/H² (our derivation). A low curvature
-      may come from a faint hinge as well, so that rounding is always allowed.
+    - what the unit bears, or lacks for a second well, between rigid bars, as forces on the opening:
+      more could hold it where it does not rest
+    - over H, what a fold as near as the curvature κ allows would bear: where the opening has a
+      stiffness λ whose slope is c, a minimum bears a force of λ²/2c; for equal corners λ = κ k/4,
+      and near the spring's inflection c = 3 k/d, k being k_b + k_θ/H² (our derivation). A low
+      curvature may come from a faint hinge as well, so that rounding is always allowed.
 
     The residual would not do: stiff bars leave rounding in it that does not move a corner.
     """
     finger = formulation.finger
-    moments = formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient)
-    unbalance = np.abs(moments).max(axis=0) / finger.segment_height
+    moments = np.abs(formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient))
+    unbalance = moments.max(axis=0) / finger.segment_height
+    on_opening = (moments / np.where(lever > 0.0, lever, finger.segment_height)).max(axis=0)
     borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)
     curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
     by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
-    return np.asarray((unbalance <= SMALL_SHARE * np.minimum(borne, by_fold)).all(axis=0))
+    is_small = (on_opening <= SMALL_SHARE * borne) & (unbalance <= SMALL_SHARE * by_fold)
+    return np.asarray(is_small.all(axis=0))

@@ -36,11 +36,12 @@ class Units:
 
     @property
     def shortest_loop(self) -> int | None:
-        """Units that the finger needs to run into itself; None where it has too few."""
-        finger = self.finger
-        widest = np.arcsin(np.minimum(0.5 * finger.stroke / finger.segment_height, 1.0))
-        turn = 2.0 * np.where(self.are_soft, widest, self.wells.angle)
-        return fewest_in_loop(turn, finger.segment_length, finger.n_units)
+        """Units that the finger needs to run into itself; None where it has too few.
+
+        How far a unit between soft bars turns is not known before: any two may meet.
+        """
+        turn = np.where(self.are_soft, np.pi, 2.0 * self.wells.angle)
+        return fewest_in_loop(turn, self.finger.segment_length, self.finger.n_units)
 
     @property
     def have_no_well(self) -> Flags:

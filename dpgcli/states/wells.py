@@ -19,6 +19,7 @@ from dpgcli.mechanics.finger import Finger
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
 SEARCHED = 512  # extensions at which the slope of a tabulated law is looked at
 WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
+IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
 INFLECTION_BISECTIONS = 24
 BISECTIONS = 48  # of one 512th of the range: down to rounding
 
@@ -43,14 +44,15 @@ class Wells(ByUnit):
     """The inverted well of each unit, arrays of shape (unit or 1, design).
 
     `exists` says whether there is one; `angle` is its corner angle m (rad), `extension` its
-    x (mm) and `barrier` the x at the top between the wells. Where there is none, `angle` is
-    that of the full stroke and `barrier` the middle, so that a search can still begin.
+    x (mm) and `barrier` the x at the top between the wells. Where there is none, both are of
+    the full stroke (of where a dome that only pushes still does) and `barrier` is the middle, so
+    that a search can still begin.
 
     `spring_barrier` is the x (mm) at which the dome's spring alone turns over. With any bars and
     hinges a unit rests inverted only beyond it, since what holds the unit straight pulls back;
-    the unit's own barrier lies between it and the well. `snap_force` and `reset_force` (N, on
-    the opening) are what a unit bears in its ground and in its inverted well; where there is no
-    second well, `reset_force` is negative, what would have to help.
+    infinite where the spring does not. The unit's own barrier lies between it and the well.
+    `snap_force` and `reset_force` (N, on the opening) are what a unit bears in its ground and in
+    its inverted well; where there is no second well, `reset_force` is negative, what is lacking.
     """
 
     exists: Flags
@@ -82,7 +84,7 @@ def inverted_wells(finger: Finger) -> Wells:
     exists &= barrier < well
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     full = np.minimum(1.0, widest)
-    extension = np.where(exists, well, full) * stroke
+    extension = np.where(exists, well * stroke, _opened(finger, widest * stroke))
     snap, reset = _extreme_slopes(finger, np.stack((0.0 * full, full)) * stroke)
     return Wells(
         exists,
@@ -95,10 +97,25 @@ def inverted_wells(finger: Finger) -> Wells:
     )
 
 
+def _opened(finger: Finger, widest: Array) -> Array:
+    """Where a search begins in a unit without a second well, mm: open by its stroke.
+
+    A dome that only pushes has to be in touch, or nothing would hold the unit there.
+    """
+    opening = finger.stroke
+    if finger.law.pushes_only:
+        well = finger.law.rests(finger.domes).well
+        opening = np.where(np.isnan(well), opening, IN_TOUCH * well)
+    return np.asarray(np.minimum(opening, widest))
+
+
 def _spring_barrier(finger: Finger, otherwise: Array) -> Array:
-    """Where the dome's spring alone turns over, mm; `otherwise` where it has no second well."""
+    """Where the dome's spring alone turns over, mm; nowhere if it has no second well.
+
+    `otherwise` where a dome has done so before it opens its unit.
+    """
     top = finger.law.rests(finger.domes).top
-    return np.asarray(np.where(top > 0.0, top, otherwise))
+    return np.asarray(np.where(np.isnan(top), np.inf, np.where(top > 0.0, top, otherwise)))
 
 
 def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
@@ -120,11 +137,12 @@ def _searched_wells(finger: Finger) -> Wells:
     lever = 2.0 * finger.segment_height
     domes = finger.domes
     whole = domes.stroke + domes.contact
-    well = finger.law.rests(domes).well + domes.contact  # a travel; the unit's own is shorter
-    furthest = WIDEST * np.where(np.isnan(well), whole, well)
+    own = finger.law.rests(domes).well + domes.contact  # a travel; the unit's is shorter
+    furthest = WIDEST * np.where(np.isnan(own), whole, own)
     widest = np.minimum(furthest - domes.contact, (1.0 - 1e-9) * lever)
     lowest = finger.law.rests(domes).top if finger.law.pushes_only else 0.0 * widest
-    lowest = np.where(np.isnan(lowest), 0.0, lowest)
+    within_reach = ~(lowest >= widest)  # of a unit whose bars are rigid
+    lowest = np.where(within_reach & ~np.isnan(lowest), lowest, 0.0)
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
     grid = lowest + (widest - lowest) * shares
     slope = _rigid_slope(finger, grid)
@@ -138,11 +156,11 @@ def _searched_wells(finger: Finger) -> Wells:
     wells = np.where(is_well, depth, -np.inf).argmax(axis=0)
     is_top &= places < wells
     tops = np.where(is_top.any(axis=0), np.where(is_top, energy, -np.inf).argmax(axis=0), -1)
-    exists = is_well.any(axis=0) & np.isfinite(finger.law.rests(finger.domes).well)
+    exists = is_well.any(axis=0) & np.isfinite(own) & within_reach
     well = _bisected(finger, grid, wells, rises=True)
     top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
     stroke = np.broadcast_to(finger.stroke, exists.shape)
-    extension = np.where(exists, well, np.minimum(stroke, widest))
+    extension = np.where(exists, well, _opened(finger, widest))
     barrier = np.where(exists, np.where(tops >= 0, top, lowest), MIDDLE * stroke)
     return Wells(
         exists,
@@ -209,6 +227,7 @@ def _roots(
         running = running & (np.abs(step) > 2e-16 * np.abs(relative))
         if not running.any():
             break
+        step = np.where(running, step, 0.0)  # what has arrived stays, whoever else still runs
         relative = np.clip(relative - step, 0.0, widest)  # beyond only where there is no root
     return relative, np.asarray(exists.all(axis=0))
 
@@ -218,9 +237,11 @@ def _turn_over_sine(turn: Array) -> tuple[Array, Array]:
     small = np.abs(turn) < 1e-2
     safe = np.where(small, 1.0, turn)
     sine = np.sin(safe)
-    ratio = np.where(small, 1.0 + turn**2 / 6.0 + 7.0 * turn**4 / 360.0, safe / sine)
+    squared = turn * turn  # NumPy's own powers have other bits in batches of other sizes
+    series = 1.0 + squared * (1.0 / 6.0 + 7.0 / 360.0 * squared)
+    ratio = np.where(small, series, safe / sine)
     slope = (sine - safe * np.cos(safe)) / sine**2
-    return ratio, np.where(small, turn / 3.0 + 7.0 * turn**3 / 90.0, slope)
+    return ratio, np.where(small, turn * (1.0 / 3.0 + 7.0 / 90.0 * squared), slope)
 
 
 def barriers(finger: Finger, wells: Wells) -> Array:

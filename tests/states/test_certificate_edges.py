@@ -1,7 +1,7 @@
 """Each check of the certificate alone: what it refuses, and nothing else is wrong."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,13 +10,16 @@ from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.arrays import Flags
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
 from dpgcli.states.certify import Batch, Status, batch_at, certify
 from dpgcli.states.guess import geometric_guess
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.pairs import _Block, _fit, paired_states
 from dpgcli.states.solve import search, solve
+from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
@@ -268,3 +271,99 @@ def test_at_a_rigid_fold_the_walk_goes_on_until_the_elastic_well_is_sure(
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     far = minimize(Chain(finger), batch.equilibrium.coordinates * 1.0001, 1e-12)
     assert not batch_at(units, Chain(finger), inverted, far).is_balanced[0]
+
+
+@pytest.mark.parametrize("formulation", [Chain, Lattice])
+def test_near_a_right_angle_moments_count_by_their_lever(
+    formulation: type[Chain | Lattice],
+) -> None:
+    """A corner near 90° hardly extends the spring: the lattice's last digits are forces there."""
+    finger = uniform_finger(
+        1,
+        segment_length=14.0,
+        segment_height=10.0,
+        stroke=30.9,
+        bistable_stiffness=10.0,
+        force_linearity=0.0940983,
+        hinge_stiffness=2.928e-5,
+        linear_stiffness=4.33e14,
+    )
+    units = Units.of(finger)
+    batch = solve(units, formulation, np.ones((1, 1), bool), 1e-12)
+    assert certify(batch, units, 1e-12)[0] != Status.STABLE
+
+
+@pytest.mark.parametrize(("ratio", "past"), [(10.0, 1e-4), (1e3, 1e-6), (1e6, 1e-10)])
+def test_a_dome_that_only_pushes_keeps_the_state_that_elastic_bars_leave_it(
+    reference_finger: Fingers, ratio: float, past: float
+) -> None:
+    """Beyond the rigid fold; the search begins where the dome is in touch."""
+    linearity = 0.0964682337467354 * (1.0 + past)
+    both = reference_finger(3, 12.84 * ratio, force_linearity=linearity)
+    pushing = Units.of(replace(both, law=PushOnly(PUBLISHED)))
+    inverted = np.array([[True], [False], [True]])
+    batches = [solve(units, Chain, inverted, 1e-12) for units in (Units.of(both), pushing)]
+    tips = [tip(batch, with_compliance=False).pose[:, 0] for batch in batches]
+    assert certify(batches[1], pushing, 1e-12).tolist() == [Status.STABLE]
+    assert tips[1] == pytest.approx(tips[0], abs=1e-7)
+
+
+def test_a_dome_beyond_the_lever_leaves_the_ground_state(reference_finger: Fingers) -> None:
+    """Rigid bars never bring the neighbor in touch: there is no well, and nothing is NaN."""
+    travel = np.linspace(0.0, 1.5, 301)
+    energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
+    law = PushOnly(Tabulated(spline(tuple(travel), tuple(energy))))
+    units = Units.of(replace(reference_finger(3, 1e4, stroke=43.0), law=law))
+    assert not units.wells.exists.any()
+    assert np.isfinite(units.wells.angle).all()
+    inverted = np.array([[False, True], [False, False], [False, False]])
+    batch = solve(units, Chain, inverted, 1e-12)
+    assert certify(batch, units, 1e-12)[0] == Status.STABLE
+
+
+def test_a_dome_without_a_second_well_is_never_inverted(reference_finger: Fingers) -> None:
+    travel = np.linspace(0.0, 0.8, 30)  # the curve ends before its well
+    energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
+    law = Tabulated(spline(tuple(travel), tuple(energy)))
+    units = Units.of(replace(reference_finger(1, 1e4), law=law))
+    batch = solve(units, Chain, np.ones((1, 1), bool), 1e-12)
+    assert certify(batch, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
+
+
+def test_soft_units_meet_wherever_a_curve_has_its_well(reference_finger: Fingers) -> None:
+    """A well at 1.8 strokes opens three units to a ring: alone as in a batch."""
+    travel = np.linspace(0.0, 2.7, 40)
+    energy = 0.5 * travel**2 * (1.0 + 0.985 * ((travel / 1.8) ** 2 - travel / 0.9))
+    finger = uniform_finger(
+        3,
+        segment_length=10.0,
+        segment_height=17.0,
+        stroke=19.0,
+        bistable_stiffness=7.0,
+        force_linearity=0.015,
+        hinge_stiffness=4.0,
+        linear_stiffness=7.0,
+    )
+    units = Units.of(replace(finger, law=Tabulated(spline(tuple(travel), tuple(energy)))))
+    batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
+    assert certify(batch, units, 1e-12).tolist() == [Status.FOLDED]
+
+
+def test_wells_are_the_same_alone_and_in_a_batch() -> None:
+    random = np.random.default_rng(0)
+    shape = (1, 200)
+    finger = Finger(
+        1,
+        segment_length=random.uniform(5.0, 20.0, shape),
+        segment_height=random.uniform(5.0, 20.0, shape),
+        stroke=10.0 ** random.uniform(-2.0, 1.0, shape),
+        bistable_stiffness=10.0 ** random.uniform(-1.0, 2.0, shape),
+        force_linearity=random.uniform(0.0, 0.1, shape),
+        hinge_stiffness=10.0 ** random.uniform(-2.0, 2.0, shape),
+        linear_stiffness=np.full(shape, 1e5),
+    )
+    together = inverted_wells(finger)
+    for design in range(200):
+        alone = inverted_wells(finger.designs(np.array([design])))
+        for field in fields(alone):
+            assert getattr(alone, field.name)[0, 0] == getattr(together, field.name)[0, design]
