@@ -22,6 +22,7 @@ def merge(
     """Join shards into the tables of the whole sweep."""
     from dpgcli.errors import UsageError
     from dpgcli.files.output import check_outputs, sole_use
+    from dpgcli.files.reading import read_run
     from dpgcli.studies.sweep import RUN, assemble, drop_half_written, outputs, stores
 
     found = []
@@ -36,11 +37,12 @@ def merge(
     with sole_use(output):
         drop_half_written(output)
         check_outputs((), *(each for each in outputs(output) if each[0] != output / RUN))
+        read_run(output / RUN)  # what no report can be made beside is refused before the work
         assemble(found, output)
+        designs, text = summarize(output, is_new=True)
         for store in found:
             if store.folder.parent.parent.samefile(output):
                 store.drop()
-        designs, text = summarize(output, is_new=True)
     if not quiet:
         print(text, end="")
         say(f"{output}: {len(found)} shards joined")

@@ -8,18 +8,24 @@ from typing import TYPE_CHECKING, Any
 from dpgcli.cli.exits import ExitCode, fail
 
 if TYPE_CHECKING:
-    from dpgcli.studies.sweep import Progress, Shard
+    from dpgcli.studies.sweep import Progress, Shard, Study
 
 
 MOST_HELD = 6  # ranges of designs that are named
 
 
-def run_facts(progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
-    """The content of run.json; shares are of the wall time of all workers."""
+def run_facts(study: "Study", progress: "Progress", replays: Sequence[str]) -> dict[str, Any]:
+    """The content of run.json; shares are of the wall time of all workers.
+
+    By their fingerprint a report knows whether they are those of the tables beside them.
+    """
     import platform
+
+    from dpgcli.files.parts import FINGERPRINT
 
     core, writing, pool = _shares(progress)
     return {
+        "fingerprint": study.metadata[FINGERPRINT],
         "designs": progress.n_designs,
         "resumed_designs": progress.n_resumed,
         "states": progress.n_states,

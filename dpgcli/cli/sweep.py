@@ -239,11 +239,11 @@ def _conclude(
 
     replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]
     if part is None:
-        write_run(study.folder / RUN, run_facts(progress, replays))
+        write_run(study.folder / RUN, run_facts(study, progress, replays))
         began = perf_counter()
         study.assemble()  # last but for its own time: finished tables say that all is there
         progress.tables_seconds = perf_counter() - began
-        write_run(study.folder / RUN, run_facts(progress, replays))
+        write_run(study.folder / RUN, run_facts(study, progress, replays))
     if not quiet:
         say(run_summary(study.folder, progress, part))
     for replay in replays:

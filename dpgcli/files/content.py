@@ -38,6 +38,13 @@ def content_of(path: Path, place: Place, most: int | None = None, hint: str = ""
         raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
 
 
+def opened(path: Path) -> BinaryIO:
+    """A file to read; raises OSError for a device or pipe, which may have no end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(None, "is a device or pipe, not a file")
+    return path.open("rb")
+
+
 @contextmanager
 def quoted_if(path: Path, word: bytes, expected: str) -> Iterator[None]:
     """Keep problems in what a file says to files that have a word in them.

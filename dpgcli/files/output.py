@@ -118,6 +118,8 @@ def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     if control := control_character(str(path)):
         raise OutputError(f"cannot write {path}: {control} in it")
     try:
+        if path.is_fifo():  # it would be waited for
+            raise OSError(None, "is a device or pipe, not a file")
         path.open("ab").close()
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}") from error

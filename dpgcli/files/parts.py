@@ -19,7 +19,8 @@ from typing import IO, Any, NamedTuple
 
 import pyarrow as pa
 
-from dpgcli.errors import OutputError
+from dpgcli.errors import OutputError, UsageError
+from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.tables import record_batch, schema
 from dpgcli.states.columns import Column
@@ -29,6 +30,7 @@ from dpgcli.temporary import temporary_file
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
 LENGTH = struct.Struct("<Q")
 SAID = "sweep.json"
+MOST_SAID = 2**26  # bytes
 FINGERPRINT = "dpg.fingerprint"
 
 
@@ -95,7 +97,7 @@ class Part(NamedTuple):
     @property
     def is_damaged(self) -> bool:
         """Whether its bytes do not match its name."""
-        return _digest(self.path) not in self.path.name
+        return not self.path.is_file() or _digest(self.path) not in self.path.name
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,19 @@ class PartStore:
                 temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
 
     def said(self) -> dict[str, str]:
-        """What the sweep is about; empty where that cannot be read, or is damaged."""
+        """What the sweep is about; empty where that is not said, or is damaged.
+
+        Raises UsageError for what cannot be read.
+        """
+        path = self.folder / SAID
         try:
-            said = json.loads((self.folder / SAID).read_bytes())
-        except (OSError, ValueError, RecursionError):
+            with opened(path) as stream:
+                said = json.loads(stream.read(MOST_SAID))
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise UsageError(f"cannot read {path}: {error.strerror}") from error
+        except (ValueError, RecursionError):
             return {}
         if not isinstance(said, dict) or said.get(FINGERPRINT) != fingerprint(said):
             return {}

@@ -10,11 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dpgcli.errors import UsageError
+from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
 
 TEXTS = ("calibration", "status", "reason", "rung")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
+MOST_FACTS = 2**26  # bytes
 DAMAGED = "damaged: its bytes are not those of its SHA-256; make it again"
 
 
@@ -48,7 +50,7 @@ def read_undamaged(path: Path) -> Any:
     Raises UsageError for what is damaged, or no Parquet file.
     """
     try:
-        with path.open("rb") as stream:  # pyarrow takes no name that is not text
+        with opened(path) as stream:  # pyarrow takes no name that is not text
             file = undamaged(stream)
             if file is not None:
                 table = file.read()
@@ -132,12 +134,16 @@ READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
 
 def read_run(path: Path) -> dict[str, Any] | None:
     """The facts of a run; None if there is no such file. Raises UsageError for other content."""
-    if path.is_fifo():  # it would be waited for
-        return None
+    return _facts(path) if path.is_file() or path.is_dir() else None
+
+
+def _facts(path: Path) -> dict[str, Any]:
     try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
+        with opened(path) as stream:
+            content = stream.read(MOST_FACTS + 1)
+        if len(content) > MOST_FACTS:
+            raise UsageError(f"cannot read {path}: larger than {MOST_FACTS >> 20} MiB")
+        facts = json.loads(content.decode())
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
@@ -157,9 +163,9 @@ def _is_shallow(value: Any, levels: int = 8) -> bool:
 
 def read_record(path: Path) -> dict[str, Any]:
     """A benchmark that was recorded. Raises UsageError for other content."""
-    facts = read_run(path)
-    rows = None if facts is None else facts.get("rows")
-    if facts is None or not isinstance(rows, list) or not all(map(_is_measured, rows)):
+    facts = _facts(path)
+    rows = facts.get("rows")
+    if not isinstance(rows, list) or not all(map(_is_measured, rows)):
         raise UsageError(f"{path} is no record of dpg bench --json")
     return facts
 

@@ -51,7 +51,7 @@ def _place(stream: BinaryIO) -> int | None:
     """Where the digits stand."""
     size = stream.seek(0, os.SEEK_END)
     start = stream.seek(max(size - TAIL, 0))
-    found = stream.read().rfind(HEAD)
+    found = stream.read(TAIL).rfind(HEAD)
     return None if found < 0 else start + found + len(HEAD)
 
 
@@ -62,6 +62,5 @@ def _sha256(stream: BinaryIO, place: int) -> bytes:
     while block := stream.read(min(BLOCK, place - stream.tell())):
         digest.update(block)
     stream.seek(place + len(UNSEALED))
-    while block := stream.read(BLOCK):
-        digest.update(block)
+    digest.update(stream.read(TAIL))
     return digest.hexdigest().encode()

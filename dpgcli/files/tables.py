@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dpgcli import __version__
+from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.files.spec import spelled
@@ -112,10 +113,13 @@ def _layout(described: Any) -> dict[str, Any]:
 def read_metadata(path: Path) -> dict[str, str]:
     """The metadata of a table; empty if there is none to read."""
     try:
-        found = pq.read_metadata(path).metadata or {}
-    except (OSError, pa.ArrowInvalid):
+        with opened(path) as stream:  # pyarrow takes no name that is not text
+            found = pq.read_metadata(stream).metadata or {}
+    except (OSError, pa.ArrowException):
         return {}
-    return {key.decode(): value.decode() for key, value in found.items()}
+    return {
+        key.decode(errors="replace"): text.decode(errors="replace") for key, text in found.items()
+    }
 
 
 def versions() -> str:

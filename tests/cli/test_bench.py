@@ -139,7 +139,7 @@ def test_data_that_cannot_be_used(call: Any, folder: Path, content: str, said: s
         (("--plot", "none/b.svg"), "cannot write none/b.svg"),
         (("--against", "none.csv"), "none.csv: file: expected a readable file"),
         (("--compare", "three_unit.yaml"), "not JSON"),
-        (("--compare", "none.json"), "no record of dpg bench --json"),
+        (("--compare", "none.json"), "cannot read none.json: No such file"),
         (("--repeats", "0"), "--repeats"),
         (("-s", "finger.law=push_only"), "the published law only, not the push-only law"),
     ],

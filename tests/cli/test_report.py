@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.files.tables import read_metadata
 
 Call = Callable[..., Any]
 SWEEP = """
@@ -17,6 +18,7 @@ space:
   - {key: finger.geometry.dome_height_mm, values: [2.5, 4.5, 6.5]}
   - {key: finger.geometry.unit_separation_mm, values: [2.0, 3.0]}
 """
+AGAIN = ("sweep", "sweep.yaml", "-o", "out", "-j", "1")
 
 
 @pytest.fixture
@@ -25,8 +27,15 @@ def swept(call: Call, folder: Path) -> Path:
     (folder / "sweep.yaml").write_text(SWEEP, encoding="utf-8")
     result = call("sweep", "sweep.yaml", "-o", "out", "-j", "1")
     assert result.exit_code == 0, result.stderr
-    (folder / "out" / "run.json").write_text('{"seconds": 2.5}', encoding="utf-8")
+    keep_facts(folder / "out", seconds=2.5)
     return folder / "out"
+
+
+def keep_facts(out: Path, **facts: Any) -> None:
+    """Facts of the run that made the tables in a folder, unless they say otherwise."""
+    made = read_metadata(out / "designs.parquet")["dpg.fingerprint"]
+    said = {"written_by": "dpg 0", "fingerprint": made, **facts}
+    (out / "run.json").write_text(json.dumps(said), encoding="utf-8")
 
 
 def test_markdown_goes_to_standard_output(call: Call, swept: Path) -> None:
@@ -60,6 +69,66 @@ def test_a_run_without_facts_has_a_report(call: Call, swept: Path) -> None:
     result = call("report", "out")
     assert result.exit_code == 0
     assert "The run" not in result.stdout
+
+
+@pytest.mark.parametrize("other", ["0" * 64, None, 1, ["0"]])
+def test_facts_of_another_run_are_left_out(call: Call, swept: Path, other: Any) -> None:
+    keep_facts(swept, fingerprint=other, seconds=2.5)
+    result = call("report", "out")
+    assert (result.exit_code, "The run" in result.stdout) == (0, False)
+    assert result.stderr == "out/run.json is not of the run that made these tables: left out\n"
+
+
+def test_a_table_of_unknown_metadata_has_a_report(call: Call, swept: Path) -> None:
+    table = pq.read_table(swept / "designs.parquet")
+    pq.write_table(table.replace_schema_metadata({b"\xff": b"\xff"}), swept / "designs.parquet")
+    result = call("report", "out")
+    assert (result.exit_code, "The run" in result.stdout) == (0, False)
+
+
+def change(folder: Path) -> None:
+    text = (folder / "sweep.yaml").read_text(encoding="utf-8")
+    (folder / "sweep.yaml").write_text(text.replace("2.5", "2.25"), encoding="utf-8")
+
+
+def test_the_report_of_former_tables_is_made_anew(
+    call: Call, swept: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after a kill between the tables and the report; once, since Make looks at its age."""
+    change(folder)
+    with monkeypatch.context() as patch:
+        patch.setattr("dpgcli.cli.sweep.summarize", stop)
+        assert call(*AGAIN).exit_code != 0
+    assert "2.5 … 6.5 mm" in (swept / "report.md").read_text(encoding="utf-8")
+    assert call(*AGAIN).stderr == "out: up to date\n"
+    assert (swept / "report.md").read_text(encoding="utf-8") == call("report", "out").stdout
+    assert "2.25 … 6.5 mm" in call("report", "out").stdout
+    made = (swept / "report.md").stat()
+    assert call(*AGAIN).exit_code == 0
+    assert (swept / "report.md").stat() == made
+
+
+def test_a_report_of_somebody_else_beside_finished_tables_stays(call: Call, swept: Path) -> None:
+    (swept / "report.md").write_text("# Notes\n", encoding="utf-8")
+    assert call(*AGAIN).exit_code == 0
+    assert (swept / "report.md").read_text(encoding="utf-8") == "# Notes\n"
+
+
+def test_facts_are_not_those_of_the_tables_before(
+    call: Call, swept: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after a kill between the facts of a run and its tables."""
+    change(folder)
+    monkeypatch.setattr("dpgcli.studies.sweep.assemble", stop)
+    assert call(*AGAIN).exit_code != 0
+    assert json.loads((swept / "run.json").read_text(encoding="utf-8"))["designs"] == 6
+    result = call("report", "out")
+    assert (result.exit_code, "The run" in result.stdout) == (0, False)
+    assert "2.5 … 6.5 mm" in result.stdout
+
+
+def stop(*_: Any, **__: Any) -> None:
+    raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("content", ["", "[1]", "{", json.dumps("x")])

@@ -13,7 +13,7 @@ import pytest
 from dpgcli.errors import UsageError
 from dpgcli.files import tables
 from dpgcli.files.reading import read_designs, read_undamaged
-from dpgcli.files.seal import KEY, UNSEALED, is_whole
+from dpgcli.files.seal import HEAD, KEY, UNSEALED, is_whole, is_whole_in
 from dpgcli.files.tables import record_batch, schema, write_table
 from dpgcli.states.columns import Column, Group, Kind
 
@@ -157,3 +157,30 @@ def test_the_content_hash_of_flags_is_that_of_their_rows(
         hashes.add((tmp_path / "t").read_bytes())
     assert len(hashes) == 1
     assert pa.types.is_boolean(pq.read_schema(tmp_path / "t").field("fingers_overlap").type)
+
+
+class Endless:
+    """What a seal seems to stand in, and no end."""
+
+    def __init__(self) -> None:
+        self.begin = HEAD + b"0" * len(UNSEALED)
+        self.at = 0
+
+    def seek(self, place: int, _: int = 0) -> int:
+        self.at = place
+        return place
+
+    def tell(self) -> int:
+        return self.at
+
+    def read(self, size: int = -1) -> bytes:
+        assert 0 <= size < 2**22
+        assert self.at < 2**24
+        self.at += size
+        return self.begin[self.at - size : self.at].ljust(size, b"x")
+
+
+def test_a_seal_is_not_looked_for_without_end() -> None:
+    stream: Any = Endless()
+    assert is_whole_in(stream) is False
+    assert stream.at > 0

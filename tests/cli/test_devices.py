@@ -1,0 +1,135 @@
+"""Devices and pipes in the place of files: refused by name, not read without end."""
+
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+from dpgcli.errors import UsageError
+from dpgcli.files import reading
+from dpgcli.files.parts import SAID, PartStore
+from dpgcli.files.reading import read_record, read_run, read_undamaged
+from dpgcli.files.tables import read_metadata
+
+Call = Callable[..., Any]
+SWEEP = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\n"
+RUN = ("sweep", "sweep.yaml", "--executor", "serial", "-q", "-o", "out")
+REQUIRE = ("--require", "n_stable > 0")
+SPECIAL = "is a device or pipe, not a file"
+LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_AS, (2**33, 2**33))"
+
+
+@pytest.fixture
+def out(call: Call, folder: Path) -> Path:
+    """The folder of a finished sweep."""
+    (folder / "sweep.yaml").write_text(SWEEP)
+    assert call(*RUN).exit_code == ExitCode.DONE
+    return folder / "out"
+
+
+def put(path: Path, kind: str) -> Path:
+    """A pipe without a writer, or a device without an end."""
+    path.unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero")
+    return path
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        (("check", "t.parquet", *REQUIRE), "t.parquet"),
+        (("report", "out"), "out/designs.parquet"),
+        (("bench", "three_unit.yaml", "--compare", "b.json"), "b.json"),
+        (("merge", "out", "-o", "all"), f"out/.parts/{'0' * 16}/{SAID}"),
+        ((*RUN[:-1], "new"), f"new/.parts/{'0' * 16}/{SAID}"),
+    ],
+)
+def test_it_is_refused_by_its_name(
+    run: Any, out: Path, folder: Path, command: tuple[str, ...], name: str, kind: str
+) -> None:
+    assert out.exists()
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    put(folder / name, kind)
+    result = run(*command, before=LIMITED, timeout=30)
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr == f"dpg: cannot read {name}: {SPECIAL}\n"
+
+
+def test_a_summary_is_not_appended_to_a_pipe(run: Any, out: Path, folder: Path) -> None:
+    put(folder / "s.md", "pipe")
+    for command in (("check", str(out / "designs.parquet"), *REQUIRE), RUN):
+        result = run(*command, "--summary-file", "s.md", timeout=30)
+        assert (result.returncode, result.stdout) == (ExitCode.USAGE, "")
+        assert result.stderr == f"dpg: cannot write s.md: {SPECIAL}\n"
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_facts_that_are_no_file_are_not_read(run: Any, out: Path, kind: str) -> None:
+    put(out / "run.json", kind)
+    for command in (("report", "out"), RUN):
+        result = run(*command, before=LIMITED, timeout=30)
+        assert (result.returncode, result.stderr) == (ExitCode.DONE, "")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_report_that_is_no_file_stays(run: Any, out: Path, kind: str) -> None:
+    path = put(out / "report.md", kind)
+    assert run(*RUN, before=LIMITED, timeout=30).returncode == ExitCode.DONE
+    assert not path.is_file()
+
+
+def test_a_part_that_is_no_file_is_damaged(run: Any, call: Call, out: Path, folder: Path) -> None:
+    assert out.exists()
+    assert call(*RUN[:-1], "s", "--shard", "1/1").exit_code == ExitCode.DONE
+    (part,) = (folder / "s").rglob("*.part")
+    put(part, "pipe")
+    result = run("merge", "s", "-o", "all", timeout=30)
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr == f"dpg: {part.relative_to(folder)} is damaged: run its sweep again\n"
+
+
+def test_a_substituted_process_is_named_a_pipe(out: Path, run: Any) -> None:
+    """As by `dpg check <(cat designs.parquet)`."""
+    with subprocess.Popen(["cat", out / "designs.parquet"], stdout=subprocess.PIPE) as cat:
+        assert cat.stdout is not None
+        name = f"/dev/fd/{cat.stdout.fileno()}"
+        result = run("check", name, *REQUIRE, pass_fds=(cat.stdout.fileno(),))
+    assert result.returncode == ExitCode.USAGE
+    assert result.stderr == f"dpg: cannot read {name}: {SPECIAL}\n"
+
+
+@pytest.mark.parametrize("reader", [read_undamaged, read_record, read_run, read_metadata])
+def test_a_folder_is_no_file_either(tmp_path: Path, reader: Callable[[Path], Any]) -> None:
+    if reader is read_metadata:
+        assert reader(tmp_path) == {}
+        return
+    with pytest.raises(UsageError, match="directory"):
+        reader(tmp_path)
+
+
+@pytest.mark.parametrize("reader", [read_record, read_run])
+def test_facts_have_a_bound(
+    tmp_path: Path, reader: Callable[[Path], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.json"
+    path.write_text('{"rows": []}')
+    monkeypatch.setattr(reading, "MOST_FACTS", 12)
+    assert reader(path) == {"rows": []}
+    monkeypatch.setattr(reading, "MOST_FACTS", 11)
+    with pytest.raises(UsageError, match="larger than"):
+        reader(path)
+
+
+def test_what_a_sweep_is_about_cannot_be_a_folder(tmp_path: Path) -> None:
+    assert PartStore(tmp_path).said() == {}
+    (tmp_path / SAID).mkdir()
+    with pytest.raises(UsageError, match=f"cannot read .*{SAID}: Is a directory"):
+        PartStore(tmp_path).said()
