@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 KINDS = (".md", ".html")
+AT_END = "<!-- written by dpg -->"
 
 
 def report(
@@ -43,18 +44,19 @@ def summarize(folder: Path, *, is_new: bool) -> "tuple[pd.DataFrame, str]":
 
 
 def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
-    """The designs in a folder, and their report with the mark by which `dpg` knows it."""
-    from dpgcli.files.output import Mark
+    """The designs in a folder, and their report."""
     from dpgcli.files.reading import read_designs, read_run
     from dpgcli.report.page import html, markdown
 
     designs, units = read_designs(folder / "designs.parquet")
     text = (markdown if kind == ".md" else html)(designs, units, read_run(folder / "run.json"))
-    return designs, f"{text}\n{Mark.REPORT.value.decode()}\n"
+    return designs, text
 
 
 def _write(path: Path, text: str) -> None:
+    """A report in a file has at its end the mark by which `dpg` knows it."""
     from dpgcli.files.output import Mark, whole_file
 
+    content = f"{text}\n{AT_END}\n".encode(errors="backslashreplace")
     with whole_file(path, Mark.REPORT) as temporary:
-        temporary.write_bytes(text.encode(errors="backslashreplace"))
+        temporary.write_bytes(content)
