@@ -7,6 +7,7 @@ orphan. On a file system without locks orphans stay.
 import fcntl
 import os
 import shutil
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count, islice
@@ -18,6 +19,7 @@ AT_ONCE = 16  # of one name that orphans are looked for among
 @contextmanager
 def temporary_file(path: Path) -> Iterator[tuple[Path, int]]:
     """An empty file beside `path`, and its handle; gone at the end unless it was renamed."""
+    drop_orphans(path)
     name, handle = _made(path, lambda new: os.open(new, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
     try:
         yield name, handle
@@ -31,6 +33,7 @@ def temporary_file(path: Path) -> Iterator[tuple[Path, int]]:
 @contextmanager
 def temporary_folder(path: Path) -> Iterator[Path]:
     """An empty folder beside `path` for this process alone; gone at the end."""
+    _drop_unheld(path, stat.S_ISDIR, shutil.rmtree)
     name, handle = _made(path, _new_folder)
     try:
         yield name
@@ -40,21 +43,27 @@ def temporary_folder(path: Path) -> Iterator[Path]:
 
 
 def drop_orphans(path: Path) -> None:
-    """Remove temporary files and folders for `path` that killed processes have left."""
+    """Remove temporary files for `path` that killed processes have left."""
+    _drop_unheld(path, stat.S_ISREG, os.unlink)
+
+
+def _drop_unheld(
+    path: Path, is_kind: Callable[[int], bool], remove: Callable[[Path], None]
+) -> None:
+    """Only of the kind that is made for `path`: another one is somebody's."""
     for name in islice(_names(path), AT_ONCE):
         with suppress(OSError):
             handle = os.open(name, os.O_RDONLY | os.O_NONBLOCK)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if _stands(name, handle):
-                    shutil.rmtree(name) if name.is_dir() else name.unlink()
+                if is_kind(os.fstat(handle).st_mode) and _stands(name, handle):
+                    remove(name)
             finally:
                 os.close(handle)
 
 
 def _made(path: Path, new: Callable[[Path], int]) -> tuple[Path, int]:
     """A new one under the first name that is free, and the handle that holds its lock."""
-    drop_orphans(path)
     for name in _names(path):
         with suppress(FileExistsError):
             handle = new(name)

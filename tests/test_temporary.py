@@ -30,11 +30,19 @@ def test_orphans_go_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / ".t.parquet.dpg1.tmp").mkdir()
     (tmp_path / ".t.parquet.dpg1.tmp" / "inside").write_text("half")
     (tmp_path / ".t.parquet.dpg2.tmp").symlink_to(tmp_path / "kept")
-    left = [".t.parquet.dpg2.tmp", ".t.parquet.mine.tmp", ".u.parquet.dpg0.tmp", "kept"]
+    left = [f".t.parquet.dpg{number}.tmp" for number in (1, 2)]
+    left += [".t.parquet.mine.tmp", ".u.parquet.dpg0.tmp", "kept"]
     with temporary_file(path) as (name, handle):
         assert name.name == ".t.parquet.dpg0.tmp"
         assert os.fstat(handle).st_size == 0
     assert names(tmp_path) == left
+    assert names(tmp_path / ".t.parquet.dpg1.tmp") == ["inside"], "nobody makes folders for it"
+    (tmp_path / ".t.parquet.dpg0.tmp").write_text("somebody's")
+    with temporary_folder(path) as folder:
+        assert folder.name == ".t.parquet.dpg1.tmp"
+        assert names(folder) == []
+    left.remove(".t.parquet.dpg1.tmp")
+    assert names(tmp_path) == [".t.parquet.dpg0.tmp", *left]
 
 
 @pytest.mark.parametrize("kind", [temporary_file, temporary_folder])

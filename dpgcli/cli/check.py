@@ -44,11 +44,17 @@ def check(
         check_appendable(summary_file, (table,))
     columns = number_columns(designs)
     verdicts = check_requirements(designs, [requirement(text, columns) for text in require])
-    if summary_file is not None:
-        append_summary(summary_file, verdicts_markdown(verdicts))
     print_verdicts(verdicts, listed_as)
+    is_written = summary_file is None or append_summary(summary_file, verdicts_markdown(verdicts))
+    if code := code_of(verdicts, is_written=is_written):
+        raise typer.Exit(code)
+
+
+def code_of(verdicts: Sequence["Verdict"], *, is_written: bool) -> ExitCode:
+    """How a command ends that held requirements: what they say comes before its summary."""
     if not all(verdict.is_met for verdict in verdicts):
-        raise typer.Exit(ExitCode.REQUIREMENT)
+        return ExitCode.REQUIREMENT
+    return ExitCode.DONE if is_written else ExitCode.USAGE
 
 
 def print_verdicts(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
@@ -56,10 +62,11 @@ def print_verdicts(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> N
     _PRINTERS[listed_as](verdicts)
 
 
-def append_summary(path: Path, text: str) -> None:
-    """Append Markdown, such as to $GITHUB_STEP_SUMMARY; a note where it would get too large."""
-    from dpgcli.errors import OutputError
+def append_summary(path: Path, text: str) -> bool:
+    """Append Markdown, such as to $GITHUB_STEP_SUMMARY; a note where it would get too large.
 
+    False, and a word why, where it cannot be written: the work is done, and its outcome counts.
+    """
     content = text.encode(errors="backslashreplace")
     try:
         with path.open("ab") as stream:
@@ -72,7 +79,9 @@ def append_summary(path: Path, text: str) -> None:
             if len(content) <= room:
                 stream.write(gap + content)
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}") from error
+        say(f"dpg: cannot write {path}: {error.strerror}")
+        return False
+    return True
 
 
 def _print_text(verdicts: Sequence["Verdict"]) -> None:

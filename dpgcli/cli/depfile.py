@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 # homes, libraries, special targets, grouped targets, members of archives), patterns of both kinds.
 UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f=;|\\]|^~|^-l|^\.[A-Z_]+$|[ &]$|\(.*\)$|%.*[*?[]|[*?[].*%")
 SPECIAL = re.compile(r"([ #:*?[])")
+HEAD = "# dpg sweep: what its tables are made from"
 
 
 def write_depfile(path: Path, study: "Study") -> None:
@@ -26,7 +27,7 @@ def write_depfile(path: Path, study: "Study") -> None:
     check_not_read(study.sweep.files, (path,))
     targets = " ".join(_target(study.folder / name) for name in (STATES, DESIGNS))
     sources = [source for source in study.sweep.files if source != Path("-")]
-    text = f"{targets}: {' '.join(map(_spelled, sources))}\n"
+    text = f"{HEAD}\n{targets}: {' '.join(map(_spelled, sources))}\n"
     text += "".join(f"\n{_target(source)}:\n" for source in sources)
     study.folder.mkdir(parents=True, exist_ok=True)
     with whole_file(path, Mark.DEPFILE) as temporary:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 KINDS = (".md", ".html")
+AT_END = "<!-- written by dpg -->"
 
 
 def report(
@@ -58,14 +59,13 @@ def _is_outdated(path: Path, text: str) -> bool:
 
 
 def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
-    """The designs in a folder, and their report with the mark by which `dpg` knows it."""
-    from dpgcli.files.output import Mark
+    """The designs in a folder, and their report."""
     from dpgcli.files.reading import read_designs
     from dpgcli.report.page import html, markdown
 
     designs, units = read_designs(folder / "designs.parquet")
     text = (markdown if kind == ".md" else html)(designs, units, _facts(folder))
-    return designs, f"{text}\n{Mark.REPORT.value.decode()}\n"
+    return designs, text
 
 
 def _facts(folder: Path) -> dict[str, Any] | None:
@@ -83,6 +83,7 @@ def _facts(folder: Path) -> dict[str, Any] | None:
 
 
 def _write(path: Path, text: str) -> None:
+    """A report in a file has at its end the mark by which `dpg` knows it."""
     from dpgcli.files.output import Mark, whole_file
 
     with whole_file(path, Mark.REPORT) as temporary:
@@ -90,4 +91,4 @@ def _write(path: Path, text: str) -> None:
 
 
 def _bytes(text: str) -> bytes:
-    return text.encode(errors="backslashreplace")
+    return f"{text}\n{AT_END}\n".encode(errors="backslashreplace")

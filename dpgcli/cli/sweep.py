@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.check import append_summary, print_verdicts
+from dpgcli.cli.check import append_summary, code_of, print_verdicts
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.cli.exits import ExitCode, Terminated
 from dpgcli.cli.options import (
@@ -135,12 +135,12 @@ def sweep(
             if not quiet:
                 say(f"{output}: up to date")
         if part is None:
-            n_failed, is_met = _judge(study, rules, summary_file, is_new, quiet)
+            n_failed, code = _judge(study, rules, summary_file, is_new, quiet)
         else:
-            n_failed, is_met = study.n_failed, True
+            n_failed, code = study.n_failed, ExitCode.DONE
     check_failed(n_failed, max_failed)
-    if not is_met:
-        raise typer.Exit(ExitCode.REQUIREMENT)
+    if code:
+        raise typer.Exit(code)
 
 
 def _start_fork_server_early() -> None:
@@ -252,8 +252,8 @@ def _conclude(
 
 def _judge(
     study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
-) -> tuple[int, bool]:
-    """Report; how many designs failed, and whether all requirements are met."""
+) -> tuple[int, ExitCode]:
+    """Report; how many designs failed, and how the command ends if they may."""
     from dpgcli.report.page import verdicts_markdown
     from dpgcli.report.requirements import check_requirements
 
@@ -263,11 +263,10 @@ def _judge(
         if study.target_error is not None:
             say(_chosen(designs))
     verdicts: Sequence[Verdict] = check_requirements(designs, rules) if rules else ()
-    if summary_file is not None:
-        append_summary(summary_file, text + ("\n" + verdicts_markdown(verdicts) if rules else ""))
     print_verdicts(verdicts, ProblemFormat.TEXT)
-    is_met = all(verdict.is_met for verdict in verdicts)
-    return int((designs["status"] == "failed").sum()), is_met
+    summary = text + ("\n" + verdicts_markdown(verdicts) if rules else "")
+    is_written = summary_file is None or append_summary(summary_file, summary)
+    return int((designs["status"] == "failed").sum()), code_of(verdicts, is_written=is_written)
 
 
 def _chosen(designs: "pd.DataFrame") -> str:

@@ -1,5 +1,6 @@
 """Content of files as it is read: bounded, from names without control characters, UTF-8."""
 
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from dpgcli.files.places import Place, located
 from dpgcli.text import control_character
 
 MAX_BYTES = 256 * 1024  # of what people write
+TOP_LEVEL = rb"""(?:^(?:\xef\xbb\xbf)?|\A\s*\{(?s:.*\W))["']?%s["']?\s*:(?:\s|$)"""
 
 
 def content_of(path: Path, place: Place, most: int | None = None, hint: str = "") -> bytes:
@@ -46,8 +48,8 @@ def opened(path: Path) -> BinaryIO:
 
 
 @contextmanager
-def quoted_if(path: Path, word: bytes, expected: str) -> Iterator[None]:
-    """Keep problems in what a file says to files that have a word in them.
+def quoted_if(path: Path, key: str, expected: str) -> Iterator[None]:
+    """Keep problems in what a file says to files that have a key at their top level.
 
     Whoever names a file in another one need not be allowed to read it: of what is no file of
     the kind nothing is shown.
@@ -57,7 +59,7 @@ def quoted_if(path: Path, word: bytes, expected: str) -> Iterator[None]:
     except SpecError:
         place = Place(str(path))
         content = content_of(path, place, MAX_BYTES)
-        if word in content or not content:
+        if re.search(TOP_LEVEL % key.encode(), content, re.MULTILINE) or not content:
             raise
         raise SpecError((located(place, "file", expected, "something else"),)) from None
 

@@ -4,6 +4,7 @@ import fcntl
 import os
 import re
 import stat
+from codecs import getincrementaldecoder
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -14,23 +15,28 @@ from dpgcli.temporary import temporary_file
 from dpgcli.text import control_character
 
 ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
+NO_TEXT = (".parquet", ".csv", ".yaml", ".yml", ".json", ".html", ".svg", ".png", ".pdf")
 
 
 class Mark(Enum):
-    """What every file of a kind has among its first or last bytes, by which it is known."""
+    """How every file of a kind begins, or what stands at its end, by which it is known.
+
+    The same words elsewhere are those of somebody who quotes them.
+    """
 
     NONE = rb"(?!)"  # nothing that is there is replaced
     ANY = rb""  # whatever is there is replaced
-    TABLE = rb"dpg\.(content|file)_sha256"
-    FACTS = rb'"written_by": "dpg '
-    REPORT = rb"<!-- written by dpg -->"
-    FIGURE = rb"drawn by dpg"
-    CALIBRATION = rb"^made_by: dpg "
-    DEPFILE = rb"\A[^\n]*states\.parquet [^\n]*designs\.parquet:"
+    TABLE = rb"\APAR1(?s:.*)dpg\.(content|file)_sha256\x18@"
+    FACTS = rb'\A\{\s*"written_by": "dpg '
+    REPORT = rb"^<!-- written by dpg -->\n?\Z"
+    FIGURE = rb"\A<\?xml (?s:.){,999}<dc:title>drawn by dpg<|\A\x89PNG(?s:.){,99}\x00drawn by dpg"
+    CALIBRATION = rb"\Acalibration_version: .*\nmade_by: dpg "
+    DEPFILE = rb"\A# dpg sweep: "
     DECK = rb"\A\*\* dpg fe "
     CURVE = rb"\A# dpg fe "
-    LOG = rb"\A# dpg fe, "
-    DISPLACEMENTS = rb"^ *displacements \(vx,vy,vz\) for set "
+    LOG = rb"\A# dpg fe, .*: words of "
+    DISPLACEMENTS = rb"\A# dpg fe, .*: printed by "
+    PARTS = rb'\A\{\s*"dpg\.'
 
 
 Output = tuple[Path | None, Mark]
@@ -62,9 +68,16 @@ def is_own(path: Path, mark: Mark) -> bool:
     """Whether a file has the mark, or nothing in it that could be lost."""
     with path.open("rb") as stream:
         head = stream.read(ENDS)
-        stream.seek(-min(ENDS, stream.seek(0, os.SEEK_END)), os.SEEK_END)
-        pattern = re.compile(mark.value, re.MULTILINE)
-        return not head or any(map(pattern.search, (head, stream.read())))
+        stream.seek(max(len(head), stream.seek(0, os.SEEK_END) - ENDS))
+        ends = head + stream.read()  # what is left out between them is in no mark
+        return not head or re.search(mark.value, ends, re.MULTILINE) is not None
+
+
+def marks_of(path: Path) -> list[Mark]:
+    """What a file is, if it is of this program."""
+    if not path.stat().st_size:
+        return []
+    return [mark for mark in Mark if mark is not Mark.ANY and is_own(path, mark)]
 
 
 def check_outputs(sources: Iterable[Path], *outputs: Output) -> None:
@@ -112,17 +125,38 @@ def check_table_name(path: Path | None) -> None:
 def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     """Fail before the work rather than after it.
 
-    Raises OutputError for what cannot be written, UsageError for one of the files that are read.
+    Raises OutputError for what cannot be written, or is no text to append Markdown to;
+    UsageError for one of the files that are read.
     """
     check_not_read(sources, (path,))
     if control := control_character(str(path)):
         raise OutputError(f"cannot write {path}: {control} in it")
+    if path.suffix.lower() in NO_TEXT:
+        hint = "give a name such as summary.md"
+        raise OutputError(f"cannot append to {path}: Markdown is no {path.suffix} file; {hint}")
     try:
         if path.is_fifo():  # it would be waited for
             raise OSError(None, "is a device or pipe, not a file")
+        if path.is_file():
+            _check_text(path)
         path.open("ab").close()
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _check_text(path: Path) -> None:
+    """Raise OutputError for a file that Markdown would destroy."""
+    if marks_of(path):
+        raise OutputError(f"cannot append to {path}: dpg made it, and would not know it any more")
+    decoder = getincrementaldecoder("utf-8")()
+    with path.open("rb") as stream:
+        try:
+            while block := stream.read(ENDS):
+                if "\0" in decoder.decode(block):
+                    raise OutputError(f"cannot append to {path}: it is no text")
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            raise OutputError(f"cannot append to {path}: it is no text in UTF-8") from None
 
 
 def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:

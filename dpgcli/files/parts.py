@@ -21,7 +21,7 @@ import pyarrow as pa
 
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
-from dpgcli.files.output import Mark, whole_file
+from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.tables import record_batch, schema
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import Columns
@@ -120,8 +120,18 @@ class PartStore:
         except OSError as error:
             raise OutputError(f"cannot write {place}: {error.strerror or error}") from error
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it is in the folder itself, and nobody else's description is in it."""
+        said = self.folder / SAID
+        is_linked = self.folder.is_symlink() or self.folder.parent.is_symlink()
+        return not is_linked and (not os.path.lexists(said) or _is_description(said))
+
     def say(self, said: dict[str, str]) -> None:
-        """Keep what the sweep is about beside its parts."""
+        """Keep what the sweep is about beside its parts; in no folder that is linked from here."""
+        for folder in (self.folder.parent, self.folder):
+            if folder.is_symlink():
+                raise OutputError(f"cannot write {folder}: a link, and what it leads to may go")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -183,6 +193,11 @@ class PartStore:
             if here < stop:
                 gaps.append((here, stop))
         return gaps
+
+
+def _is_description(path: Path) -> bool:
+    """Whether a file is the description of a sweep, damaged or not."""
+    return path.is_file() and not path.is_symlink() and is_own(path, Mark.PARTS)
 
 
 def _digest(path: Path) -> str:

@@ -19,7 +19,7 @@ from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import LARGEST
 
 MAX_BYTES = 64 * 1024 * 1024
-COMMENT = re.compile(r"#+\s|#[-+.]?[0-9]|#$")
+COMMENT = re.compile(r"#+\s|#$")
 TO_COMMENT = "behind the # of a comment stands a space"
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
@@ -84,7 +84,8 @@ class Sheet:
 def read_sheet(path: Path) -> Sheet:
     """Read a CSV file with a header; lines that start with # are comments.
 
-    Below the header a comment has a space or a number behind the #: spreadsheets write #DIV/0!.
+    Below the header a comment has a space behind the #: spreadsheets write #DIV/0!, and of a row
+    such as #5,0.2 nobody knows whether it is meant.
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
     file = str(path)

@@ -9,7 +9,7 @@ from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.places import shortened
 
 LONGEST_TITLE = 100
-AUTHOR = Mark.FIGURE.value.decode()
+AUTHOR = "drawn by dpg"
 
 
 @contextmanager

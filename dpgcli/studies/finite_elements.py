@@ -131,9 +131,7 @@ def solve(deck: Path, limits: Limits) -> Output:
         if code != 0 or not printed.exists():
             raise SolverError(_failure(code, said, log))
         text = printed.read_text(encoding="utf-8", errors="replace")
-        if is_own(printed, Mark.DISPLACEMENTS):
-            with whole_file(results, Mark.DISPLACEMENTS) as temporary:
-                shutil.copyfile(printed, temporary)
+        _write(results, f"# dpg fe, {deck.name}: printed by {SOLVER}\n{text}")
     return Output(text, said)
 
 

@@ -195,9 +195,9 @@ class Study:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
         check_workers(workplace)
+        store.say(self.metadata)
         for damaged in store.damaged():
             damaged.path.unlink()
-        store.say(self.metadata)
         ranges = self.ranges(shard or Shard())
         missing = store.missing(ranges)
         n_designs = sum(stop - start for start, stop in ranges)
@@ -289,8 +289,9 @@ def stores(folder: Path) -> list[PartStore]:
 
 
 def _stores(folder: Path) -> list[PartStore]:
-    """Folders whose names are beginnings of fingerprints."""
-    return [PartStore(path) for path in sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/"))]
+    """Folders whose names are beginnings of fingerprints, and that nobody else uses."""
+    found = map(PartStore, sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/")))
+    return [store for store in found if store.is_own]
 
 
 def _existing(folder: Path) -> Path:

@@ -251,3 +251,30 @@ def test_a_summary_that_cannot_be_written_is_2(call: Call, table: str) -> None:
     )
     assert result.exit_code == ExitCode.USAGE
     assert "cannot write missing/summary.md" in result.stderr
+
+
+@pytest.mark.parametrize(("limit", "code"), [("2", 1), ("5", 2)])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_under_the_summary_hides_no_verdict(
+    call: Call, folder: Path, table: str, limit: str, code: int
+) -> None:
+    pq.write_table(pq.read_table(folder / table).slice(0, 5), folder / "few.parquet")
+    rule = ("check", "few.parquet", "--require", f"area_mm2 < {limit}")
+    result = call(*rule, "--summary-file", "/dev/full")
+    assert result.exit_code == code
+    assert result.stdout == call(*rule).stdout != ""
+    assert "dpg: cannot write /dev/full: No space left on device" in result.stderr
+
+
+@pytest.mark.parametrize(("limit", "code"), [("9", 1), ("2", 2)])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_under_the_summary_of_a_sweep(
+    call: Call, folder: Path, limit: str, code: int
+) -> None:
+    text = "base: three_unit.yaml\nspace: [{key: finger.units, values: [3]}]\n"
+    (folder / "sweep.yaml").write_text(text, encoding="utf-8")
+    run = ("sweep", "sweep.yaml", "-q", "-o", "out", "--executor", "serial")
+    result = call(*run, "--require", f"n_units > {limit}", "--summary-file", "/dev/full")
+    assert result.exit_code == code
+    assert f"met: n_units > {limit}" in result.stdout
+    assert "dpg: cannot write /dev/full: No space left on device" in result.stderr

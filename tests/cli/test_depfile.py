@@ -70,7 +70,8 @@ def depend(folder: str, *files: str) -> None:
 
 def make() -> str:
     """What Make does about the first target of the depfile."""
-    targets = Path("sweep.d").read_bytes().split(b".parquet", 1)[0] + b".parquet"
+    rules = Path("sweep.d").read_bytes().split(b"\n", 1)[1]
+    targets = rules.split(b".parquet", 1)[0] + b".parquet"
     rule = b"all: " + targets.replace(rb"\%", b"%") + b"\n\n" + targets + b":\n\t@echo again\n\n"
     Path("Makefile").write_bytes(rule + b"include sweep.d\n")
     done = subprocess.run(

@@ -250,6 +250,24 @@ def test_results_of_a_run_keep_their_modes_and_break_links(
     assert "3.01" in (folder / "deck" / "hinge.log").read_text()
 
 
+def test_what_somebody_elses_solver_printed_stays(call: Any, folder: Path, fake: Fake) -> None:
+    """Every run of ccx prints such a file, also one beside our deck."""
+    prepared(folder)
+    theirs = (folder / "prepared.dat").read_bytes()
+    fake('echo "CalculiX Version 2.99"; cp ../../prepared.dat "$1.dat"')
+    assert call(*HINGE).exit_code == ExitCode.DONE
+    (folder / "deck" / "hinge.dat").write_bytes(theirs)
+    for options in (("--moment", "4"), ("--run",)):
+        result = call(*HINGE, *options)
+        assert result.exit_code == ExitCode.USAGE
+        assert "deck/hinge.dat: not of dpg fe" in result.stderr
+        assert (folder / "deck" / "hinge.dat").read_bytes() == theirs
+    (folder / "deck" / "hinge.dat").unlink()
+    assert call(*HINGE, "--run").exit_code == ExitCode.DONE
+    ours = (folder / "deck" / "hinge.dat").read_bytes()
+    assert ours == b"# dpg fe, hinge.inp: printed by ccx\n" + theirs
+
+
 def test_a_measured_curve_beside_the_deck_stays(call: Any, folder: Path) -> None:
     assert call(*HINGE).exit_code == ExitCode.DONE
     (folder / "deck" / "hinge.csv").write_text("rotation_rad,moment_N_mm\n0.1,2.4\n")

@@ -172,6 +172,81 @@ def test_a_link_to_a_file_of_somebody_else_is_not_followed(call: Call, inputs: P
     assert (inputs / "notes.md").read_bytes() == THEIRS
 
 
+def test_notes_that_a_summary_was_appended_to_stay(call: Call, inputs: Path) -> None:
+    (inputs / "notes.md").write_bytes(THEIRS)
+    for _ in range(2):
+        assert call(*RUN, "--summary-file", "notes.md").exit_code == ExitCode.DONE
+    notes = (inputs / "notes.md").read_bytes()
+    assert notes.startswith(THEIRS) and notes.count(b"\n# ") == 2
+    result = call("report", "done", "-o", "notes.md")
+    assert result.exit_code == ExitCode.USAGE
+    assert "notes.md: it is there and not of dpg" in result.stderr
+    assert (inputs / "notes.md").read_bytes() == notes
+
+
+def test_what_report_prints_is_not_taken_for_its_file(call: Call, inputs: Path) -> None:
+    printed = call("report", "done").stdout
+    (inputs / "notes.md").write_text(printed)
+    assert (inputs / "done" / "report.md").read_text() == f"{printed}\n<!-- written by dpg -->\n"
+    assert call("report", "done", "-o", "notes.md").exit_code == ExitCode.USAGE
+    assert (inputs / "notes.md").read_text() == printed
+
+
+@pytest.mark.parametrize("name", ["states.parquet", "run.json", "report.md", "photo.png", "a.yaml"])
+def test_a_summary_is_appended_to_text_only(call: Call, inputs: Path, name: str) -> None:
+    path = inputs / "done" / name
+    if not path.exists():
+        path.write_bytes(THEIRS)
+    before = everything(inputs)
+    designs = "done/designs.parquet"
+    result = call("check", designs, "--require", "n_stable > 0", "--summary-file", f"done/{name}")
+    assert result.exit_code == ExitCode.USAGE
+    assert f"cannot append to done/{name}: " in result.stderr
+    assert call(*RUN, "--summary-file", f"done/{name}").exit_code == ExitCode.USAGE
+    assert everything(inputs) == before
+
+
+def test_a_makefile_is_no_depfile(call: Call, inputs: Path) -> None:
+    rule = b"out/states.parquet out/designs.parquet: sweep.yaml\n\tdpg sweep sweep.yaml -o out\n"
+    (inputs / "Makefile").write_bytes(rule)
+    result = call(*RUN, "--depfile", "Makefile")
+    assert result.exit_code == ExitCode.USAGE
+    assert "cannot write Makefile: it is there and not of dpg" in result.stderr
+    assert (inputs / "Makefile").read_bytes() == rule
+
+
+@pytest.mark.parametrize("flag", [(), ("--restart",)])
+@pytest.mark.parametrize("linked", [".parts", f".parts/{'a' * 16}"])
+def test_links_among_the_parts_are_not_followed(
+    call: Call, inputs: Path, flag: tuple[str, ...], linked: str
+) -> None:
+    theirs = inputs / "elsewhere" / ("b" * 16)
+    PartStore(theirs).say({"dpg.designs": "3"})
+    (theirs / "0000000000-0000000004-0123456789abcdef.part").write_bytes(THEIRS)
+    target = theirs if "/" in linked else theirs.parent
+    (inputs / "out" / linked).parent.mkdir(exist_ok=True)
+    (inputs / "out" / linked).symlink_to(target)
+    before = everything(inputs / "elsewhere")
+    result = call(*RUN, *flag)
+    assert result.exit_code == (ExitCode.DONE if "/" in linked else ExitCode.USAGE)
+    assert ("cannot write out/.parts: a link" in result.stderr) == ("/" not in linked)
+    assert everything(inputs / "elsewhere") == before
+    assert (inputs / "out" / linked).is_symlink()
+
+
+@pytest.mark.parametrize("flag", [(), ("--restart",)])
+def test_a_description_that_is_not_of_dpg_stays(
+    call: Call, inputs: Path, flag: tuple[str, ...]
+) -> None:
+    theirs = inputs / "out" / ".parts" / ("0" * 16)
+    theirs.mkdir(parents=True)
+    (theirs / "sweep.json").write_bytes(THEIRS)
+    (theirs / "0000000000-0000000004-0123456789abcdef.part").write_bytes(THEIRS)
+    before = everything(theirs)
+    assert call(*RUN, *flag).exit_code == ExitCode.DONE
+    assert everything(theirs) == before
+
+
 @pytest.mark.parametrize("flag", [(), ("--restart",)])
 def test_what_stands_among_the_parts_stays(call: Call, inputs: Path, flag: tuple[str, ...]) -> None:
     theirs = ["sweep.json", "mine/sweep.json", "mine/0000000000-0000000004-0123456789abcdef.part"]

@@ -57,7 +57,8 @@ def test_the_kind_of_file_follows_from_its_name(call: Call, swept: Path, folder:
     for name in ("report.md", "report.HTML"):
         result = call("report", "out", "-o", name)
         assert (result.exit_code, result.output) == (0, "")
-    assert (folder / "report.md").read_text(encoding="utf-8") == call("report", "out").stdout
+    written = call("report", "out").stdout + "\n<!-- written by dpg -->\n"
+    assert (folder / "report.md").read_text(encoding="utf-8") == written
     page = (folder / "report.HTML").read_text(encoding="utf-8")
     assert page.startswith("<!DOCTYPE html>")
     assert "<svg" in page

@@ -103,7 +103,9 @@ def test_a_sweep_writes_all_its_files(unread: Unread, folder: Path) -> None:
     written = {path.name for path in (folder / "out").iterdir()}
     assert written == {"states.parquet", "designs.parquet", "run.json", "report.md"}
     summary = (folder / "summary.md").read_text()
-    assert (folder / "out" / "report.md").read_text() in summary
+    report, mark = (folder / "out" / "report.md").read_text().rsplit("\n<!--", 1)
+    assert mark == " written by dpg -->\n"
+    assert report in summary and mark not in summary
     assert "design 1 (dome_height_mm = 6.5): n_units = 3" in summary
     assert (folder / "out.d").is_file()
 

@@ -56,8 +56,16 @@ def test_an_error_of_a_spreadsheet_in_the_first_cell_is_no_comment(path: Path, e
 
 
 def test_comments_below_the_header(path: Path) -> None:
-    path.write_text(f"{GOOD}# 14,60\n#15,60\n#-1,0\n ## a title\n#\n", encoding="utf-8")
+    path.write_text(f"{GOOD}# 14,60\n ## a title\n#\n", encoding="utf-8")
     assert read_curve(path).curve.travel.tolist() == [0.0, 1.0, 13.0]
+
+
+@pytest.mark.parametrize("row", ["#15,60", "#-1,0", "#.5,0", "#+5,0.2"])
+def test_a_row_behind_a_bare_mark_is_not_dropped(path: Path, row: str) -> None:
+    path.write_text(f"{GOOD}{row}\n", encoding="utf-8")
+    with pytest.raises(SpecError) as caught:
+        read_curve(path)
+    assert "behind the # of a comment stands a space" in problems(caught)[0]
 
 
 @pytest.mark.parametrize("mark", ["\x0b", "\x0c", "\x1c", "\x1e", "\x85", "\u2028", "\u2029"])

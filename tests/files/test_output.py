@@ -8,8 +8,10 @@ import pytest
 
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.output import (
+    ENDS,
     Mark,
     check_apart,
+    check_appendable,
     check_outputs,
     check_writable,
     is_own,
@@ -169,16 +171,23 @@ def test_a_write_protected_file_stays(tmp_path: Path, monkeypatch: pytest.Monkey
 
 LONG = b"0" * 10**6
 KNOWN = {
-    Mark.TABLE: [LONG + b"..dpg.file_sha256..", b"dpg.file_sha256"],
+    Mark.TABLE: [
+        b"PAR1" + LONG + b"..dpg.file_sha256\x18@..PAR1",
+        b"PAR1..dpg.content_sha256\x18@..PAR1",
+    ],
     Mark.FACTS: [b'{\n  "written_by": "dpg 0.1.0",' + LONG],
     Mark.REPORT: [b"# Design space\n" + LONG + b"\n<!-- written by dpg -->\n"],
-    Mark.FIGURE: [b"<svg>drawn by dpg" + LONG],
+    Mark.FIGURE: [
+        b"<?xml version='1.0'?>\n<svg>\n<dc:title>drawn by dpg</dc:title>" + LONG,
+        b"\x89PNG\r\n\x1a\n....IHDR....tEXtSoftware\x00drawn by dpg" + LONG,
+    ],
     Mark.CALIBRATION: [b"calibration_version: 1\nmade_by: dpg 0.1.0, numpy 2" + LONG],
-    Mark.DEPFILE: [b"a/states.parquet a/designs.parquet: b.yaml\n"],
+    Mark.DEPFILE: [b"# dpg sweep: what\na/states.parquet a/designs.parquet: b.yaml\n"],
     Mark.DECK: [b"** dpg fe hinge" + LONG],
     Mark.CURVE: [b"# dpg fe hinge: a simulation"],
     Mark.LOG: [b"# dpg fe, hinge.inp: words of ccx\n"],
-    Mark.DISPLACEMENTS: [b"\n displacements (vx,vy,vz) for set ALL and time  0.1E+01\n" + LONG],
+    Mark.DISPLACEMENTS: [b"# dpg fe, hinge.inp: printed by ccx\n\n displacements" + LONG],
+    Mark.PARTS: [b'{\n  "dpg.sweep": "' + LONG],
     Mark.ANY: [b"anything"],
     Mark.NONE: [],
 }
@@ -191,6 +200,19 @@ STRANGE = [
     b"\n** dpg fe hinge",
     b"see # dpg fe, and # dpg fe hinge",
     b"the displacements (vx,vy,vz) for set ALL",
+    b"\n displacements (vx,vy,vz) for set ALL and time  0.1E+01\n" + LONG,
+    b"out/states.parquet out/designs.parquet: sweep.yaml\n\tdpg sweep sweep.yaml -o out\n",
+    b'{"runs": [{"written_by": "dpg 0.1.0"}], "mine": 1}',
+    b'[{"written_by": "dpg 0.1.0"}]',
+    b"# Notes\n\n<!-- written by dpg -->\n\nand what I think of it\n",
+    b"see <!-- written by dpg -->\n",
+    b"<!-- written by dpg -->\n" + LONG,
+    b"PAR1..dpg.file_sha256 of the other table..PAR1",
+    b"the key dpg.file_sha256\x18@",
+    b"<?xml version='1.0'?><svg><text>drawn by dpg</text></svg>",
+    b"how a figure is drawn by dpg",
+    b"note: |\n  calibration_version: 1\nmade_by: dpg fit, then by hand\n",
+    b'{"mine": {"dpg.sweep": "a"}}',
 ]
 
 
@@ -208,10 +230,37 @@ def test_files_are_known_by_their_marks(tmp_path: Path, mark: Mark) -> None:
     assert is_own(path, mark), "nothing can be lost"
 
 
+@pytest.mark.parametrize("kind", [mark for mark in Mark if KNOWN[mark] and mark is not Mark.ANY])
+def test_nothing_is_appended_to_what_is_known_by_a_mark(tmp_path: Path, kind: Mark) -> None:
+    path = tmp_path / "file"
+    for content in KNOWN[kind]:
+        path.write_bytes(content)
+        with pytest.raises(OutputError, match="dpg made it"):
+            check_appendable(path, ())
+        assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("content", [b"\xff", LONG + b"\xc3", b"a\0b", LONG + b"\0"])
+def test_nothing_is_appended_to_what_is_no_text(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with pytest.raises(OutputError, match="it is no text"):
+        check_appendable(path, ())
+    path.write_bytes(b"0" * (ENDS - 1) + "é\n".encode())
+    check_appendable(path, ())
+
+
+@pytest.mark.parametrize("name", ["t.parquet", "T.CSV", "s.yaml", "s.yml", "p.png", "p.svg"])
+def test_nothing_is_appended_to_a_name_that_promises_a_table(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match="Markdown is no"):
+        check_appendable(tmp_path / name, ())
+    assert names(tmp_path) == []
+
+
 def test_a_file_that_came_while_the_new_one_was_made_stays(tmp_path: Path) -> None:
     path = tmp_path / "table.txt"
     with pytest.raises(OutputError, match="not of dpg"), whole_file(path, Mark.TABLE) as temporary:
-        temporary.write_bytes(b"dpg.file_sha256")
+        temporary.write_bytes(b"ours")
         path.write_bytes(b"theirs")
     assert path.read_bytes() == b"theirs"
     assert names(tmp_path) == ["table.txt"]

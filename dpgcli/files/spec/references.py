@@ -99,5 +99,5 @@ class _Reader:
             self.wrong(path, f"{shown(name)}: no such file")
             return None
         self.files.append(file)
-        with quoted_if(file, b"calibration_version", "a calibration file of dpg fit"):
+        with quoted_if(file, "calibration_version", "a calibration file of dpg fit"):
             return read_calibration(file).model_copy(update={"file": file.name})

@@ -103,7 +103,7 @@ def _base(
     """The data of the base and what they mean, None where `problems` now say why not."""
     document = None
     try:
-        with quoted_if(path, b"finger", "a spec, with a section finger"):
+        with quoted_if(path, "finger", "a spec, with a section finger"):
             document = read_scene(path, settings)
             return document, checked(document)
     except SpecError as error:

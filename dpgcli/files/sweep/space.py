@@ -134,7 +134,7 @@ class SpaceReader:
 
     def tabulated(self, path: KeyPath, name: str) -> Axis | None:
         """Columns of a CSV or Parquet file, which is read once."""
-        from dpgcli.files.sweep.tables import UNREADABLE, Wrong, frame_in, numbers_in
+        from dpgcli.files.sweep.tables import UNREADABLE, NoTableError, Wrong, frame_in, numbers_in
 
         file = self.folder / name
         if file.is_file() and (size := file.stat().st_size) > MOST_BYTES:
@@ -147,6 +147,9 @@ class SpaceReader:
             frame = frame_in(content, lambda *shape: self.has_room(path, *shape))
         except SpecError as error:
             self.wrong(path, TABLE, error.problems[0].found)
+            return None
+        except NoTableError as error:
+            self.wrong(path, TABLE, *error.args)
             return None
         except UNREADABLE as error:
             self.wrong(path, TABLE, shown(str(error)))

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -16,6 +17,8 @@ from dpgcli.files.reading import DAMAGED, undamaged
 
 LARGEST_WHOLE = 2**63 - 1
 PARQUET = b"PAR1"
+TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?\n)+")
+COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?\r?$", re.MULTILINE)
 UNREADABLE = (  # what pandas and pyarrow raise for content that is no table
     OSError,
     csv.Error,
@@ -47,13 +50,45 @@ def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFra
     return frame.reset_index() if is_named else frame
 
 
+class NoTableError(ValueError):
+    """A file is no table: what was found, and a hint."""
+
+
 def _csv(content: bytes) -> pd.DataFrame:
+    """Comments leave empty lines, so that the others keep their numbers."""
+    if b"#" in content:
+        content = TOP.sub(lambda top: b"\n" * top[0].count(b"\n"), content)
+        content = COMMENT.sub(b"", content)
     if b'"' in content:  # pandas reads "3"4 as 34
         for _ in csv.reader(io.StringIO(content.decode("utf-8")), strict=True):
             pass
     with warnings.catch_warnings():  # rows that do not fit the header
         warnings.simplefilter("error", pd.errors.ParserWarning)
-        return pd.read_csv(io.BytesIO(content), index_col=False)
+        try:
+            frame = pd.read_csv(io.BytesIO(content), index_col=False)
+        except (pd.errors.ParserError, pd.errors.ParserWarning):
+            _check_rows(content)
+            raise
+    if len(frame.columns) == 1:
+        _check_separator([str(frame.columns[0])])
+    return frame
+
+
+def _check_rows(content: bytes) -> None:
+    """Raise NoTableError for the first row that is longer than the header."""
+    rows = csv.reader(io.StringIO(content.decode("utf-8-sig")))
+    header = next(row for row in rows if row)
+    _check_separator(header)
+    for row in rows:
+        if len(row) > len(header):
+            found = f"{len(row)} cells in line {rows.line_num}"
+            raise NoTableError(found, f"the header has {len(header)}")
+
+
+def _check_separator(header: list[str]) -> None:
+    if len(header) == 1 and (foreign := [c for c in ";\t" if c in header[0]]):
+        hint = "separate them by commas, and write decimal points"
+        raise NoTableError(f"columns separated by {shown(foreign[0])}", hint)
 
 
 class Wrong(NamedTuple):

@@ -482,6 +482,35 @@ def test_quotes_in_the_midst_of_a_cell_are_refused(read: Read, tmp_path: Path) -
     assert designs(read("table: t.csv")) == {HEIGHT: [6.5]}
 
 
+def test_comments_in_a_table_of_designs(read: Read, tmp_path: Path) -> None:
+    top = "# of the lab\n\n#heights, as cut\n"
+    rows = f"{HEIGHT},{SEPARATION}\n6,3\n# 7,3\n#\n8,4\n"
+    for text in (top + rows, "\ufeff" + top + rows, (top + rows).replace("\n", "\r\n")):
+        (tmp_path / "t.csv").write_bytes(text.encode())
+        assert designs(read("table: t.csv")) == {HEIGHT: [6, 8], SEPARATION: [3, 4]}
+    for row in ("#7,3", "#DIV/0!,3"):
+        (tmp_path / "t.csv").write_text(f"{top}{rows}{row}\n")
+        assert f'"{row[:-2]}" in row 3' in problems(read, "table: t.csv")[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"{HEIGHT},{SEPARATION}\n6,3\n7,3,1\n", "found 3 cells in line 3 (the header has 2)"),
+        (f"# a\n{HEIGHT},{SEPARATION}\n6,3,1\n", "found 3 cells in line 3 (the header has 2)"),
+        (f"{HEIGHT};{SEPARATION}\n6,5;3,0\n", 'columns separated by ";" (separate them by commas'),
+        (f"{HEIGHT};{SEPARATION}\n6;3\n", 'columns separated by ";" (separate them by commas'),
+        (f"{HEIGHT}\t{SEPARATION}\n6\t3\n", 'columns separated by "\\t" (separate them by commas'),
+    ],
+)
+def test_what_is_wrong_with_a_csv_is_said_in_words(
+    read: Read, tmp_path: Path, text: str, said: str
+) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    (problem,) = problems(read, "table: t.csv")
+    assert said in problem
+
+
 def test_a_table_is_a_file_and_nothing_else(read: Read, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "t.csv")
     assert "found a device or pipe" in problems(read, "table: t.csv")[0]
@@ -498,13 +527,31 @@ def test_nothing_is_quoted_of_a_file_that_is_no_table_of_designs(
     )
 
 
-@pytest.mark.parametrize("secret", ["hunter2", "hunter2: 1", "- [hunter2", "hunter2: {a: 1}}"])
+@pytest.mark.parametrize(
+    "secret",
+    [
+        "hunter2",
+        "hunter2: 1",
+        "- [hunter2",
+        "hunter2: {a: 1}}",
+        "hunter2 base finger",
+        "hunter2\n  finger: 1\nbase: x\n",
+        "hunter2 finger: x: y",
+    ],
+)
 def test_nothing_is_quoted_of_a_base_that_is_no_spec(
     read: Read, tmp_path: Path, secret: str
 ) -> None:
     (tmp_path / "secret").write_text(secret)
     (problem,) = problems(read, f"{{key: {HEIGHT}, values: [6]}}", head="base: secret")
     assert problem.endswith("expected a spec, with a section finger, found something else")
+
+
+@pytest.mark.parametrize("spec", ["finger: [\n", "# mine\n'finger': 3: 4\n", '{\n"finger": ]'])
+def test_a_base_that_is_a_broken_spec_is_quoted(read: Read, tmp_path: Path, spec: str) -> None:
+    (tmp_path / "broken.yaml").write_text(spec)
+    (problem,) = problems(read, f"{{key: {HEIGHT}, values: [6]}}", head="base: broken.yaml")
+    assert "syntax: expected valid YAML" in problem
 
 
 def test_more_designs_than_can_be_counted_are_counted_exactly(read: Read) -> None:
