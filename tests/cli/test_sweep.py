@@ -258,6 +258,7 @@ def test_a_depfile_in_the_output_folder(call: Any, sweep: Path) -> None:
     result = call("sweep", "sweep.yaml", *SERIAL, "--depfile", "out/sweep.d")
     assert result.exit_code == ExitCode.DONE
     assert (sweep.parent / "out" / "sweep.d").read_text() == (
+        "# dpg sweep: what its tables are made from\n"
         "out/states.parquet out/designs.parquet: sweep.yaml three_unit.yaml\n"
         "\nsweep.yaml:\n\nthree_unit.yaml:\n"
     )
@@ -267,7 +268,7 @@ def test_a_depfile_of_standard_input_names_files_only(run: Any, sweep: Path) -> 
     result = run("sweep", "-", *SERIAL, "--depfile", "out.d", input=sweep.read_text())
     assert result.returncode == ExitCode.DONE
     text = (sweep.parent / "out.d").read_text()
-    assert text.splitlines()[0] == "out/states.parquet out/designs.parquet: three_unit.yaml"
+    assert text.splitlines()[1] == "out/states.parquet out/designs.parquet: three_unit.yaml"
 
 
 def test_progress_goes_to_standard_error_only(run: Any, sweep: Path) -> None:
@@ -542,7 +543,7 @@ def test_a_design_of_a_sweep_is_that_of_predict(call: Any, domes: Path, law: str
 def test_a_depfile_lists_the_calibration(call: Any, domes: Path) -> None:
     assert call("sweep", "domes.yaml", *SERIAL, "--depfile", "out.d").exit_code == ExitCode.DONE
     text = (domes / "out.d").read_text()
-    assert text.splitlines()[0] == (
+    assert text.splitlines()[1] == (
         "out/states.parquet out/designs.parquet: domes.yaml base.yaml dome.yaml"
     )
     assert "\ndome.yaml:\n" in text
