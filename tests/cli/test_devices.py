@@ -48,8 +48,6 @@ def put(path: Path, kind: str) -> Path:
         (("check", "t.parquet", *REQUIRE), "t.parquet"),
         (("report", "out"), "out/designs.parquet"),
         (("bench", "three_unit.yaml", "--compare", "b.json"), "b.json"),
-        (("merge", "out", "-o", "all"), f"out/.parts/{'0' * 16}/{SAID}"),
-        ((*RUN[:-1], "new"), f"new/.parts/{'0' * 16}/{SAID}"),
     ],
 )
 def test_it_is_refused_by_its_name(
@@ -61,6 +59,23 @@ def test_it_is_refused_by_its_name(
     result = run(*command, before=LIMITED, timeout=30)
     assert result.returncode == ExitCode.USAGE
     assert result.stderr == f"dpg: cannot read {name}: {SPECIAL}\n"
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_parts_of_somebody_else_are_left_alone(
+    run: Any, out: Path, folder: Path, kind: str
+) -> None:
+    """What stands in the place of a sweep's description is not read, and not in the way."""
+    assert out.exists()
+    for name in ("out", "new"):
+        parts = folder / name / ".parts" / ("0" * 16)
+        parts.mkdir(parents=True)
+        put(parts / SAID, kind)
+    merged = run("merge", "out", "-o", "all", before=LIMITED, timeout=30)
+    assert (merged.returncode, "found no shard" in merged.stderr) == (ExitCode.USAGE, True)
+    swept = run(*RUN[:-1], "new", before=LIMITED, timeout=30)
+    assert (swept.returncode, swept.stderr) == (ExitCode.DONE, "")
+    assert (folder / "new" / ".parts" / ("0" * 16) / SAID).exists() or kind == "pipe"
 
 
 def test_a_summary_is_not_appended_to_a_pipe(run: Any, out: Path, folder: Path) -> None:

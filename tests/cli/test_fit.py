@@ -305,12 +305,12 @@ def test_what_makes_no_sense(fit: Any, folder: Path, options: tuple[str, ...], s
 
 
 def test_a_fit_that_fails_leaves_the_old_file(fit: Any, folder: Path) -> None:
-    (folder / "out.yaml").write_text("made_by: dpg old")
+    (folder / "out.yaml").write_text("calibration_version: 1\nmade_by: dpg old")
     (folder / "two.csv").write_text("travel_mm,energy_mJ\n0,0\n1,2\n")
     result = fit("bistable", "two.csv", *EQUAL, "-o", "out.yaml")
     assert result.exit_code == ExitCode.USAGE
     assert "2 points for 3 free values: give more, or fix some" in result.stderr
-    assert (folder / "out.yaml").read_text() == "made_by: dpg old"
+    assert (folder / "out.yaml").read_text() == "calibration_version: 1\nmade_by: dpg old"
 
 
 def test_a_reader_that_has_had_enough_gets_its_file(fit: Any, folder: Path, start: Any) -> None:
@@ -330,12 +330,12 @@ def test_an_interrupt_while_writing_leaves_the_old_file(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(YAML, "dump", half)
-    (folder / "d.yaml").write_text("made_by: dpg old")
+    (folder / "d.yaml").write_text("calibration_version: 1\nmade_by: dpg old")
     before = sorted(path.name for path in folder.iterdir())
     result = fit("bistable", PATH, *EQUAL, "-o", "d.yaml")
     assert result.exit_code == ExitCode.INTERRUPTED
     assert "nothing half-written is left" in result.stderr
-    assert (folder / "d.yaml").read_text() == "made_by: dpg old"
+    assert (folder / "d.yaml").read_text() == "calibration_version: 1\nmade_by: dpg old"
     assert sorted(path.name for path in folder.iterdir()) == before
 
 

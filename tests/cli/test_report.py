@@ -102,7 +102,8 @@ def test_the_report_of_former_tables_is_made_anew(
         assert call(*AGAIN).exit_code != 0
     assert "2.5 … 6.5 mm" in (swept / "report.md").read_text(encoding="utf-8")
     assert call(*AGAIN).stderr == "out: up to date\n"
-    assert (swept / "report.md").read_text(encoding="utf-8") == call("report", "out").stdout
+    written = (swept / "report.md").read_text(encoding="utf-8")
+    assert written == call("report", "out").stdout + "\n<!-- written by dpg -->\n"
     assert "2.25 … 6.5 mm" in call("report", "out").stdout
     made = (swept / "report.md").stat()
     assert call(*AGAIN).exit_code == 0

@@ -137,7 +137,7 @@ def test_an_interrupt_while_writing_leaves_nothing(
 def test_an_interrupt_leaves_the_old_table_as_it_was(
     start: Any, folder: Path, number: int, code: int, word: str
 ) -> None:
-    old = b"a table of dpg, see dpg.file_sha256"
+    old = b"PAR1 a table, dpg.file_sha256\x18@ of it"
     (folder / "states.parquet").write_bytes(old)
     process = start(*WRITING)
     wait_until(is_writing(folder), process)
