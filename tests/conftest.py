@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 
 # A shell that starts the tests in the background makes them, and what they start, deaf to
@@ -24,5 +25,23 @@ def reference_finger() -> Callable[..., Finger]:
 
     def build(n_units: int, linear_stiffness: float = np.inf, **changes: float) -> Finger:
         return uniform_finger(n_units, **{**STUDY, **changes}, linear_stiffness=linear_stiffness)
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def graded_finger() -> Callable[..., Finger]:
+    """Other values in each unit, within 30 % of the study's; changes override them."""
+
+    def build(
+        n_units: int, seed: int, linear_stiffness: float = 1e4, **changes: Array | float
+    ) -> Finger:
+        random = np.random.default_rng(seed)
+        values = {
+            name: value * random.uniform(0.7, 1.3, (n_units, 1)) for name, value in STUDY.items()
+        }
+        values["segment_height"] = values["segment_height"][:1]
+        values |= {name: np.reshape(value, (-1, 1)) for name, value in changes.items()}
+        return Finger(n_units, **values, linear_stiffness=np.array([[linear_stiffness]]))
 
     return build

@@ -13,8 +13,7 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
-from dpgcli.accuracy.families import FAMILIES, PATTERNS
-from dpgcli.accuracy.stress import Verdict
+from dpgcli.benchmark.ablation import KEEPABLE
 from dpgcli.cli import (
     bench,
     check,
@@ -36,14 +35,15 @@ from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
-from dpgcli.files.spec import json_schema, read_spec
-from dpgcli.files.sweep import read_sweep
+from dpgcli.files.scene_file import json_schema, read_spec
+from dpgcli.files.sweep_file import read_sweep
 from dpgcli.mechanics.scene import Origin
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group, declared
-from dpgcli.states.metrics import DESIGN_COLUMNS
+from dpgcli.stress.families import FAMILIES, PATTERNS
+from dpgcli.stress.verdicts import Verdict
 from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
-from dpgcli.studies.kept import KEEPABLE
+from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,7 +26,7 @@ from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
-    from dpgcli.studies.bench import Row
+    from dpgcli.benchmark.bench import Row
 
 GROUPS = {
     "ladder": "Ways to the states, in a batch as large as a sweep's",
@@ -90,11 +91,12 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
+    from dpgcli.benchmark.bench import Bench
     from dpgcli.files.known_states import states_of
     from dpgcli.files.output import Mark, check_outputs, check_table_name
-    from dpgcli.files.spec import canonical_json, checked, read_scene, scene_of
+    from dpgcli.files.scene_file import canonical_json, checked, read_scene, scene_of
+    from dpgcli.files.table_writer import write_states
     from dpgcli.report.precision import cheapest_way, draw_precision
-    from dpgcli.studies.bench import Bench
 
     check_installed("dpg bench", "mpmath")
     if plot is not None:
@@ -110,7 +112,13 @@ def bench(
     known = None if against is None else states_of(scene.finger, against)
     then = None if compare is None else _recorded(compare, said)
     study = Bench(
-        scene, repeats, tuple(keep or ()), target, known, frame_of(first_station, tip_offset)
+        scene,
+        repeats,
+        tuple(keep or ()),
+        target,
+        known,
+        frame_of(first_station, tip_offset),
+        partial(write_states, spec_json="{}"),
     )
     study.check()
     rows = list(_watched(study.rows(), quiet))
@@ -126,7 +134,7 @@ def bench(
 def _recorded(path: Path, said: str) -> "Sequence[Row]":
     """The rows of a record of the same finger."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.reading import read_record
+    from dpgcli.files.table_reader import read_record
     from dpgcli.studies.differences import differences
 
     facts = read_record(path)
@@ -157,7 +165,7 @@ def _tell(printed_as: Format, line: str) -> None:
 
 
 def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
-    from dpgcli.studies.bench import COLUMNS, as_columns
+    from dpgcli.benchmark.bench import COLUMNS, as_columns
 
     if printed_as is Format.TABLE:
         _print_tables(rows)
@@ -202,8 +210,8 @@ def _cell(row: "Row", name: str) -> str:
 
 
 def _write(rows: "Sequence[Row]", said: str, output: Path | None, record: Path | None) -> None:
-    from dpgcli.files.tables import record_batch, schema, write_run, write_table
-    from dpgcli.studies.bench import COLUMNS, as_columns
+    from dpgcli.benchmark.bench import COLUMNS, as_columns
+    from dpgcli.files.table_writer import record_batch, schema, write_run, write_table
 
     if output is not None:
         batch = record_batch(COLUMNS, as_columns(rows))
@@ -216,7 +224,7 @@ def _write(rows: "Sequence[Row]", said: str, output: Path | None, record: Path |
 
 def _plain(value: Any) -> Any:
     """As JSON can say it: null for what was not measured, and .inf as in a spec."""
-    from dpgcli.files.spec import spelled
+    from dpgcli.files.scene_file import spelled
 
     if not isinstance(value, float):
         return value

@@ -13,7 +13,7 @@ from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat, escaped
 from dpgcli.text import printable
 
 if TYPE_CHECKING:
-    from dpgcli.report.requirements import Verdict
+    from dpgcli.sweeps.gate import Verdict
 
 MOST_LINES = 20
 LARGEST_SUMMARY = 2**20  # bytes; GitHub refuses more
@@ -35,9 +35,9 @@ def check(
 ) -> None:
     """Check that every design of a table meets requirements."""
     from dpgcli.files.output import check_appendable
-    from dpgcli.files.reading import read_designs
+    from dpgcli.files.table_reader import read_designs
     from dpgcli.report.page import verdicts_markdown
-    from dpgcli.report.requirements import check_requirements, number_columns, requirement
+    from dpgcli.sweeps.gate import check_requirements, number_columns, requirement
 
     designs, _ = read_designs(table)
     if summary_file is not None:

@@ -56,7 +56,7 @@ def compare(
     from dpgcli.calibration.comparison import columns, compare, rows
     from dpgcli.files.known_states import states_of
     from dpgcli.files.output import Mark, check_outputs
-    from dpgcli.files.spec import checked, read_scene, recalibrated, scene_of
+    from dpgcli.files.scene_file import checked, read_scene, recalibrated, scene_of
 
     document = read_scene(spec, settings or ())
     finger, frame = scene_of(checked(document)).finger, frame_of(first_station, tip_offset)
@@ -136,7 +136,7 @@ def _worst_and_mean(errors: "Array", unit: str) -> str:
 def _times(finger: "Finger", known: "KnownStates") -> str:
     import numpy as np
 
-    from dpgcli.accuracy.timing import measured
+    from dpgcli.benchmark.timing import measured
     from dpgcli.calibration.known import Frame, lattice_states
 
     n_states = known.patterns.shape[1]

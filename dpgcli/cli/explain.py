@@ -47,7 +47,7 @@ def explain(
     ] = PlanFormat.TEXT,
 ) -> None:
     """Say what predict will do, and leave out, and why."""
-    from dpgcli.files.spec import read_spec, scene_of
+    from dpgcli.files.scene_file import read_spec, scene_of
     from dpgcli.states import plan
 
     scene = scene_of(read_spec(spec, settings or ()))
@@ -65,7 +65,7 @@ def explain(
 
 def facts(plan: "Plan") -> dict[str, Any]:
     """The plan as plain values, units in the names."""
-    from dpgcli.files.spec import spelled
+    from dpgcli.files.scene_file import spelled
 
     return {
         "n_units": plan.n_units,

@@ -139,8 +139,8 @@ def _dimensions(
     path: Path, settings: list[str] | None, keys: Sequence[str], quiet: bool
 ) -> list[float]:
     """The values of some keys of the spec's geometry, and a word on those of single units."""
-    from dpgcli.files.spec import read_keys
-    from dpgcli.files.spec.dimensions import dimensions, overridden
+    from dpgcli.files.scene_file import read_keys
+    from dpgcli.files.scene_file.dimensions import dimensions, overridden
 
     spec = read_keys(path, settings or ())
     values = dimensions(spec, str(path), keys, "dpg fe builds its mesh from it")

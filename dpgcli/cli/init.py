@@ -20,7 +20,7 @@ def init(
 
     from dpgcli.errors import OutputError
     from dpgcli.files.output import Mark, whole_file
-    from dpgcli.files.spec import starter
+    from dpgcli.files.scene_file import starter
 
     if path == Path("-"):
         sys.stdout.write(starter())

@@ -7,8 +7,8 @@ import typer
 
 from dpgcli.cli.options import MaxFailed, Quiet
 from dpgcli.cli.report import summarize
-from dpgcli.cli.run import check_failed
 from dpgcli.cli.streams import say
+from dpgcli.cli.sweep_summary import check_failed
 
 
 def merge(
@@ -22,7 +22,7 @@ def merge(
     """Join shards into the tables of the whole sweep."""
     from dpgcli.errors import UsageError
     from dpgcli.files.output import check_outputs, sole_use
-    from dpgcli.files.reading import read_run
+    from dpgcli.files.table_reader import read_run
     from dpgcli.studies.sweep import RUN, assemble, drop_half_written, outputs, stores
 
     found = []

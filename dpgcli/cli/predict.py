@@ -59,12 +59,12 @@ def predict(
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
-    from dpgcli.files import spec as specs
+    from dpgcli.files import scene_file
     from dpgcli.states import predict as states
 
-    document = specs.read_scene(spec, settings or ())
-    checked = specs.checked(document)
-    scene = specs.scene_of(checked)
+    document = scene_file.read_scene(spec, settings or ())
+    checked = scene_file.checked(document)
+    scene = scene_file.scene_of(checked)
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
@@ -82,7 +82,7 @@ def predict(
         rows = printer(prediction.plan.columns, rows)
     only_prints = output is None and plot is None
     if output is not None:
-        _write(prediction, output, specs.canonical_json(checked), rows)
+        _write(prediction, output, scene_file.canonical_json(checked), rows)
     for _ in rows:
         if only_prints and not is_read():  # the work is for nobody
             break
@@ -125,7 +125,7 @@ def _write(
 ) -> None:
     import platform
 
-    from dpgcli.files.tables import write_run, write_states
+    from dpgcli.files.table_writer import write_run, write_states
 
     write_states(prediction, output, spec_json, rows)
     summary = prediction.summary

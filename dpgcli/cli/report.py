@@ -60,7 +60,7 @@ def _is_outdated(path: Path, text: str) -> bool:
 
 def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
     """The designs in a folder, and their report."""
-    from dpgcli.files.reading import read_designs
+    from dpgcli.files.table_reader import read_designs
     from dpgcli.report.page import html, markdown
 
     designs, units = read_designs(folder / "designs.parquet")
@@ -71,8 +71,8 @@ def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
 def _facts(folder: Path) -> dict[str, Any] | None:
     """The facts of the run that made the tables in a folder, if they are there."""
     from dpgcli.files.parts import FINGERPRINT
-    from dpgcli.files.reading import read_run
-    from dpgcli.files.tables import read_metadata
+    from dpgcli.files.table_reader import read_run
+    from dpgcli.files.table_writer import read_metadata
 
     facts = read_run(folder / "run.json")
     made = read_metadata(folder / "designs.parquet").get(FINGERPRINT)

@@ -19,12 +19,12 @@ from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
-    from dpgcli.accuracy.gauntlet import Case
-    from dpgcli.accuracy.outcomes import FamilySummary
-    from dpgcli.accuracy.stress import Outcome
-    from dpgcli.files.spec import Spec
+    from dpgcli.files.scene_file import Spec
     from dpgcli.mechanics.finger import Finger
     from dpgcli.states.rows import Columns
+    from dpgcli.stress.cases import Case
+    from dpgcli.stress.table import FamilySummary
+    from dpgcli.stress.verdicts import Outcome
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
 MARGINS = (
@@ -52,7 +52,7 @@ def stress(
 ) -> None:
     """Hold stiff and extreme cases against extended precision."""
     from dpgcli.files.output import Mark, check_outputs, check_table_name
-    from dpgcli.files.spec import scene_of
+    from dpgcli.files.scene_file import scene_of
 
     check_installed("dpg stress", "mpmath")
     checked, sources = _spec(spec, settings or ())
@@ -74,7 +74,7 @@ def stress(
 def _spec(spec: Path | None, settings: Sequence[str]) -> tuple["Spec | None", tuple[Path, ...]]:
     """The spec, if there is one, and the files it is read from."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.spec import checked, read_scene
+    from dpgcli.files.scene_file import checked, read_scene
 
     if spec is None and settings:
         raise UsageError("--set changes a spec: give one")
@@ -85,8 +85,8 @@ def _spec(spec: Path | None, settings: Sequence[str]) -> tuple["Spec | None", tu
 
 
 def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
-    from dpgcli.accuracy.gauntlet import all_cases, check_families
     from dpgcli.errors import NothingSelectedError
+    from dpgcli.stress.cases import all_cases, check_families
 
     check_families(only)
     cases = all_cases(finger, only)
@@ -97,10 +97,10 @@ def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
 
 def _progress(cases: Sequence["Case"], quiet: bool) -> Iterator["Outcome"]:
     """Outcomes as they come, with progress."""
-    from dpgcli.accuracy import stress as accuracy
+    from dpgcli.stress import verdicts
 
     line = ProgressLine(len(cases), "cases", quiet=quiet)
-    for done, outcome in enumerate(accuracy.stress(cases), start=1):
+    for done, outcome in enumerate(verdicts.stress(cases), start=1):
         yield outcome
         line.show(done)
     line.clear()
@@ -110,7 +110,7 @@ def _printed(
     printed_as: Format, coming: Iterator["Outcome"], finger: "Finger | None"
 ) -> list["Outcome"]:
     """All outcomes: printed one by one as they come, or in tables at the end."""
-    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
+    from dpgcli.stress.table import STRESS_COLUMNS, rows
 
     outcomes: list[Outcome] = []
 
@@ -130,7 +130,7 @@ def _printed(
 
 def _print_tables(outcomes: list["Outcome"], finger: "Finger | None") -> None:
     """Families by whose finger it is, cases that matter in full, and the finger's margins."""
-    from dpgcli.accuracy.outcomes import summarized
+    from dpgcli.stress.table import summarized
 
     summaries = summarized(outcomes)
     titles = {"spec": "The spec's finger", "built-in": "The study's finger"}
@@ -173,9 +173,9 @@ def _family(summary: "FamilySummary") -> dict[str, str]:
 
 def _in_full(outcomes: list["Outcome"]) -> list[dict[str, str]]:
     """All that is known of some cases."""
-    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
     from dpgcli.states.columns import Kind
     from dpgcli.states.rows import as_text
+    from dpgcli.stress.table import STRESS_COLUMNS, rows
 
     values = rows(outcomes)
     texts = {
@@ -193,7 +193,7 @@ def _margins(finger: "Finger") -> list[dict[str, str]]:
     """One record for each run of equal units."""
     import numpy as np
 
-    from dpgcli.accuracy.margins import NAMES, limits
+    from dpgcli.states.margins import NAMES, limits
 
     ends = limits(finger)
     columns = []
@@ -220,9 +220,15 @@ def _rounded(value: float) -> str:
 
 
 def _write(output: Path, outcomes: list["Outcome"], spec: "Spec | None") -> None:
-    from dpgcli.accuracy.outcomes import STRESS_COLUMNS, rows
-    from dpgcli.files.spec import canonical_json
-    from dpgcli.files.tables import SCHEMA_VERSION, record_batch, schema, versions, write_table
+    from dpgcli.files.scene_file import canonical_json
+    from dpgcli.files.table_writer import (
+        SCHEMA_VERSION,
+        record_batch,
+        schema,
+        versions,
+        write_table,
+    )
+    from dpgcli.stress.table import STRESS_COLUMNS, rows
 
     metadata = {"dpg.schema_version": str(SCHEMA_VERSION), "dpg.versions": versions()}
     if spec is not None:

@@ -26,17 +26,17 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.report import summarize
-from dpgcli.cli.run import check_failed, run_facts, run_summary
 from dpgcli.cli.streams import say
+from dpgcli.cli.sweep_summary import check_failed, run_facts, run_summary
 from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dpgcli.exploration.executors import Workplace
-    from dpgcli.exploration.expressions import Expression
-    from dpgcli.report.requirements import Verdict
     from dpgcli.studies.sweep import Progress, Shard, Study
+    from dpgcli.sweeps.executors import Workplace
+    from dpgcli.sweeps.expressions import Expression
+    from dpgcli.sweeps.gate import Verdict
 
 MOST_NAMED = 20
 WAIT = "5m"
@@ -145,7 +145,7 @@ def sweep(
 
 def _start_fork_server_early() -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
-    from dpgcli.exploration.executors import start_fork_server
+    from dpgcli.sweeps.executors import start_fork_server
 
     start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
 
@@ -157,7 +157,7 @@ def _study(
     tolerance: float | None,
     target_error: str | None,
 ) -> "Study":
-    from dpgcli.files.sweep import read_sweep
+    from dpgcli.files.sweep_file import read_sweep
     from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
     from dpgcli.studies.sweep import Study
 
@@ -218,8 +218,8 @@ def _rules(study: "Study", require: list[str]) -> "list[Expression]":
     """Requirements over the columns of designs, checked before any work."""
     if not require:
         return []
-    from dpgcli.report.requirements import requirement
     from dpgcli.states.columns import Kind
+    from dpgcli.sweeps.gate import requirement
 
     columns = study.evaluation.design_columns
     numbers = [column.name for column in columns if column.kind in (Kind.COUNT, Kind.NUMBER)]
@@ -234,7 +234,7 @@ def _conclude(
     quiet: bool,
 ) -> None:
     """Write the tables unless this is a part of them, and say what the run came to."""
-    from dpgcli.files.tables import write_run
+    from dpgcli.files.table_writer import write_run
     from dpgcli.studies.sweep import RUN
 
     replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]
@@ -255,7 +255,7 @@ def _judge(
 ) -> tuple[int, ExitCode]:
     """Report; how many designs failed, and how the command ends if they may."""
     from dpgcli.report.page import verdicts_markdown
-    from dpgcli.report.requirements import check_requirements
+    from dpgcli.sweeps.gate import check_requirements
 
     designs, text = summarize(study.folder, is_new=is_new)
     if is_new and not quiet:
@@ -324,7 +324,7 @@ def _workplace(
     executor: ExecutorName, jobs: int | None, scheduler: str | None, limit: float
 ) -> "Workplace":
     from dpgcli.errors import UsageError
-    from dpgcli.exploration import cluster, executors
+    from dpgcli.sweeps import cluster, executors
 
     if scheduler is not None:
         try:

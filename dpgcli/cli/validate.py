@@ -32,7 +32,7 @@ def validate(
 ) -> None:
     """Check specs without solving."""
     from dpgcli.errors import SpecError
-    from dpgcli.files.spec import read_spec
+    from dpgcli.files.scene_file import read_spec
 
     problems: list[Problem] = []
     for path in specs:

@@ -9,8 +9,8 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.csv_file import Sheet, read_sheet
 from dpgcli.files.places import Place, in_order, located
-from dpgcli.files.sheet import Sheet, read_sheet
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")

@@ -11,10 +11,10 @@ from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration.models import Values
+from dpgcli.files.csv_file import Sheet, read_sheet
 from dpgcli.files.places import in_order
 from dpgcli.files.sections import SMALLEST, Geometry, expected_of, unit_of
-from dpgcli.files.sheet import Sheet, read_sheet
-from dpgcli.files.source import MAX_NODES
+from dpgcli.files.yaml_file import MAX_NODES
 from dpgcli.mechanics.geometry import snap_pressure
 
 TRAVELS = ("pole_travel_mm", "travel_mm")

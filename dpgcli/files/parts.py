@@ -22,7 +22,7 @@ import pyarrow as pa
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
-from dpgcli.files.tables import record_batch, schema
+from dpgcli.files.table_writer import record_batch, schema
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import Columns
 from dpgcli.temporary import temporary_file

@@ -14,7 +14,7 @@ import pandas as pd
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.scene import Origin
-from dpgcli.report.requirements import swept_names
+from dpgcli.sweeps.gate import swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero
     "workspace_area_mm2": True,

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import keep_freed_memory
 from dpgcli.errors import Problem, SpecError
-from dpgcli.exploration.expressions import Expression
-from dpgcli.exploration.space import Space
+from dpgcli.files.scene_file import variant
 from dpgcli.files.sections import unit_of
-from dpgcli.files.spec import variant
-from dpgcli.files.sweep.space import UNITS, flattened
+from dpgcli.files.sweep_file.space import UNITS, flattened
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared
-from dpgcli.states.designs import choices, design_states
-from dpgcli.states.metrics import DESIGN_COLUMNS
 from dpgcli.states.rows import Columns
+from dpgcli.sweeps.designs import choices, design_states
+from dpgcli.sweeps.expressions import Expression
+from dpgcli.sweeps.metrics import DESIGN_COLUMNS
+from dpgcli.sweeps.space import Space
 
 Numbers = NDArray[Any]
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.errors import UsageError
-from dpgcli.exploration.executors import chunked
-from dpgcli.files.spec.models import MAX_UNITS
-from dpgcli.files.sweep import Sweep
-from dpgcli.files.sweep.space import UNITS
+from dpgcli.files.scene_file.models import MAX_UNITS
+from dpgcli.files.sweep_file import Sweep
+from dpgcli.files.sweep_file.space import UNITS
 from dpgcli.states.costs import UNIT_STATE_SECONDS
 from dpgcli.states.patterns import MOST_SELECTED
+from dpgcli.sweeps.executors import chunked
 
 DESIGN_SECONDS = 3e-4  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts

@@ -13,9 +13,15 @@ import numpy as np
 
 import dpgcli
 from dpgcli.errors import WorkplaceError
-from dpgcli.exploration.executors import Workplace
+from dpgcli.sweeps.executors import Workplace
 
-NO_NUMBERS = ("accuracy", "cli", "report")  # parts of the package that no number passes through
+NO_NUMBERS = (
+    "benchmark",
+    "cli",
+    "reference",
+    "report",
+    "stress",
+)  # parts of the package that no number passes through
 
 
 class Maker(NamedTuple):

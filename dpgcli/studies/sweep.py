@@ -10,19 +10,19 @@ from pathlib import Path
 from time import perf_counter
 
 from dpgcli.errors import UsageError
-from dpgcli.exploration.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
+from dpgcli.files.scene_file import scene_of, spelled
 from dpgcli.files.seal import is_whole
-from dpgcli.files.spec import scene_of, spelled
-from dpgcli.files.sweep import Sweep
-from dpgcli.files.tables import SCHEMA_VERSION, read_metadata, versions, write_table
+from dpgcli.files.sweep_file import Sweep
+from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.differences import differences
 from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.studies.extent import Extent, size_text
 from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
+from dpgcli.sweeps.executors import Chunk, Runner, Workplace, chunked
 from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work

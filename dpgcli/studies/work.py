@@ -6,10 +6,10 @@ from io import BytesIO
 from time import process_time
 from typing import IO, NamedTuple
 
-from dpgcli.exploration.executors import Chunk
 from dpgcli.files.parts import PartStore, write_part
 from dpgcli.studies.evaluation import Evaluation, Numbers, Tables
 from dpgcli.studies.maker import Maker, check_maker
+from dpgcli.sweeps.executors import Chunk
 
 
 class Done(NamedTuple):

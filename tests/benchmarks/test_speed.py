@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.arrays import keep_freed_memory
-from dpgcli.files.tables import write_states
+from dpgcli.files.table_writer import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice

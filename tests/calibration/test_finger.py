@@ -14,7 +14,7 @@ from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
 from dpgcli.errors import FitError
 from dpgcli.files.known_states import read_states
-from dpgcli.files.spec import read_spec, scene_of
+from dpgcli.files.scene_file import read_spec, scene_of
 from dpgcli.mechanics.finger import Finger
 
 Fingers = Callable[..., Finger]

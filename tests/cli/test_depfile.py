@@ -11,7 +11,7 @@ import pytest
 
 from dpgcli.cli.depfile import write_depfile
 from dpgcli.errors import UsageError
-from dpgcli.files.sweep import read_sweep
+from dpgcli.files.sweep_file import read_sweep
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SPECIALS = "#$%:*?[]~!@^+-,'\"`<>{}()& é."

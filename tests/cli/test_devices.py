@@ -10,10 +10,10 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.errors import UsageError
-from dpgcli.files import reading
+from dpgcli.files import table_reader
 from dpgcli.files.parts import SAID, PartStore
-from dpgcli.files.reading import read_record, read_run, read_undamaged
-from dpgcli.files.tables import read_metadata
+from dpgcli.files.table_reader import read_record, read_run, read_undamaged
+from dpgcli.files.table_writer import read_metadata
 
 Call = Callable[..., Any]
 SWEEP = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\n"
@@ -136,9 +136,9 @@ def test_facts_have_a_bound(
 ) -> None:
     path = tmp_path / "run.json"
     path.write_text('{"rows": []}')
-    monkeypatch.setattr(reading, "MOST_FACTS", 12)
+    monkeypatch.setattr(table_reader, "MOST_FACTS", 12)
     assert reader(path) == {"rows": []}
-    monkeypatch.setattr(reading, "MOST_FACTS", 11)
+    monkeypatch.setattr(table_reader, "MOST_FACTS", 11)
     with pytest.raises(UsageError, match="larger than"):
         reader(path)
 

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.files.tables import read_metadata
+from dpgcli.files.table_writer import read_metadata
 
 Call = Callable[..., Any]
 SWEEP = """

@@ -12,11 +12,11 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from dpgcli.accuracy import stress as accuracy
-from dpgcli.accuracy.gauntlet import Case
-from dpgcli.accuracy.outcomes import STRESS_COLUMNS
-from dpgcli.accuracy.stress import Answer, Outcome, Verdict
 from dpgcli.cli.exits import ExitCode
+from dpgcli.stress import verdicts
+from dpgcli.stress.cases import Case
+from dpgcli.stress.table import STRESS_COLUMNS
+from dpgcli.stress.verdicts import Answer, Outcome, Verdict
 
 Call = Callable[..., Any]
 QUICK = ("--only", "mirror")
@@ -31,8 +31,8 @@ def overconfident(monkeypatch: pytest.MonkeyPatch) -> None:
         answer = honest(case)
         return replace(answer, tip_error=1e-6 * answer.tip_error)
 
-    honest = accuracy.answered
-    monkeypatch.setattr(accuracy, "answered", boastful)
+    honest = verdicts.answered
+    monkeypatch.setattr(verdicts, "answered", boastful)
 
 
 def test_the_built_in_cases_need_no_spec(call: Call) -> None:
@@ -130,8 +130,8 @@ def test_what_is_missed_by_a_guess_is_shown_and_no_failure(
         for outcome in all_right(cases):
             yield replace(outcome, verdict=Verdict.MISSED)
 
-    all_right = accuracy.stress
-    monkeypatch.setattr(accuracy, "stress", missing)
+    all_right = verdicts.stress
+    monkeypatch.setattr(verdicts, "stress", missing)
     result = call("stress", *QUICK)
     assert result.exit_code == ExitCode.DONE
     assert "Failures" not in result.stdout

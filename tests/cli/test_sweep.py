@@ -18,13 +18,13 @@ import pandas as pd
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.exploration.executors import Chunk
 from dpgcli.files.output import sole_use
-from dpgcli.files.sweep import read_sweep
-from dpgcli.files.tables import read_metadata
+from dpgcli.files.sweep_file import read_sweep
+from dpgcli.files.table_writer import read_metadata
 from dpgcli.studies.maker import HERE
 from dpgcli.studies.sweep import Study
 from dpgcli.studies.work import Work
+from dpgcli.sweeps.executors import Chunk
 
 HEIGHT = "finger.geometry.dome_height_mm"
 SEPARATION = "finger.geometry.unit_separation_mm"
@@ -282,7 +282,7 @@ def design_2_kills() -> Iterator[pytest.MonkeyPatch]:
     """Design 2 kills whatever worker it meets, until this is undone."""
     from concurrent.futures import BrokenExecutor
 
-    from dpgcli.exploration import executors
+    from dpgcli.sweeps import executors
 
     submit = executors.SerialExecutor.submit
 

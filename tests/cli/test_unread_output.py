@@ -22,7 +22,7 @@ BUFFERED: dict[str, str] = {}
 UNBUFFERED = {"PYTHONUNBUFFERED": "1"}
 KILLS = (
     "from concurrent.futures import BrokenExecutor as B\n"
-    "from dpgcli.exploration.executors import SerialExecutor as S\n"
+    "from dpgcli.sweeps.executors import SerialExecutor as S\n"
     "old = S.submit\n"
     "def broken(): raise B('killed')\n"
     "def submit(self, f, *a):\n"
@@ -30,12 +30,12 @@ KILLS = (
     "S.submit = submit"
 )
 FAILS = (
-    "from dpgcli.accuracy.stress import Outcome\nOutcome.is_failure = property(lambda self: True)"
+    "from dpgcli.stress.verdicts import Outcome\nOutcome.is_failure = property(lambda self: True)"
 )
 BREAKS = (
     ""
     "def broken(*_): raise BrokenPipeError('of a socket')\n"
-    "import dpgcli.files.spec as specs\n"
+    "import dpgcli.files.scene_file as specs\n"
     "specs.read_spec = broken"
 )
 FEW = (

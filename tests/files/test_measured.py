@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import SpecError
-from dpgcli.files import sheet
+from dpgcli.files import csv_file
 from dpgcli.files.measured import read_curve, read_moments, read_table
 
 DOME = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "elastic_modulus_MPa": 26.0}
@@ -82,7 +82,7 @@ def test_an_open_quote_is_no_cell(path: Path, text: str) -> None:
 
 
 def test_a_file_without_end_is_read_to_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sheet, "MAX_BYTES", 2**20)
+    monkeypatch.setattr(csv_file, "MAX_BYTES", 2**20)
     with pytest.raises(SpecError, match="/dev/zero: file: expected at most 1,024 KiB, found more"):
         read_moments(Path("/dev/zero"))
 

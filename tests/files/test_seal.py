@@ -1,4 +1,4 @@
-"""No damaged byte of a table is believed: seals, flipped bits, and what reads tables."""
+"""No damaged byte of a table is believed: seals, flipped bits, and what reads table_writer."""
 
 import random
 from collections.abc import Callable
@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import UsageError
-from dpgcli.files import tables
-from dpgcli.files.reading import read_designs, read_undamaged
+from dpgcli.files import table_writer
 from dpgcli.files.seal import HEAD, KEY, UNSEALED, is_whole, is_whole_in
-from dpgcli.files.tables import record_batch, schema, write_table
+from dpgcli.files.table_reader import read_designs, read_undamaged
+from dpgcli.files.table_writer import record_batch, schema, write_table
 from dpgcli.states.columns import Column, Group, Kind
 
 N_FLIPS = 1500
@@ -146,7 +146,7 @@ def test_the_content_hash_of_flags_is_that_of_their_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However they are cut into batches: bits before and after a slice do not count."""
-    monkeypatch.setattr(tables, "rows_at_once", lambda _: 2)
+    monkeypatch.setattr(table_writer, "rows_at_once", lambda _: 2)
     hashes = set()
     for cuts in ((0, 3), (0, 1, 3), (0, 2, 3)):
         batches = [

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from dpgcli.report.page import html, markdown, verdicts_markdown
-from dpgcli.report.requirements import check_requirements, requirement
+from dpgcli.sweeps.gate import check_requirements, requirement
 
 UNITS = {
     "height_mm": "mm",

@@ -6,8 +6,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.arrays import Flags
+from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.curve import spline

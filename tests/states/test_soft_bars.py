@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from dpgcli.accuracy.network import SpringNetwork
 from dpgcli.arrays import Array, Flags
+from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice

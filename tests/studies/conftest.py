@@ -6,10 +6,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dpgcli.exploration.executors import serial
-from dpgcli.files.sweep import read_sweep
+from dpgcli.files.sweep_file import read_sweep
 from dpgcli.studies import sweep as studies
 from dpgcli.studies.sweep import Study
+from dpgcli.sweeps.executors import serial
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 Make = Callable[..., Study]

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dpgcli.files.spec import read_spec, scene_of
+from dpgcli.files.scene_file import read_spec, scene_of
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 

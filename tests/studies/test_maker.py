@@ -10,9 +10,9 @@ import pytest
 
 import dpgcli
 from dpgcli.errors import UsageError, WorkplaceError
-from dpgcli.exploration.executors import Workplace, processes, serial
 from dpgcli.studies import sweep as studies
 from dpgcli.studies.maker import HERE, NO_NUMBERS, WHO, Maker, check_workers, code_of
+from dpgcli.sweeps.executors import Workplace, processes, serial
 
 PACKAGE = Path(dpgcli.__file__).parent
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7, 7.5]}"
@@ -20,8 +20,8 @@ OTHER = HERE._replace(code="f" * 64)
 EVALUATING = """
 import sys
 from pathlib import Path
-from dpgcli.exploration.executors import serial
-from dpgcli.files.sweep import read_sweep
+from dpgcli.sweeps.executors import serial
+from dpgcli.files.sweep_file import read_sweep
 from dpgcli.studies.sweep import Study
 Study(read_sweep(Path(sys.argv[1])), Path(sys.argv[2])).compute(serial(), lambda _: None)
 print(" ".join(name for name in sys.modules if name.startswith("dpgcli.")))
@@ -52,7 +52,7 @@ def test_a_module_under_another_name_is_other_code(package: Path) -> None:
 
 
 def test_work_on_what_is_printed_leaves_the_code_as_it_is(package: Path) -> None:
-    for name in ("cli/sweep.py", "report/summary.py", "accuracy/stress.py"):
+    for name in ("cli/sweep.py", "report/summary.py", "stress/verdicts.py"):
         (package / name).write_text("changed = True\n")
     assert code_of(package) == HERE.code
 

@@ -106,7 +106,7 @@ def scale_of(loss: Loss, scale: float | None) -> float | None:
 def geometry_from(values: list[str] | None, spec: Path | None) -> "Geometry | None":
     """The geometry that a fit holds at: that of a spec, with values changed or added."""
     from dpgcli.files.calibration import geometry_of
-    from dpgcli.files.spec import read_keys
+    from dpgcli.files.scene_file import read_keys
 
     base = None if spec is None else read_keys(spec).finger.geometry
     return geometry_of(values, base) if values else base

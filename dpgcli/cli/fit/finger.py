@@ -68,8 +68,8 @@ def finger(
     from dpgcli.files.calibration import DataFile, geometry_of
     from dpgcli.files.calibration.results import fitted
     from dpgcli.files.known_states import states_of
-    from dpgcli.files.spec import read_scene, scene_of
-    from dpgcli.files.spec.problems import checked as checked_spec
+    from dpgcli.files.scene_file import read_scene, scene_of
+    from dpgcli.files.scene_file.problems import checked as checked_spec
 
     document = read_scene(spec, settings or ())
     check_files((spec, data, *document.files), output, plot)

@@ -36,7 +36,7 @@ from dpgcli.files.sections import (
     expected_of,
     wrong_width,
 )
-from dpgcli.files.source import Document, parse_value, read_document
+from dpgcli.files.yaml_file import Document, parse_value, read_document
 
 __all__ = [
     "VERSION",

@@ -1,1 +1,0 @@
-"""Solved states measured against references that share no code with the solver."""

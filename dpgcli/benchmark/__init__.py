@@ -1,0 +1,1 @@
+"""Error against run time: benchmark methods, third-party minimizers, ablations."""

@@ -1,0 +1,333 @@
+"""Error against run time, on one finger: rows of one table, whatever was measured.
+
+Errors are those of tips, angles and energies against extended precision, over the patterns
+that have a state. Times are of one warm call in this process.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, keep_freed_memory
+from dpgcli.benchmark.ablation import check_kept, kept_ways
+from dpgcli.benchmark.methods import Found, Way, other_ways, ways
+from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
+from dpgcli.calibration.comparison import compare
+from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.scene import Scene
+from dpgcli.reference.equilibria import ExtendedStates, extended_states
+from dpgcli.states.certify import certify
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.plan import Request
+from dpgcli.states.predict import Prediction, predict
+from dpgcli.states.rows import Columns
+from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
+from dpgcli.stress.cases import check_law
+from dpgcli.stress.families import repeated
+
+MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
+PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
+BATCH = 4096  # states of a call, as in a sweep
+GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)
+TABLE_UNITS = 20  # of a finger all of whose states go into a Parquet file
+GROWTH_DESIGNS = (1, 4, 16, 64, 256, 1024)
+GROWTH_RATIOS = (1.0, 1e2, 1e4, 1e6, 1e9, 1e12, 1e15, math.inf)
+REFERENCE_DIGITS = 50
+
+Row = dict[str, Any]
+
+COLUMNS = (
+    Column("group", "", "what was varied", Group.STATES, Kind.TEXT),
+    Column("way", "", "how the states were found", Group.STATES, Kind.TEXT),
+    Column("n_units", "", "units of the finger", Group.STATES, Kind.COUNT),
+    Column("n_designs", "", "designs in a call", Group.STATES, Kind.COUNT),
+    Column("stiffness_ratio", "", "k_L over the largest k_b", Group.STATES),
+    Column("n_states", "", "states in a call", Group.STATES, Kind.COUNT),
+    Column("certified", "", "whether the way certifies what it finds", Group.STATES, Kind.FLAG),
+    Column("n_missing", "", "states not found, of those that exist", Group.STATES, Kind.COUNT),
+    Column("max_tip_error_mm", "mm", "largest error of a tip", Group.STATES),
+    Column("rms_tip_error_mm", "mm", "root mean square of the tips' errors", Group.STATES),
+    Column("max_angle_error_rad", "rad", "largest error of a tip angle", Group.STATES),
+    Column("rms_angle_error_rad", "rad", "root mean square of the angles' errors", Group.STATES),
+    Column("max_energy_error_mJ", "mJ", "largest error of an energy", Group.STATES),
+    Column("rms_energy_error_mJ", "mJ", "root mean square of the energies' errors", Group.STATES),
+    Column("bound_mm", "mm", "bound on the change of a tip, known before", Group.STATES),
+    Column("seconds", "s", "wall time of a call, median", Group.STATES),
+    Column("seconds_min", "s", "wall time of a call, smallest", Group.STATES),
+    Column("seconds_max", "s", "wall time of a call, largest", Group.STATES),
+    Column("cpu_seconds", "s", "CPU time of a call, median", Group.STATES),
+    Column("seconds_per_state", "s", "wall time of a call over its states", Group.STATES),
+    Column("relative_time", "", "shortest such time over a fixed NumPy kernel's", Group.STATES),
+    Column("peak_MiB", "MiB", "largest memory allocated in a call", Group.STATES),
+)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What to measure: a scene, how often, with what put back, beside what data.
+
+    `target_error` (mm) is that of the plan from which something is put back.
+    `known` tips lie in a `frame` of their own. `write` writes a prediction as a table; where it is
+    not given, that is not measured.
+    """
+
+    scene: Scene
+    repeats: int
+    keep: tuple[str, ...] = ()
+    target_error: float | None = None
+    known: KnownStates | None = None
+    frame: Frame = field(default_factory=Frame)
+    write: Callable[[Prediction, Path], None] | None = None
+
+    @property
+    def finger(self) -> Finger:
+        return self.scene.finger
+
+    def check(self) -> None:
+        """Raise UsageError for a law that has no reference, and what makes no sense."""
+        check_law(self.finger)
+        check_exactness(DEFAULT_TOLERANCE, self.target_error)
+        for name in self.keep:
+            check_kept(self.scene, name, self.target_error)
+
+    def rows(self) -> Iterator[Row]:
+        """Measure, group by group, a row at a time."""
+        keep_freed_memory()
+        kernel = numpy_kernel()
+        for row in self._measured():
+            yield {**_blank(), **row, "relative_time": _relative(row, kernel, self.repeats)}
+
+    def _measured(self) -> Iterator[Row]:
+        patterns = chosen_patterns(self.finger.n_units)
+        reference = extended_states(self.finger, patterns, digits=REFERENCE_DIGITS)
+        yield from self._ladder(patterns, reference)
+        yield from self._alone(patterns, reference)
+        if not self.finger.is_rigid:
+            most = max(1, PEER_STATES // math.ceil(self.finger.n_units / MANY_UNITS))
+            few = slice(None, None, -(-patterns.shape[1] // most))
+            for way in other_ways(self.finger, patterns[:, few]):
+                yield self._row(way, _only(reference, few))
+        if self.known is not None:
+            yield self._model_error(self.known)
+        yield from self._by_units()
+        if self.write is not None:
+            yield self._to_parquet(self.write)
+        yield from self._by_designs()
+        yield from self._by_stiffness()
+        for name in self.keep:
+            yield from self._kept(name)
+
+    def _ladder(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
+        """The package's ways in a batch as large as those of a sweep."""
+        n_copies = max(1, BATCH // patterns.shape[1])
+        tiled = np.tile(patterns, (1, n_copies))
+        for way in ways(self.finger, tiled):
+            yield self._row(way, reference)
+
+    def _alone(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
+        """The same for this finger's states only."""
+        for way in ways(self.finger, patterns):
+            yield self._row(way._replace(group="one finger"), reference)
+
+    def _row(self, way: Way, reference: ExtendedStates) -> Row:
+        found = way.run()
+        n_states = reference.energy.shape[0]
+        first = Found(found.pose[:, :n_states], found.energy[:n_states])
+        return {
+            **self._facts(way.group, way.name, way.n_states),
+            "certified": way.certifies,
+            **errors(first, reference),
+            **_times(measured(way.run, self.repeats), way.n_states),
+        }
+
+    def _facts(self, group: str, way: str, n_states: int, finger: Finger | None = None) -> Row:
+        finger = finger or self.finger
+        ratio = finger.linear_stiffness.max() / finger.bistable_stiffness.max()
+        return {
+            "group": group,
+            "way": way,
+            "n_units": finger.n_units,
+            "n_designs": 1,
+            "stiffness_ratio": float(ratio),
+            "n_states": n_states,
+        }
+
+    def _model_error(self, known: KnownStates) -> Row:
+        """The lattice's own error: its states beside those that were given."""
+        found = compare(self.finger, known, self.frame)
+        is_state = np.isfinite(found.states.pose[0])
+        distance = found.distance[np.isfinite(found.distance)]
+        angle = np.abs(found.tip_angle[np.isfinite(found.tip_angle)])
+        return {
+            **self._facts("model", "lattice against the data given", len(is_state)),
+            "n_missing": int((~is_state).sum()),
+            "max_tip_error_mm": _largest(distance),
+            "rms_tip_error_mm": _rms(distance),
+            "max_angle_error_rad": _largest(angle),
+            "rms_angle_error_rad": _rms(angle),
+        }
+
+    def _by_units(self) -> Iterator[Row]:
+        """All 2^n states of fingers that repeat this one's units, as `predict` finds them."""
+        for n_units in GROWTH_UNITS:
+            finger = repeated(self.finger, n_units)
+            scene = Scene(finger, ())
+
+            def whole(scene: Scene = scene) -> None:
+                for _ in predict(scene, Request(columns=("states",))).blocks():
+                    pass
+
+            method = predict(scene, Request(columns=("states",))).plan.method.value
+            yield {
+                **self._facts("units", method, 2**n_units, finger),
+                **_times(measured(whole, self.repeats), 2**n_units),
+                "peak_MiB": peak_bytes(whole) / 2**20,
+            }
+
+    def _by_designs(self) -> Iterator[Row]:
+        """Designs that all differ, by 1 % in their strokes."""
+        patterns = chosen_patterns(self.finger.n_units)
+        for n_designs in GROWTH_DESIGNS:
+            finger = varied(self.finger, n_designs)
+            lanes = np.repeat(np.arange(n_designs), patterns.shape[1])
+            inverted = np.tile(patterns, n_designs)
+
+            def whole(finger: Finger = finger, lanes: Any = lanes, on: Flags = inverted) -> None:
+                units = Units.of(finger).designs(lanes)
+                batch = solve(units, Chain, on, DEFAULT_TOLERANCE)
+                certify(batch, units, DEFAULT_TOLERANCE)
+                tip(batch, with_compliance=True)
+
+            yield {
+                **self._facts("designs", "chain, all designs differ", len(lanes)),
+                "n_designs": n_designs,
+                **_times(measured(whole, self.repeats), len(lanes)),
+                "peak_MiB": peak_bytes(whole) / 2**20,
+            }
+
+    def _by_stiffness(self) -> Iterator[Row]:
+        """Bars from as soft as the springs to rigid, in both formulations."""
+        n_units = min(self.finger.n_units, 3)
+        patterns = chosen_patterns(n_units)
+        for ratio in GROWTH_RATIOS:
+            short = repeated(self.finger, n_units)
+            finger = short.with_bars(ratio * float(short.bistable_stiffness.max()))
+            reference = extended_states(finger, patterns, digits=REFERENCE_DIGITS)
+            wanted = (f"chain, {DEFAULT_TOLERANCE:g}", f"lattice, {DEFAULT_TOLERANCE:g}")
+            for way in ways(finger, patterns):
+                if way.name in wanted:
+                    yield {
+                        **self._row(way, reference),
+                        **self._facts("stiffness", way.name, way.n_states, finger),
+                        "peak_MiB": peak_bytes(way.run) / 2**20,
+                    }
+
+    def _to_parquet(self, write: Callable[[Prediction, Path], None]) -> Row:
+        """All states of a long finger, computed, certified and written to a file."""
+        finger = repeated(self.finger, TABLE_UNITS)
+
+        with TemporaryDirectory() as folder:
+
+            def whole() -> None:
+                write(predict(Scene(finger, ())), Path(folder) / "states.parquet")
+
+            times = measured(whole, self.repeats)
+        n_states = 2**TABLE_UNITS
+        way = "predicted into a Parquet file"
+        return {**self._facts("units", way, n_states, finger), **_times(times, n_states)}
+
+    def _kept(self, name: str) -> Iterator[Row]:
+        """The scene as planned, and with one thing put back that the plan leaves out."""
+        for way in kept_ways(self.scene, name, self.target_error):
+            yield {
+                **self._facts("kept", way.name, way.n_states),
+                **_times(measured(way.run, self.repeats), way.n_states),
+                "max_tip_error_mm": way.change,
+                "bound_mm": way.bound,
+                "peak_MiB": peak_bytes(way.run) / 2**20,
+            }
+
+
+def errors(found: Found, reference: ExtendedStates) -> Row:
+    """Errors of what was found, over the states that exist."""
+    exists = reference.is_minimum & reference.in_pattern
+    is_found = np.isfinite(found.pose).all(axis=0)
+    both = exists & is_found
+    pose = (found.pose - reference.pose)[:, both].astype(float)
+    energy = np.abs((found.energy - reference.energy)[both].astype(float))
+    distance, angle = np.hypot(pose[0], pose[1]), np.abs(pose[2])
+    return {
+        "n_missing": int((exists & ~is_found).sum()),
+        "max_tip_error_mm": _largest(distance),
+        "rms_tip_error_mm": _rms(distance),
+        "max_angle_error_rad": _largest(angle),
+        "rms_angle_error_rad": _rms(angle),
+        "max_energy_error_mJ": _largest(energy),
+        "rms_energy_error_mJ": _rms(energy),
+    }
+
+
+def chosen_patterns(n_units: int) -> Flags:
+    """All patterns, or as many, evenly spread, as the reference can solve in some seconds."""
+    most = min(MOST_STATES, max(4, MOST_UNITS_SOLVED // n_units))
+    if 2**n_units <= most:
+        return inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units)
+    last = 2**n_units - 1
+    codes = [last * place // (most - 1) for place in range(most)]
+    return inverted_units(np.array(codes, dtype=np.uint64), n_units)
+
+
+def varied(finger: Finger, n_designs: int) -> Finger:
+    """Designs whose strokes differ by up to 1 %."""
+    factors = np.linspace(0.99, 1.01, n_designs)
+    return finger.changed(stroke=finger.stroke * factors)
+
+
+def _only(reference: ExtendedStates, few: slice) -> ExtendedStates:
+    return ExtendedStates(*(values[..., few] for values in vars(reference).values()))
+
+
+def _blank() -> Row:
+    empty: dict[Kind, Any] = {Kind.TEXT: "", Kind.COUNT: 0, Kind.FLAG: False}
+    return {column.name: empty.get(column.kind, math.nan) for column in COLUMNS}
+
+
+def _relative(row: Row, kernel: Callable[[], object], repeats: int) -> float:
+    """The shortest time of a state over that of the kernel, measured next to each other."""
+    if "seconds_min" not in row:
+        return math.nan
+    return float(row["seconds_min"] / row["n_states"] / measured(kernel, repeats).wall_min)
+
+
+def _times(times: Times, n_states: int) -> Row:
+    return {
+        "seconds": times.wall,
+        "seconds_min": times.wall_min,
+        "seconds_max": times.wall_max,
+        "cpu_seconds": times.cpu,
+        "seconds_per_state": times.wall / n_states,
+    }
+
+
+def as_columns(rows: Sequence[Row]) -> Columns:
+    """Rows as the columns of one table."""
+    return {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS}
+
+
+def _largest(values: Array) -> float:
+    return float(values.max()) if len(values) else math.nan
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan

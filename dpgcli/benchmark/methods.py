@@ -1,0 +1,119 @@
+"""Ways to the same states, from the cheapest to the most exact, and beside them what else there is.
+
+Every way starts from the finger's parameters, or from one common shape where it searches, and
+gives tips and energies of given patterns; `missing` are those it found no state for.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, total
+from dpgcli.benchmark.network import SpringNetwork
+from dpgcli.benchmark.peers import peers, tip_pose
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.formulation import Formulation, Internal
+from dpgcli.mechanics.lattice import Lattice
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.guess import geometric_guess, stroke_guess
+from dpgcli.states.rungs import DEFAULT_TOLERANCE, RUNGS
+from dpgcli.states.solve import solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
+
+PEERS_START = 1.0  # strokes: where the peers begin
+
+
+class Found(NamedTuple):
+    """Tips x, y (mm) and angle (rad), (3, state), energies (mJ), (state,), NaN if missing."""
+
+    pose: Array
+    energy: Array
+
+
+class Way(NamedTuple):
+    """One way; `run` gives what it finds. `n_states` are those that a run solves."""
+
+    name: str
+    group: str
+    run: Callable[[], Found]
+    n_states: int
+    certifies: bool = False
+
+
+def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
+    """Ways of the package to these patterns, (unit, state), of one finger."""
+    n_states = inverted.shape[1]
+
+    def way(name: str, run: Callable[[], Found], *, certifies: bool = True) -> Way:
+        return Way(name, "ladder", run, n_states, certifies)
+
+    rigid = finger.with_bars(np.inf)
+    yield way("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
+    if not finger.is_rigid:
+        name = "units looked up, poses composed"
+        yield way(name, lambda: _looked_up(finger, inverted), certifies=False)
+    for rung in RUNGS:
+        if rung.drops_bars and finger.is_rigid:
+            continue
+        used, name = (rigid, "chain, rigid bars") if rung.drops_bars else (finger, "chain")
+        tolerance = rung.tolerance
+        yield way(f"{name}, {tolerance:g}", _solver(used, inverted, Chain, tolerance))
+    if not finger.is_rigid:
+        lattice = _solver(finger, inverted, Lattice, DEFAULT_TOLERANCE)
+        yield way(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
+
+
+def other_ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
+    """What one would do without the package, state by state, each prepared for the finger."""
+    lattice, network = Lattice(finger), SpringNetwork.of(finger)
+    starts = lattice.coordinates(stroke_guess(finger, inverted, PEERS_START))
+    for peer in peers():
+        solve_one = peer.prepare(finger)
+
+        def run(solve_one: Callable[[Array], Array] = solve_one) -> Found:
+            nodes = np.stack([solve_one(start) for start in starts.T], axis=1)
+            return Found(tip_pose(nodes), np.array([network.energy(shape) for shape in nodes.T]))
+
+        yield Way(peer.name, "peer", run, inverted.shape[1])
+
+
+def _looked_up(finger: Finger, inverted: Flags) -> Found:
+    """Each unit's own well, with its bars' answer to first order, put together: no solve."""
+    units = Units.of(finger)
+    chain = Chain(finger)
+    shape = geometric_guess(finger, inverted, units.first_order)
+    coordinates = chain.coordinates(shape)
+    pose, _ = chain.tip(coordinates)
+    openings = chain.openings(coordinates)
+    energy = _energy(finger, shape, openings)
+    in_wells = (openings > units.wells.barrier) == inverted
+    is_there = (in_wells & (units.wells.exists | ~inverted)).all(axis=0)
+    return Found(np.where(is_there, pose, np.nan), np.where(is_there, energy, np.nan))
+
+
+def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
+    """Energy of a shape, mJ, (state,)."""
+    domes = finger.springs(openings)
+    corners = finger.hinge_stiffness * (shape.near_angle**2 + shape.far_angle**2)
+    energy = total(domes.energy + corners)
+    if finger.is_rigid:
+        return energy
+    bars = 0.5 * finger.linear_stiffness * (shape.chord**2 + shape.strut**2)
+    return energy + total(bars)
+
+
+def _solver(
+    finger: Finger, inverted: Flags, formulate: Callable[[Finger], Formulation], tolerance: float
+) -> Callable[[], Found]:
+    def run() -> Found:
+        units = Units.of(finger)
+        batch = solve(units, formulate, inverted, tolerance)
+        is_stable = certify(batch, units, tolerance) == Status.STABLE
+        pose = tip(batch, with_compliance=False).pose
+        energy = np.asarray(sum(batch.equilibrium.energies.values()))
+        return Found(np.where(is_stable, pose, np.nan), np.where(is_stable, energy, np.nan))
+
+    return run

@@ -1,1 +1,0 @@
-"""Parameter spaces, executors and sweeps; knows no mechanics."""

@@ -1,0 +1,102 @@
+"""The spec of a scene: read and checked, turned into a scene, and written for other programs."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from dpgcli.files.scene_file.models import Spec
+from dpgcli.files.scene_file.problems import checked, checked_keys
+from dpgcli.files.scene_file.references import recalibrated, with_calibrations
+from dpgcli.files.scene_file.scenes import scene_of
+from dpgcli.files.scene_file.settings import changed, with_settings
+from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.mechanics.scene import Scene
+
+__all__ = [
+    "Spec",
+    "canonical",
+    "canonical_json",
+    "checked",
+    "json_schema",
+    "read_keys",
+    "read_scene",
+    "read_spec",
+    "recalibrated",
+    "scene_of",
+    "spelled",
+    "starter",
+    "variant",
+]
+
+
+def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
+    """Read and check a spec; "-" reads standard input.
+
+    `settings` are "key.path=value" texts that change the file's data before it is checked.
+    Raises SpecError with all problems at once, those of content after those of form are mended.
+    """
+    return checked(read_scene(path, settings))
+
+
+def read_keys(path: str | Path, settings: Sequence[str] = ()) -> Spec:
+    """Read a spec key by key: rules between keys wait, and calibrations need not exist yet.
+
+    For what comes before them in the making: finite elements, fits. Raises SpecError.
+    """
+    return checked_keys(with_settings(read_document(path), settings))
+
+
+def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
+    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    folder = Path() if str(path) == "-" else Path(path).parent
+    return with_calibrations(with_settings(read_document(path), settings), folder)
+
+
+def variant(data: Mapping[str, Any], changes: Mapping[str, float]) -> Scene:
+    """The scene of a spec's plain data with some keys ("a.b.c") changed.
+
+    Raises SpecError where the changed spec is wrong.
+    """
+    document = changed(Document("design", dict(data), {}), changes)
+    try:
+        return scene_of(Spec.model_validate(document.data))
+    except ValidationError:
+        return scene_of(checked(document))
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of a spec, for editors."""
+    schema = Spec.model_json_schema()
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dpg spec"}
+    return {**schema, **head}
+
+
+def canonical_json(spec: Spec) -> str:
+    """One line of JSON, the same for specs that say the same; infinity is the text ".inf"."""
+    plain = canonical(spec.model_dump(exclude_none=True))
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def starter() -> str:
+    """A commented spec to start from."""
+    text = resources.files("dpgcli.files.scene_file").joinpath("starter.yaml")
+    return text.read_text(encoding="utf-8")
+
+
+def canonical(value: Any) -> Any:
+    """Data as strict JSON can say them: infinity is the text ".inf", negative zero is zero."""
+    if isinstance(value, dict):
+        return {key: canonical(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [canonical(item) for item in value]
+    return spelled(value) if isinstance(value, float) else value
+
+
+def spelled(value: float) -> float | str:
+    """A number as JSON can say it: infinity is the text ".inf" or "-.inf", as in a spec."""
+    return str(value).replace("inf", ".inf") if math.isinf(value) else value + 0.0

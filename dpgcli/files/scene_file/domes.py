@@ -1,0 +1,114 @@
+"""Which law the domes of a spec follow, and the curve behind it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.files.calibration.models import Calibration, Curve
+from dpgcli.files.scene_file.rules import (
+    BISTABLE_STIFFNESS,
+    DERIVATIONS,
+    FORCE_LINEARITY,
+    STROKE,
+    Derivation,
+    Issue,
+    sizes_of,
+)
+from dpgcli.mechanics.curve import FEWEST_POINTS, bridged, spline
+from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+
+WHERE = ("finger", "law")
+HINT = "dpg fit bistable writes one"
+NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
+
+
+@dataclass(frozen=True)
+class Domes:
+    """How domes answer, and by which rules their values come about.
+
+    `calibration` has the curve, if there is one. `travel` is that of the inverted dome at rest
+    (mm), at a dome height of `height` (mm, if it is known), for domes with a travel of their own;
+    else 0.
+    """
+
+    law: Law
+    derivations: tuple[Derivation, ...]
+    calibration: Calibration | None = None
+    travel: float = 0.0
+    height: float | None = None
+
+    def carries(self, key: str, calibration: object) -> bool:
+        """Whether an error of a file's value is one of the finger.
+
+        What normalizes the file's own curve cancels: the curve is as it is.
+        """
+        return calibration is not self.calibration or key not in NORMALS
+
+    def travel_at(self, height: float | None) -> float:
+        """Travel of an inverted dome of another height, which it grows with (finite elements)."""
+        if self.height is None or height is None:
+            return self.travel
+        return self.travel * height / self.height
+
+
+def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Domes | Issue:
+    """The law that a spec names, with the first curve among its calibrations."""
+    if law in (None, "published"):
+        return Domes(PUBLISHED, DERIVATIONS)
+    curves = (c for c in calibrations if isinstance(c, Calibration) and c.curve is not None)
+    calibration = next(curves, None)
+    if law == "push_only" and calibration is None:
+        return Domes(PushOnly(PUBLISHED), DERIVATIONS)
+    if calibration is None or calibration.curve is None:
+        return Issue(WHERE, "a calibration with a curve beside law: tabulated", "none", HINT)
+    if len(calibration.curve.travel_mm) < FEWEST_POINTS:
+        found = f"{len(calibration.curve.travel_mm)} in {calibration.file}"
+        return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
+    stiffness, stroke = (calibration.fitted(d.key) for d in (BISTABLE_STIFFNESS, STROKE))
+    if stiffness is None or stroke is None:
+        expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
+        return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
+    if law == "tabulated":
+        return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
+    return _pushing(calibration, calibration.curve, stiffness.value)
+
+
+def _no_well(calibration: Calibration) -> Issue:
+    return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+
+
+def _tabulated(
+    calibration: Calibration, curve: Curve, stiffness: float, stroke: float
+) -> Domes | Issue:
+    factor = curve.opening_per_travel
+    shape = spline(*_points(curve, stroke / factor, stiffness * stroke**2))
+    if not np.isfinite(shape.rests[1]):
+        return _no_well(calibration)
+    rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return Domes(Tabulated(shape), rules, calibration)
+
+
+def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes | Issue:
+    travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
+    if not np.isfinite(travel):
+        return _no_well(calibration)
+    height = sizes_of(calibration.geometry).get("dome_height_mm")
+    shape = spline(*_points(curve, travel, stiffness * travel**2))
+    domes = Domes(PushOnly(Tabulated(shape)), (), calibration, travel, height)
+    stroke = replace(
+        STROKE,
+        value=lambda height, separation: domes.travel_at(height) - height - separation,
+        rule="travel of the inverted dome - dome height - unit separation (contact)",
+        not_from=calibration,
+    )
+    rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return replace(domes, derivations=tuple(rules))
+
+
+def _points(curve: Curve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
+    """Travels and energies over a travel and an energy, from rest on, gaps bridged."""
+    travels, energies = np.array(curve.travel_mm), np.array(curve.energy_mJ)
+    if travels[0] > 0.0:
+        travels, energies = (np.concatenate(([0.0], values)) for values in (travels, energies))
+    travels, energies = bridged(travels, energies, curve.unsampled_mm)
+    return tuple((travels / travel).tolist()), tuple((energies / energy).tolist())

@@ -1,0 +1,196 @@
+"""From data to a checked spec: every mistake located, worded and given a hint."""
+
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import ValidationError
+
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.places import KeyPath, dotted, in_order, shown
+from dpgcli.files.scene_file.models import (
+    MAX_UNITS,
+    FingerSpec,
+    GripperSpec,
+    Spec,
+    UnitOverride,
+)
+from dpgcli.files.scene_file.scenes import chamber_issues, early_issues, issues, unit_range
+from dpgcli.files.sections import (
+    LARGEST,
+    SMALLEST,
+    STIFFEST,
+    Geometry,
+    Lattice,
+    Section,
+    UnitGeometry,
+    UnitLattice,
+    expected_of,
+)
+from dpgcli.files.yaml_file import Document
+
+SECTIONS: dict[KeyPath, type[Section]] = {
+    (): Spec,
+    ("finger",): FingerSpec,
+    ("finger", "geometry"): Geometry,
+    ("finger", "lattice"): Lattice,
+    ("finger", "overrides", "*"): UnitOverride,
+    ("finger", "overrides", "*", "geometry"): UnitGeometry,
+    ("finger", "overrides", "*", "lattice"): UnitLattice,
+    ("gripper",): GripperSpec,
+}
+
+SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
+    *UnitGeometry.model_fields,
+    *UnitLattice.model_fields,
+}
+
+OWN = {
+    "units": f"a whole number from 1 to {MAX_UNITS}",
+    "calibration": '"published", the name of a calibration file, or a list of these',
+    "law": '"published", "tabulated" or "push_only"',
+    "mounting_angle_deg": "an angle from -90 to 90 in degrees",
+}
+
+HINTS = {
+    "units": "a whole number without quotes or decimal point",
+    "stroke_mm": "stroke is dome height minus unit separation",
+    "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+    "chamber_width_mm": "chamber width is unit cell minus 2 mm",
+    "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
+    "segment_height_mm": "half the chamber width + half the limiting layer",
+}
+
+CALIBRATION: KeyPath = ("finger", "calibration")
+TEXTS = ("calibration", "law")
+BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
+OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
+
+
+def checked(document: Document) -> Spec:
+    """The spec in a document. Raises SpecError with every problem of the document.
+
+    Rules between keys are applied once each key by itself is right.
+    """
+    spec, problems = _validated(document)
+    problems = [*document.problems, *problems]
+    found = early_issues(document.data) if spec is None or problems else issues(spec)
+    problems += [document.problem(*issue) for issue in found]
+    if spec is None or problems:
+        own_first = sorted(problems, key=lambda problem: problem.file != document.file)
+        raise SpecError(in_order(own_first))
+    return spec
+
+
+def checked_keys(document: Document) -> Spec:
+    """The spec in a document, each of whose keys is right by itself; raises SpecError.
+
+    Of the rules between keys, those of the geometry alone hold.
+    """
+    spec, problems = _validated(document)
+    if spec is not None:
+        problems = [document.problem(*issue) for issue in chamber_issues(spec.finger)]
+    if spec is None or problems or document.problems:
+        raise SpecError(in_order([*document.problems, *problems]))
+    return spec
+
+
+def _validated(document: Document) -> tuple[Spec | None, list[Problem]]:
+    """The spec if each key is right; what the reader reported already is not reported again."""
+    try:
+        return Spec.model_validate(document.data), []
+    except ValidationError as error:
+        known = {(p.line, p.column, p.key) for p in document.problems}
+        found = [_problem(document, e) for e in error.errors(include_url=False)]
+        return None, [p for p in found if (p.line, p.column, p.key) not in known]
+
+
+def _problem(document: Document, error: Any) -> Problem:
+    """One finding of the models as a problem with a place."""
+    path: KeyPath = error["loc"]
+    if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
+        path = CALIBRATION
+        error = {**error, "type": "", "input": _at(document.data, path)}
+    if error["type"] == "extra_forbidden":
+        return document.problem(path, *_unknown(path))
+    key = str(path[-1]) if path else "document"
+    found = "nothing" if error["type"] == "missing" else shown(error["input"])
+    return document.problem(path, _expected(path), found, _hint(key, error))
+
+
+def _at(data: Any, path: KeyPath) -> Any:
+    for part in path:
+        data = data[part]
+    return data
+
+
+def _expected(path: KeyPath) -> str:
+    key = str(path[-1]) if path else "document"
+    if _pattern(path) in SECTIONS or key == "overrides":
+        return "a section of keys"
+    return OWN.get(key, expected_of(key))
+
+
+def _hint(key: str, error: Any) -> str:
+    """What to do, by the kind of mistake before the kind of key."""
+    value = error["input"]
+    if error["type"] == "model_type":
+        return "keys below it, indented"
+    if isinstance(value, str) and key not in TEXTS:
+        return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS):
+        return OUT_OF_RANGE
+    return HINTS.get(key, "")
+
+
+def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
+    """Expected, found and hint if no spec can have a number at this path."""
+    if (
+        path[:2] == ("finger", "overrides")
+        and len(path) > 2
+        and min(unit_range(str(path[2])), default=0) < 1
+    ):
+        return "units such as 4 or 4-5", dotted(path), "count from the base"
+    parent, pattern = _pattern(path[:-1]), _pattern(path)
+    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS):
+        return "the key of a number", dotted(path), "name the number itself"
+    if parent not in SECTIONS:
+        known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]
+        units = str(path[2]) if len(path) > 2 else "*"
+        close = get_close_matches(dotted(path), [k.replace("*", units) for k in known], n=1)
+        return "a known key", dotted(path), f"did you mean {close[0]}?" if close else ""
+    if str(path[-1]) not in SECTIONS[parent].model_fields:
+        return _unknown(path)
+    return None
+
+
+def _unknown(path: KeyPath) -> tuple[str, str, str]:
+    """Expected, found and hint for a key that is not known where it stands."""
+    key, parent = str(path[-1]), _pattern(path[:-1])
+    known = list(SECTIONS[parent].model_fields)
+    if "overrides" in parent and key in SHARED:
+        why = "segment height is shared by neighboring units: set it for the whole finger"
+        return "keys that may differ between units", dotted((key,)), why
+    return "a known key", dotted((key,)), _nearest(key, known)
+
+
+def _nearest(key: str, known: list[str]) -> str:
+    """The key that was probably meant: here, else elsewhere, else all that are known here."""
+    if close := get_close_matches(key, known, n=1):
+        return f"did you mean {close[0]}?"
+    elsewhere = {
+        name: dotted((*section, name))
+        for section, model in reversed(SECTIONS.items())
+        if "*" not in section
+        for name in model.model_fields
+    }
+    if close := get_close_matches(key, list(elsewhere), n=1):
+        return f"did you mean {elsewhere[close[0]]}?"
+    return "known here: " + ", ".join(known)
+
+
+def _pattern(path: KeyPath) -> KeyPath:
+    """A key path with `*` for the units of an override."""
+    if path[:2] == ("finger", "overrides") and len(path) > 2:
+        return ("finger", "overrides", "*", *path[3:])
+    return path

@@ -1,0 +1,103 @@
+"""Calibration files that a spec names, read and put in the place of their names."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
+from dpgcli.files.content import quoted_if
+from dpgcli.files.places import KeyPath, shown
+from dpgcli.files.scene_file.rules import LINEAR_STIFFNESS, PUBLISHED
+from dpgcli.files.scene_file.settings import SETTING, changed
+from dpgcli.files.yaml_file import Document
+
+EXPECTED = '"published" or the name of a calibration file'
+KEY = ("finger", "calibration")
+
+
+def with_calibrations(document: Document, folder: Path) -> Document:
+    """The document with calibrations instead of their files' names, and those files.
+
+    Names are relative to the spec's folder, in `--set` to the current one. What is wrong in a
+    calibration joins the document's problems.
+    """
+    finger = document.data.get("finger")
+    said = finger.get("calibration") if isinstance(finger, dict) else None
+    if said is None or said == PUBLISHED:
+        return document
+    origin = Path() if document.place(KEY) == SETTING else folder
+    reader = _Reader(document, origin)
+    if isinstance(said, list):
+        value: Any = [reader.found((*KEY, place), part) for place, part in enumerate(said)]
+        if not said:
+            reader.wrong(KEY, "an empty list")
+    else:
+        value = reader.found(KEY, said)
+    if reader.problems:  # what is wrong with the values is said once the files are right
+        value = PUBLISHED
+    embedded = changed(document, {".".join(KEY): value})
+    problems = (*document.problems, *reader.problems)
+    return replace(embedded, problems=problems, files=tuple(reader.files))
+
+
+def recalibrated(document: Document, file: Path) -> Document:
+    """The document with a calibration's values in the place of its own, wherever it has them.
+
+    They come before its other calibrations, and its lattice sections lose what the file gives.
+    Raises SpecError with every problem of the file.
+    """
+    calibration = read_calibration(file).model_copy(update={"file": file.name})
+    finger = document.data["finger"]
+    said = finger.get("calibration")
+    before = said if isinstance(said, list) else [] if said is None else [said]
+
+    def without(section: dict[str, Any]) -> dict[str, Any]:
+        kept = (section.get("lattice") or {}).items()
+        return {**section, "lattice": {k: v for k, v in kept if not calibration.has(k)}}
+
+    changes = {**without(finger), "calibration": [calibration, *before]}
+    if calibration.has(LINEAR_STIFFNESS):
+        changes.pop(LINEAR_STIFFNESS, None)
+    overrides = finger.get("overrides") or {}
+    changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}
+    return replace(document, data={**document.data, "finger": changes})
+
+
+@dataclass
+class _Reader:
+    """Reads calibrations by name, or as a table keeps them; what is wrong gathers."""
+
+    document: Document
+    folder: Path
+    problems: list[Problem] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+    def wrong(self, path: KeyPath, found: str) -> None:
+        self.problems.append(self.document.problem(path, EXPECTED, found))
+
+    def found(self, path: KeyPath, said: object) -> object:
+        """The calibration that is said; "published" remains."""
+        try:
+            if isinstance(said, dict):
+                return calibration_in(self.document.section(path, said))
+            if isinstance(said, str) and said != PUBLISHED:
+                return self.named(path, said)
+        except SpecError as error:
+            self.problems += error.problems
+        if not isinstance(said, dict | str):
+            self.wrong(path, shown(said))
+        return said
+
+    def named(self, path: KeyPath, name: str) -> Calibration | None:
+        file = self.folder / name
+        try:
+            is_file = file.is_file()
+        except OSError:  # a name too long, a folder that is closed
+            is_file = False
+        if not is_file:
+            self.wrong(path, f"{shown(name)}: no such file")
+            return None
+        self.files.append(file)
+        with quoted_if(file, "calibration_version", "a calibration file of dpg fit"):
+            return read_calibration(file).model_copy(update={"file": file.name})

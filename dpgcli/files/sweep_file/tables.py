@@ -1,0 +1,122 @@
+"""Tables of designs, CSV or Parquet: their columns as numbers, none lost and none changed."""
+
+import csv
+import io
+import re
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from dpgcli.files.places import shown
+from dpgcli.files.table_reader import DAMAGED, undamaged
+
+LARGEST_WHOLE = 2**63 - 1
+PARQUET = b"PAR1"
+TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?\n)+")
+COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?\r?$", re.MULTILINE)
+UNREADABLE = (  # what pandas and pyarrow raise for content that is no table
+    OSError,
+    csv.Error,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    NotImplementedError,
+    pa.ArrowException,
+    pd.errors.ParserWarning,
+)
+
+
+def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFrame | None:
+    """The table in a file's content, None where there is no room; raises one of UNREADABLE.
+
+    An index with a name is a column like the others, as it was before it was made the index.
+    """
+    if not content.startswith(PARQUET):
+        rows = _csv(content)
+        return rows if has_room(*rows.shape) else None
+    file = undamaged(io.BytesIO(content))
+    if file is None:
+        raise ValueError(DAMAGED)
+    if not has_room(file.metadata.num_rows, file.metadata.num_columns):
+        return None
+    frame: pd.DataFrame = file.read().to_pandas()
+    is_named = any(name is not None for name in frame.index.names)
+    return frame.reset_index() if is_named else frame
+
+
+class NoTableError(ValueError):
+    """A file is no table: what was found, and a hint."""
+
+
+def _csv(content: bytes) -> pd.DataFrame:
+    """Comments leave empty lines, so that the others keep their numbers."""
+    if b"#" in content:
+        content = TOP.sub(lambda top: b"\n" * top[0].count(b"\n"), content)
+        content = COMMENT.sub(b"", content)
+    if b'"' in content:  # pandas reads "3"4 as 34
+        for _ in csv.reader(io.StringIO(content.decode("utf-8")), strict=True):
+            pass
+    with warnings.catch_warnings():  # rows that do not fit the header
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        try:
+            frame = pd.read_csv(io.BytesIO(content), index_col=False)
+        except (pd.errors.ParserError, pd.errors.ParserWarning):
+            _check_rows(content)
+            raise
+    if len(frame.columns) == 1:
+        _check_separator([str(frame.columns[0])])
+    return frame
+
+
+def _check_rows(content: bytes) -> None:
+    """Raise NoTableError for the first row that is longer than the header."""
+    rows = csv.reader(io.StringIO(content.decode("utf-8-sig")))
+    header = next(row for row in rows if row)
+    _check_separator(header)
+    for row in rows:
+        if len(row) > len(header):
+            found = f"{len(row)} cells in line {rows.line_num}"
+            raise NoTableError(found, f"the header has {len(header)}")
+
+
+def _check_separator(header: list[str]) -> None:
+    if len(header) == 1 and (foreign := [c for c in ";\t" if c in header[0]]):
+        hint = "separate them by commas, and write decimal points"
+        raise NoTableError(f"columns separated by {shown(foreign[0])}", hint)
+
+
+class Wrong(NamedTuple):
+    """What a column should have, what stands there instead, and a hint."""
+
+    expected: str
+    found: str
+    hint: str = ""
+
+
+def numbers_in(column: "pd.Series[Any]") -> NDArray[Any] | Wrong:
+    """The numbers of a column, whole ones as such; or what is wrong with the first."""
+    types = pd.api.types
+    if isinstance(column.dtype, pd.CategoricalDtype):
+        column = pd.Series(column.to_numpy())
+    is_number = types.is_numeric_dtype(column) and not types.is_bool_dtype(column)
+    if not is_number or types.is_complex_dtype(column):
+        numbers = pd.to_numeric(column.astype(str), errors="coerce").to_numpy(np.float64)
+    else:
+        numbers = column.to_numpy(np.float64, na_value=np.nan)
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if len(wrong) or not is_number:
+        row = int(wrong[0]) if len(wrong) else 0
+        found = f"{shown(str(column.iloc[row]))} in row {row + 1}"
+        return Wrong("finite numbers", found, "no text, no gaps")
+    if not types.is_integer_dtype(column):
+        return numbers
+    if column.max() > LARGEST_WHOLE:
+        row = int(column.to_numpy().argmax())
+        return Wrong("whole numbers below 2^63", f"{column.iloc[row]} in row {row + 1}")
+    return column.to_numpy(np.int64)

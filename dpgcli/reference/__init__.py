@@ -1,0 +1,1 @@
+"""Extended-precision equilibria: a reference that shares no code with the solver."""

@@ -1,0 +1,338 @@
+"""The energy of a finger in mpmath numbers, written from the model's definition.
+
+Of the package it shares nothing but the finger's parameters. The unknowns are the free nodes
+(B_1x, B_1y, T_1x, T_1y, B_2x, …) in mm, for rigid bars the corner angles (a_1, b_1, a_2, …) in
+rad. Unit i has the chord c = B_i − B_{i-1}, the top t = T_i − T_{i-1}, and the struts
+p = T_{i-1} − B_{i-1} (near) and q = T_i − B_i (far). Its corners open by a = ∠p − ∠c − π/2 and
+b = ∠c + π/2 − ∠q.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.reference.units import Unit
+
+if TYPE_CHECKING:
+    from mpmath import mpf
+
+
+Vector = tuple["mpf", "mpf"]
+Rate = dict[int, "mpf"]
+
+
+class Cell(NamedTuple):
+    """The vectors c, t, p and q of a unit."""
+
+    chord: Vector
+    top: Vector
+    near: Vector
+    far: Vector
+
+
+ENDS = Cell((-4, 0), (-2, 2), (-4, -2), (0, 2))  # x rows of what they join, from B_i's
+
+
+def cells(base: Sequence["mpf"], nodes: Sequence["mpf"]) -> Iterator[Cell]:
+    """The vectors of every unit by the nodes of the base station and the others."""
+    stations = [base, *(nodes[k : k + 4] for k in range(0, len(nodes), 4))]
+    for before, after in pairwise(stations):
+        yield Cell(
+            (after[0] - before[0], after[1] - before[1]),
+            (after[2] - before[2], after[3] - before[3]),
+            (before[2] - before[0], before[3] - before[1]),
+            (after[2] - after[0], after[3] - after[1]),
+        )
+
+
+def _dot(v: Vector, w: Vector) -> "mpf":
+    return v[0] * w[0] + v[1] * w[1]
+
+
+def cross(v: Vector, w: Vector) -> "mpf":
+    """The cross product of two plane vectors."""
+    return v[0] * w[1] - v[1] * w[0]
+
+
+def _left(v: Vector) -> Vector:
+    return -v[1], v[0]
+
+
+def _times(factor: "mpf", v: Vector) -> Vector:
+    return factor * v[0], factor * v[1]
+
+
+def _rates(vector: Vector) -> tuple[Vector, Vector]:
+    """Derivatives m/ℓ of a vector's direction and n/ℓ of log ℓ, n along it and m to the left."""
+    stretch = _times(1 / _dot(vector, vector), vector)
+    return _left(stretch), stretch
+
+
+def measured(vector: Vector) -> tuple["mpf", Vector]:
+    """Length and direction."""
+    from mpmath import sqrt
+
+    length = sqrt(_dot(vector, vector))
+    return length, _times(1 / length, vector)
+
+
+def corners(cell: Cell) -> Vector:
+    """The angles a and b."""
+    from mpmath import atan2
+
+    chord, near, far = cell.chord, cell.near, cell.far
+    a = atan2(-_dot(chord, near), cross(chord, near))
+    return a, atan2(_dot(chord, far), cross(chord, far))
+
+
+class Response(NamedTuple):
+    """A spring's energy, force and stiffness."""
+
+    energy: "mpf"
+    force: "mpf"
+    stiffness: "mpf"
+
+
+def linear(stiffness: "mpf", x: "mpf") -> Response:
+    """E = ½ k x²."""
+    return Response(stiffness * x * x / 2, stiffness * x, stiffness)
+
+
+def bistable(unit: Unit, x: "mpf") -> Response:
+    """E = ½ k_b x² [1 + β(u² − 2u)] with u = x/d and β = 1−α."""
+    u, softening, stiffness = x / unit.stroke, 1 - unit.linearity, unit.bistable
+    return Response(
+        stiffness * x * x * (1 + softening * (u * u - 2 * u)) / 2,
+        stiffness * x * (1 + softening * (2 * u * u - 3 * u)),
+        stiffness * (1 + 6 * softening * (u * u - u)),
+    )
+
+
+class Expansion:
+    """An energy with its gradient and Hessian, summed up element by element.
+
+    `band[i][k]` is the Hessian's entry (i, i−k).
+    """
+
+    def __init__(self, size: int, bandwidth: int) -> None:
+        from mpmath import mpf
+
+        self.energy = mpf(0)
+        self.gradient = [mpf(0)] * size
+        self.band = [[mpf(0)] * (min(row, bandwidth) + 1) for row in range(size)]
+
+    def add(self, response: Response, rate: Rate) -> None:
+        """Add a spring whose coordinate changes at `rate`; how the rate changes is extra."""
+        self.energy += response.energy
+        for row, slope in rate.items():
+            self.gradient[row] += response.force * slope
+        self.add_square(response.stiffness, rate)
+
+    def add_square(self, factor: "mpf", rate: Rate) -> None:
+        """Add factor · r rᵀ to the Hessian."""
+        for row, slope in rate.items():
+            scaled = factor * slope
+            for column, other in rate.items():
+                if column <= row:
+                    self.band[row][row - column] += scaled * other
+
+    def add_bend(self, factor: "mpf", first: Rate, second: Rate) -> None:
+        """Add factor · (r sᵀ + s rᵀ) to the Hessian."""
+        for row in first:
+            r, s = factor * first[row], factor * second[row]
+            for column in first:
+                if column <= row:
+                    self.band[row][row - column] += r * second[column] + s * first[column]
+
+
+def _spread(unit: int, *parts: tuple[Vector, Vector]) -> Rate:
+    """The rate by nodes of what has given slopes by vectors, (ends, slope) each."""
+    rate: Rate = {}
+    for (start, stop), slope in parts:
+        for axis in (0, 1):
+            for row, part in ((start, -slope[axis]), (stop, slope[axis])):
+                place = 4 * unit + row + axis
+                if place >= 0:  # the base is clamped
+                    rate[place] = rate.get(place, 0) + part
+    return rate
+
+
+@dataclass(frozen=True)
+class ElasticBars:
+    """The energy of a finger whose bars are springs; its unknowns are the nodes."""
+
+    units: list[Unit]
+
+    @property
+    def base(self) -> list["mpf"]:
+        return [0, 0, 0, self.units[0].height]
+
+    @property
+    def scale(self) -> "mpf":
+        """What an unknown's step is small against."""
+        return sum(unit.length for unit in self.units) + self.units[0].height
+
+    def unknowns(self, nodes: list["mpf"]) -> list["mpf"]:
+        return nodes
+
+    def nodes(self, unknowns: list["mpf"]) -> list["mpf"]:
+        return unknowns
+
+    def at(self, unknowns: list["mpf"]) -> Expansion:
+        """The energy at nodes, expanded along the ways of `moved`."""
+        expansion = Expansion(len(unknowns), bandwidth=7)
+        shape = list(cells(self.base, unknowns))
+        for i, (unit, cell) in enumerate(zip(self.units, shape, strict=True)):
+            _add_springs(expansion, i, unit, cell)
+            _add_corners(expansion, i, unit, cell)
+        _add_swings(expansion, shape)
+        return expansion
+
+    def boldness(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        """Strokes by which a step opens the unit that it opens most."""
+        strokes = []
+        changes = cells([0] * 4, step)
+        for unit, cell, change in zip(self.units, cells(self.base, unknowns), changes, strict=True):
+            turns = [_dot(_rates(v)[0], w) for v, w in zip(cell, change, strict=True)]
+            opening = max(abs(turns[2] - turns[0]), abs(turns[3] - turns[0]))
+            stretch = _dot(_rates(cell.top)[1], change.top)
+            strokes.append(opening * max(unit.height / unit.stroke, 1))
+            strokes.append(abs(stretch) * unit.length / unit.stroke)
+        return max(strokes)
+
+    def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
+        """Turn and stretch each bar at the step's rates: a straight way would stretch it too."""
+        x, y = self.base[:2]
+        nodes = []
+        for cell, change in zip(cells(self.base, unknowns), cells([0] * 4, step), strict=True):
+            chord, strut = _swung(cell.chord, change.chord), _swung(cell.far, change.far)
+            x, y = x + chord[0], y + chord[1]
+            nodes += [x, y, x + strut[0], y + strut[1]]
+        return nodes
+
+    def node_rates(self, unknowns: list["mpf"]) -> Array:
+        """Derivatives of the node coordinates by the unknowns, (4 n, size)."""
+        return np.eye(len(unknowns))
+
+
+def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
+    """Bars and dome, each with the Hessian K n nᵀ + (F/ℓ) m mᵀ by its vector ℓ n."""
+    laws = (
+        (ENDS.chord, cell.chord, unit.length, partial(linear, unit.bar)),
+        (ENDS.far, cell.far, unit.height, partial(linear, unit.bar)),
+        (ENDS.top, cell.top, unit.length, partial(bistable, unit)),
+    )
+    for ends, vector, rest, law in laws:
+        length, direction = measured(vector)
+        spring = law(length - rest)
+        across = _spread(i, (ends, _left(direction)))
+        expansion.add(spring, _spread(i, (ends, direction)))
+        expansion.add_square(spring.force / length, across)
+
+
+def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
+    """E = k_θ θ², θ = ∠s − ∠c − π/2, s either strut; ∠v bends by −(g hᵀ + h gᵀ), its `_rates`."""
+    a, b = corners(cell)
+    turn, stretch = _rates(cell.chord)
+    chord, along_chord = (_spread(i, (ENDS.chord, rate)) for rate in (turn, stretch))
+    for angle, ends, vector in ((a, ENDS.near, cell.near), (-b, ENDS.far, cell.far)):
+        corner = linear(2 * unit.hinge, angle)
+        rates = _rates(vector)
+        expansion.add(corner, _spread(i, (ends, rates[0]), (ENDS.chord, _times(-1, turn))))
+        expansion.add_bend(-corner.force, *(_spread(i, (ends, rate)) for rate in rates))
+        expansion.add_bend(corner.force, chord, along_chord)
+
+
+def _add_swings(expansion: Expansion, shape: list[Cell]) -> None:
+    """What the ways of `ElasticBars.moved` bend by, times the gradient: nothing at equilibrium.
+
+    A bar v that turns by ω and stretches by σ moves all beyond it by σω m − ½ω² v, m = v turned
+    to the left. Without this, forces out of balance hide how softly a long finger bends.
+    """
+    pull: Vector = (0, 0)
+    for i in reversed(range(len(shape))):
+        x, y, *top = expansion.gradient[4 * i : 4 * i + 4]
+        tip = (top[0], top[1])
+        pull = (pull[0] + x + tip[0], pull[1] + y + tip[1])
+        bars = ((ENDS.chord, shape[i].chord, pull), (ENDS.far, shape[i].far, tip))
+        for ends, vector, beyond in bars:
+            turn, stretch = (_spread(i, (ends, rate)) for rate in _rates(vector))
+            expansion.add_bend(cross(vector, beyond), turn, stretch)
+            expansion.add_square(-_dot(vector, beyond), turn)
+
+
+def _swung(vector: Vector, change: Vector) -> Vector:
+    """The vector turned and stretched at the rates of a change of it."""
+    from mpmath import cos, sin
+
+    turn, stretch = (_dot(rate, change) for rate in _rates(vector))
+    along, across = (1 + stretch) * cos(turn), (1 + stretch) * sin(turn)
+    return along * vector[0] - across * vector[1], across * vector[0] + along * vector[1]
+
+
+@dataclass(frozen=True)
+class RigidBars:
+    """The energy of a finger whose bars keep their lengths; its unknowns are the corner angles."""
+
+    units: list[Unit]
+    scale = 1
+
+    def unknowns(self, nodes: list["mpf"]) -> list["mpf"]:
+        base = ElasticBars(self.units).base
+        return [angle for cell in cells(base, nodes) for angle in corners(cell)]
+
+    def nodes(self, unknowns: list["mpf"]) -> list["mpf"]:
+        from mpmath import cos, sin
+
+        x, y, turned = 0, 0, 0
+        nodes = []
+        for unit, a, b in zip(self.units, unknowns[0::2], unknowns[1::2], strict=True):
+            direction = turned - a
+            turned = direction - b
+            x, y = x + unit.length * cos(direction), y + unit.length * sin(direction)
+            nodes += [x, y, x - unit.height * sin(turned), y + unit.height * cos(turned)]
+        return nodes
+
+    def at(self, unknowns: list["mpf"]) -> Expansion:
+        """With t = (L + H(sin a + sin b), H(cos b − cos a)), in the frame of the chord."""
+        from mpmath import cos, sin
+
+        expansion = Expansion(len(unknowns), bandwidth=1)
+        for i, unit in enumerate(self.units):
+            a, b = unknowns[2 * i : 2 * i + 2]
+            rise_near, rise_far = unit.height * sin(a), unit.height * sin(b)
+            lean_near, lean_far = unit.height * cos(a), unit.height * cos(b)
+            top = (unit.length + rise_near + rise_far, lean_far - lean_near)
+            length, n = measured(top)
+            spring = bistable(unit, length - unit.length)
+            slopes = {2 * i: (lean_near, rise_near), 2 * i + 1: (lean_far, -rise_far)}
+            across = {row: _dot(_left(n), slope) for row, slope in slopes.items()}
+            expansion.add(spring, {row: _dot(n, slope) for row, slope in slopes.items()})
+            expansion.add_square(spring.force / length, across)
+            bends = {2 * i: (-rise_near, lean_near), 2 * i + 1: (-rise_far, -lean_far)}
+            for (row, bend), angle in zip(bends.items(), (a, b), strict=True):
+                expansion.add(linear(2 * unit.hinge, angle), {row: 1})
+                expansion.add_square(spring.force * _dot(n, bend), {row: 1})
+        return expansion
+
+    def boldness(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        per_turn = [max(unit.height / unit.stroke, 1) for unit in self.units for _ in "ab"]
+        return max(abs(turn) * each for turn, each in zip(step, per_turn, strict=True))
+
+    def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
+        return [angle + turn for angle, turn in zip(unknowns, step, strict=True)]
+
+    def node_rates(self, unknowns: list["mpf"]) -> Array:
+        """An opening corner turns all that lies beyond it by −1 about its own station."""
+        n = len(self.units)
+        nodes = np.array(self.nodes(unknowns), float).reshape(n, 2, 1, 2)
+        stations = np.vstack((np.zeros((1, 2)), nodes[:, 0, 0]))
+        away = nodes - np.repeat(stations, 2, axis=0)[1:-1]
+        is_beyond = np.arange(n)[:, None] >= np.arange(2 * n) // 2
+        rates = np.stack((away[..., 1], -away[..., 0]), axis=2) * is_beyond[:, None, None]
+        return np.asarray(rates.reshape(4 * n, 2 * n))

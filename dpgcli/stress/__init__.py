@@ -1,0 +1,1 @@
+"""Hard cases, each decided by the extended-precision reference."""

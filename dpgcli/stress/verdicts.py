@@ -1,0 +1,234 @@
+"""Hold the solver's answers to hard cases against extended precision.
+
+The truth is what `extended` finds from the shape that the solver called stable, and, where it
+called none so, from a start of extended's own too.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.formulation import Formulation, Internal
+from dpgcli.mechanics.terms import evaluate
+from dpgcli.reference.equilibria import ExtendedStates, extended_states
+from dpgcli.states.certify import Batch, Status, certify
+from dpgcli.states.plan import FORMULATIONS
+from dpgcli.states.rungs import DEFAULT_TOLERANCE
+from dpgcli.states.solve import search, solve
+from dpgcli.states.tip import tip
+from dpgcli.states.units import Units
+from dpgcli.states.wells import inverted_wells
+from dpgcli.stress.cases import Case
+
+AT_FOLD = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
+FOLD_FACTOR = 4.0
+FAINT = 1e-6  # of a spring's stiffness: a curvature by nodes that may be called marginal
+LARGEST_CONDITION = 1.0 / np.finfo(float).eps  # what doubles can tell from infinity
+
+
+class Verdict(StrEnum):
+    """What an answer is worth, by extended precision."""
+
+    RIGHT = "right"
+    RECOGNIZED = "recognized"
+    NO_SUCH_STATE = "no such state"
+    MARGINAL = "marginal"
+    MISSED = "missed"
+    OVERCONFIDENT = "overconfident"
+    WRONG = "wrong"
+
+    @property
+    def meaning(self) -> str:
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Verdict.RIGHT: "called stable, and it is, with an error within the stated one",
+    Verdict.RECOGNIZED: "a minimum that is not the pattern's, and not called stable",
+    Verdict.NO_SUCH_STATE: "not called stable, and extended precision finds no such state either",
+    Verdict.MARGINAL: "refused as marginal; it is a minimum, but its curvature nearly vanishes",
+    Verdict.MISSED: "not called stable, though extended precision finds the state",
+    Verdict.OVERCONFIDENT: "called stable, and it is, but its error exceeds the stated one",
+    Verdict.WRONG: "called stable, but it is not",
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the solver says to a case, with lengths in mm.
+
+    `nodes` (4 n, 1) and `pose` (3,) are where the search ended, whatever its status;
+    `tip_error` (mm) and `angle_error` (rad) the errors that it states.
+    """
+
+    status: Status
+    reached: Flags
+    nodes: Array
+    pose: Array
+    tip_error: float
+    angle_error: float
+    residual: float
+    residual_floor: float
+    condition: float
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """An answer with its verdict, and its true errors (mm, rad), NaN where there is no truth."""
+
+    case: Case
+    answer: Answer
+    verdict: Verdict
+    true_tip_error: float
+    true_angle_error: float
+
+    @property
+    def is_failure(self) -> bool:
+        """Missing a state is a failure of the chain alone, and from its own guess alone."""
+        is_default = self.case.formulation == "chain" and self.case.has_own_guess
+        return self.verdict in _ALWAYS_FAIL or (self.verdict is Verdict.MISSED and is_default)
+
+
+_ALWAYS_FAIL = (Verdict.WRONG, Verdict.OVERCONFIDENT)
+
+
+def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
+    """Put cases to the solver and judge what it says; needs mpmath.
+
+    >>> from dpgcli.stress.cases import built_in_cases
+    >>> outcome = next(stress(built_in_cases(["scale"])))
+    >>> outcome.case.variant.label, outcome.verdict.value, outcome.true_tip_error < 1e-12
+    ('in m', 'right', True)
+    """
+    return (judged(case, answered(case)) for case in cases)
+
+
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of mechanisms
+def answered(case: Case) -> Answer:
+    """What the solver says, in the case's own units of length."""
+    scale = case.variant.scale
+    units = Units.of(scaled(case.variant.finger, scale))
+    batch = _batch(case, units)
+    at_tip = tip(batch, with_compliance=False)
+    stations = batch.formulation.stations(batch.equilibrium.coordinates)
+    floor, condition = _numerics(batch.formulation, batch.equilibrium.coordinates)
+    return Answer(
+        status=Status(certify(batch, units, DEFAULT_TOLERANCE)[0]),
+        reached=batch.reached,
+        nodes=np.stack(stations, axis=1).reshape(-1, 1) / scale,
+        pose=at_tip.pose[:, 0] / np.array([scale, scale, 1.0]),
+        tip_error=float(at_tip.error[0]) / scale,
+        angle_error=float(at_tip.angle_error[0]),
+        residual=float(batch.equilibrium.residual[0]),
+        residual_floor=floor,
+        condition=condition,
+        iterations=int(batch.equilibrium.iterations[0]),
+    )
+
+
+def scaled(finger: Finger, scale: float) -> Finger:
+    """The finger with lengths in another unit, `scale` of which are a mm; forces stay in N."""
+    lengths = ("segment_length", "segment_height", "stroke", "hinge_stiffness")
+    arrays = finger.arrays()
+    changes = {name: arrays[name] * scale for name in lengths}
+    changes |= {name: arrays[name] / scale for name in ("bistable_stiffness", "linear_stiffness")}
+    return finger.changed(**changes)
+
+
+def _batch(case: Case, units: Units) -> Batch:
+    """Where the search ends, from wherever the case begins it."""
+    start = case.variant.start
+    formulate = FORMULATIONS[case.formulation]
+    if start.corners is None:
+        strokes = start.strokes
+        return solve(units, formulate, case.inverted, DEFAULT_TOLERANCE, strokes=strokes)
+    formulation = formulate(units.finger)
+    rest = np.zeros((1, 1))
+    near, far = (np.full((1, 1), angle) for angle in start.corners)
+    guess = Internal(rest, near, far, rest)
+    at = formulation.coordinates(guess)
+    return search(units, formulation, case.inverted, at, DEFAULT_TOLERANCE)
+
+
+def _numerics(formulation: Formulation, coordinates: Array) -> tuple[float, float]:
+    """What rounding leaves of the residual (N), and the condition of the Hessian H.
+
+    Each coordinate q is stored to within ε/2 of itself, and evaluating as much again: ε |H| |q|.
+    The condition, in the 2-norm, is that of H scaled to a unit diagonal: of what no choice of
+    units for the coordinates can mend (van der Sluis 1969, to a factor of their number).
+    """
+    hessian = _dense(evaluate(formulation, coordinates).hessian)
+    if not np.isfinite(hessian).all():
+        return np.nan, np.inf
+    rounding = np.abs(hessian) @ np.abs(coordinates) / formulation.force_unit
+    own = np.sqrt(np.abs(np.diag(hessian)))
+    own[own == 0.0] = 1.0
+    condition = float(np.linalg.cond(hessian / own / own[:, None]))
+    return float(np.finfo(float).eps * rounding.max()), min(condition, LARGEST_CONDITION)
+
+
+def _dense(band: Array) -> Array:
+    """The full matrix of a band of one lane."""
+    size = band.shape[1]
+    full = np.zeros((size, size))
+    for depth in range(min(len(band), size)):
+        columns = np.arange(size - depth)
+        entries = band[depth, : size - depth, 0]
+        full[columns + depth, columns] = full[columns, columns + depth] = entries
+    return full
+
+
+def judged(case: Case, answer: Answer) -> Outcome:
+    """Hold an answer against extended precision."""
+    if answer.status != Status.STABLE:
+        return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)
+    truth = _next_to(case, answer)
+    off = np.abs(truth.pose[:, 0] - answer.pose)
+    tip_error, angle_error = float(np.hypot(off[0], off[1])), float(off[2])
+    allowed = FOLD_FACTOR * answer.tip_error if _is_at_fold(case) else answer.tip_error
+    if not _is_state(truth):
+        verdict = Verdict.WRONG
+    else:
+        verdict = Verdict.RIGHT if tip_error <= allowed else Verdict.OVERCONFIDENT
+    return Outcome(case, answer, verdict, tip_error, angle_error)
+
+
+def _next_to(case: Case, answer: Answer) -> ExtendedStates:
+    """What extended precision finds from where the search ended."""
+    return extended_states(case.variant.finger, case.inverted, answer.nodes)
+
+
+def _is_state(truth: ExtendedStates) -> bool:
+    return bool(truth.is_minimum[0] and truth.in_pattern[0])
+
+
+def _refusal(case: Case, answer: Answer) -> Verdict:
+    """Whether there was a state to be found where none was called stable."""
+    if case.variant.start.corners is not None:
+        truth = _next_to(case, answer)
+        if truth.is_minimum[0] and not truth.in_pattern[0]:
+            return Verdict.RECOGNIZED
+        return Verdict.MISSED if _is_state(truth) else Verdict.NO_SUCH_STATE
+    truth = extended_states(case.variant.finger, case.inverted)
+    if answer.status in (Status.MARGINAL, Status.NOT_CONVERGED) and not _is_state(truth):
+        truth = _next_to(case, answer)
+    if not _is_state(truth):
+        return Verdict.NO_SUCH_STATE
+    is_faint = truth.min_eigenvalue[0] < FAINT * case.variant.finger.bistable_stiffness.max()
+    is_marginal = answer.status is Status.MARGINAL and is_faint
+    return Verdict.MARGINAL if is_marginal else Verdict.MISSED
+
+
+def _is_at_fold(case: Case) -> bool:
+    """Whether α is within 1e-8 of where, with rigid bars, an inverted unit loses its well."""
+    finger = case.variant.finger
+    below, above = (
+        inverted_wells(replace(finger, force_linearity=finger.force_linearity + by)).exists
+        for by in (-AT_FOLD, AT_FOLD)
+    )
+    return bool(((below != above) & case.inverted).any())

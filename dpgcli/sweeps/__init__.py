@@ -1,0 +1,1 @@
+"""Parameter spaces, executors, design metrics and requirements of sweeps."""

@@ -1,0 +1,111 @@
+"""The workers of a Dask cluster, and what to do while none of them answers."""
+
+import logging
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from dataclasses import dataclass, field
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+
+from dpgcli.errors import NoWorkerError
+from dpgcli.sweeps.executors import GO_ON, PERIOD, Workplace
+
+PATIENCE = 10  # s, for an answer of the scheduler
+SILENCE = 10  # s after which a word is said
+
+
+@dataclass
+class Watch:
+    """Says that workers are missing or silent, and gives up after `limit` seconds without any."""
+
+    name: str
+    n_workers: Callable[[], int]
+    limit: float
+    say: Callable[[str], None]
+    last_seen: float = field(default_factory=monotonic)
+    is_said: bool = False
+
+    def __call__(self, silence: float) -> None:
+        """Look for workers after so many seconds without a result; may raise NoWorkerError."""
+        n_workers = self.n_workers()
+        now = monotonic()
+        if n_workers:
+            self.last_seen = now
+        lonely = now - self.last_seen
+        if lonely > self.limit:
+            raise NoWorkerError(f"{self.name}: no worker for {lonely:.0f} s (--wait). {GO_ON}")
+        if (silence if n_workers else lonely) < SILENCE:
+            self.is_said = False
+        elif not self.is_said:
+            self.is_said = True
+            self.say(self._word(n_workers, silence))
+
+    def _word(self, n_workers: int, silence: float) -> str:
+        if not n_workers:
+            return f"{self.name}: no worker answers; waiting {self.limit:g} s for one (--wait)"
+        who = "its worker" if n_workers == 1 else f"any of its {n_workers} workers"
+        return f"{self.name}: nothing from {who} for {silence:.0f} s; waiting"
+
+
+def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Workplace:
+    """The workers of a Dask cluster.
+
+    Raises OSError where no scheduler answers, NoWorkerError where no worker comes within `limit`
+    seconds.
+    """
+    from distributed import KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is raised
+    name = f"the Dask cluster at {scheduler}"
+    client = _client(scheduler)
+    watch = Watch(name, lambda: len(_threads(client)), limit, say)
+    while not _threads(client):
+        watch(0.0)
+        sleep(PERIOD)
+    return Workplace(
+        name,
+        lambda _: client.get_executor(pure=False),
+        sum(_threads(client).values()),
+        is_local=False,
+        broken=(BrokenExecutor, KilledWorker),
+        lost=(CancelledError, CommClosedError),
+        ask=lambda question: _answers(client, question),
+        watch=watch,
+    )
+
+
+def _client(scheduler: str) -> Any:
+    """A client, made aside: a scheduler that takes the call and says nothing would hold it."""
+    from distributed import Client
+
+    coming: Future[Any] = Future()
+
+    def connect() -> None:
+        try:
+            coming.set_result(Client(scheduler, timeout=PATIENCE, set_as_default=False))
+        except Exception as error:
+            coming.set_exception(error)
+
+    Thread(target=connect, daemon=True).start()
+    return coming.result(2 * PATIENCE)
+
+
+def _threads(client: Any) -> dict[str, int]:
+    """Threads of each worker; none of a scheduler that does not answer."""
+    try:
+        found: dict[str, int] = client.nthreads(callback_timeout=PATIENCE)
+    except OSError:
+        return {}
+    return found
+
+
+def _answers(client: Any, question: Callable[[], Any]) -> dict[str, Any]:
+    """What each worker says; nothing of any while one is stopped."""
+    try:
+        found: dict[str, Any] = client.run(question, on_error="return", callback_timeout=PATIENCE)
+    except TimeoutError:
+        return {}
+    return found

@@ -1,0 +1,138 @@
+"""Many designs at once: all states of each in bounded blocks, and their metrics."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Codes, Indices
+from dpgcli.mechanics.finger import ARRAYS, Finger
+from dpgcli.mechanics.formulation import Formulation
+from dpgcli.mechanics.scene import Gripper, Scene
+from dpgcli.states.columns import Group
+from dpgcli.states.patterns import chunks, inverted_units
+from dpgcli.states.rows import Columns, Wanted, solved_rows
+from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
+from dpgcli.states.solve import lanes_at_once
+from dpgcli.states.units import Units
+from dpgcli.sweeps.metrics import Metrics
+
+ROWS_AT_ONCE = 2**15  # of one design
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Designs (by place) that take one rung, and the bound on their tips' error, mm."""
+
+    rung: Rung
+    places: Indices
+    bounds: Array
+
+
+def choices(scenes: Sequence[Scene], target_error: float) -> Iterator[Choice]:
+    """The cheapest rung of each design that is bounded by the target error (mm), by rung.
+
+    The scenes agree in the number of units and in having rigid bars.
+    """
+    bounds = error_bounds(Units.of(_stacked([scene.finger for scene in scenes])))
+    chosen = cheapest(bounds, target_error)
+    for index in np.unique(chosen):
+        places = np.flatnonzero(chosen == index)
+        yield Choice(RUNGS[index], places, bounds[index, places])
+
+
+class Block(NamedTuple):
+    """Rows of states of the designs at some places, equally many of each, design by design.
+
+    `metrics` has a row for each of these designs, and comes with their last states.
+    """
+
+    places: Indices
+    rows: Columns
+    metrics: Columns | None
+
+
+def design_states(
+    scenes: Sequence[Scene],
+    formulate: Callable[[Finger], Formulation],
+    tolerance: float,
+    groups: frozenset[Group],
+    *,
+    drops_bars: bool = False,
+) -> Iterator[Block]:
+    """All states of some designs, design by design, in blocks.
+
+    A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
+    depends on its number of units alone. The scenes agree in that, in having rigid bars and in
+    being grippers. If it drops the bars, the error of the tips includes what that costs.
+    """
+    units = Units.of(_stacked([scene.finger for scene in scenes]))
+    dropped = np.zeros(len(scenes))
+    if drops_bars:
+        dropped = bar_flexibility(units)
+        units = Units.of(units.finger.with_bars(np.inf))
+
+    def solved(designs: Indices, codes: Codes) -> Columns:
+        lanes = np.repeat(designs, len(codes))
+        inverted = np.tile(inverted_units(codes, n_units), len(designs))
+        wanted = Wanted(formulate, tolerance, groups, *_placement(scenes, lanes), dropped[lanes])
+        return solved_rows(_designs(units, lanes), inverted, wanted)
+
+    n_units = units.finger.n_units
+    size = lanes_at_once(n_units)
+    for designs in _design_batches(len(scenes), n_units):
+        metrics = Metrics(_designs(units, designs), len(designs))
+        for first in range(0, 2**n_units, ROWS_AT_ONCE):
+            n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
+            parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
+            rows = _joined(parts, drops_bars=drops_bars)
+            metrics.add(rows)
+            is_last = first + n_codes == 2**n_units
+            yield Block(designs, rows, metrics.columns() if is_last else None)
+
+
+def _designs(units: Units, index: Indices) -> Units:
+    """Units of the designs at `index`; what there is one design of stays one."""
+    return units.designs(index) if units.wells.exists.shape[1] > 1 else units
+
+
+def _joined(parts: Sequence[Columns], *, drops_bars: bool) -> Columns:
+    """Rows below each other; without bars stiffness would be wrong."""
+    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    if drops_bars:
+        rows |= {name: np.full_like(v, np.nan) for name, v in rows.items() if _is_stiffness(name)}
+    return rows
+
+
+def _is_stiffness(name: str) -> bool:
+    return name.startswith(("tip_stiffness", "tip_compliance"))
+
+
+def _stacked(fingers: Sequence[Finger]) -> Finger:
+    """Fingers as the designs of one batch."""
+    columns = {name: _side_by_side([getattr(f, name) for f in fingers]) for name in ARRAYS}
+    return fingers[0].changed(**columns)
+
+
+def _side_by_side(parts: list[Array]) -> Array:
+    rows = max(len(part) for part in parts)
+    repeated = (part if len(part) == rows else np.repeat(part, rows, axis=0) for part in parts)
+    return np.concatenate(list(repeated), axis=1)
+
+
+def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
+    size = max(1, lanes_at_once(n_units) >> n_units)
+    for first in range(0, n_designs, size):
+        yield np.arange(first, min(first + size, n_designs))
+
+
+def _placement(scenes: Sequence[Scene], lanes: Indices) -> tuple[Gripper | None, float | Array]:
+    """The gripper and the layer's thickness of each lane's design."""
+    grippers = [scene.gripper for scene in scenes if scene.gripper is not None]
+    thickness = np.array([scene.layer_thickness or 0.0 for scene in scenes])[lanes]
+    if not grippers:
+        return None, thickness
+    spacing = np.array([gripper.base_spacing for gripper in grippers])[lanes]
+    angle = np.array([gripper.mounting_angle for gripper in grippers])[lanes]
+    return Gripper(spacing, angle), thickness

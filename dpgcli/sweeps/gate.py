@@ -1,0 +1,138 @@
+"""Requirements on a table of designs: thresholds that every design has to meet."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+import pandas as pd
+
+from dpgcli.arrays import Flags, Indices
+from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
+from dpgcli.text import printable
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A design that does not meet a requirement, and what was found in it."""
+
+    design: int
+    values: dict[str, float]
+    found: dict[str, float]
+    status: str
+    reason: str
+
+    def __str__(self) -> str:
+        reason = " ".join(self.reason.split())
+        why = f"{self.status}: {reason}" if reason else _listed(self.found)
+        said = f"design {self.design} ({_listed(self.values)}): {why}"
+        return printable(said)  # in one line, whatever the table holds
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One requirement held against the designs; `rows` are those that fail it."""
+
+    designs: pd.DataFrame
+    requirement: Expression
+    n_checked: int
+    rows: Indices
+
+    @property
+    def is_met(self) -> bool:
+        return not len(self.rows)
+
+    def __str__(self) -> str:
+        if self.is_met:
+            return f"met: {self._text}: all {self.n_checked:,} designs"
+        return f"not met: {self._text}: {len(self.rows):,} of {self.n_checked:,} designs"
+
+    @property
+    def _text(self) -> str:
+        return printable(self.requirement.text)
+
+    def failures(self, limit: int | None = None) -> list[Failure]:
+        """The designs that fail, in the order of the table; at most `limit`."""
+        swept = swept_names(self.designs)
+        needed = [name for name in self.designs if name in self.requirement.names]
+        return [
+            Failure(
+                int(row["design"]),
+                {name: row[name] for name in swept},
+                {name: row[name] for name in needed},
+                row["status"],
+                row["reason"] or ("" if row["n_stable"] else "no stable state"),
+            )
+            for row in self.designs.iloc[self.rows[:limit]].to_dict("records")
+        ]
+
+
+def requirement(text: str, columns: Collection[str]) -> Expression:
+    """A threshold over columns of numbers, such as `reach_max_mm > 60 and n_stable == 32`.
+
+    Raises UsageError for what is no such threshold, with the nearest name for an unknown one.
+    """
+    try:
+        rule = expression(text)
+        for name in sorted(rule.names.difference(columns)):
+            nearest = get_close_matches(name, sorted(columns), n=1, cutoff=0.0)
+            raise UsageError(
+                f"--require {text!r}: no column {name} of numbers; the nearest is {nearest[0]}"
+            )
+        rule(dict.fromkeys(rule.names, 1.0))
+    except ExpressionError as error:
+        raise UsageError(f"--require {text!r}: {error}") from error
+    except (TypeError, ValueError, RecursionError) as error:
+        raise UsageError(f"--require {text!r}: cannot be evaluated") from error
+    if not rule.is_comparison:
+        raise UsageError(f"--require {text!r}: expected a comparison, found a number")
+    return rule
+
+
+def number_columns(designs: pd.DataFrame) -> list[str]:
+    """Columns that a requirement can name."""
+    return list(designs.select_dtypes(include=["number", "bool"]).columns)
+
+
+def swept_names(designs: pd.DataFrame) -> list[str]:
+    """Columns of the swept values: those between the design's number and its calibration."""
+    names = list(designs.columns)
+    return names[names.index("design") + 1 : names.index("calibration")]
+
+
+def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
+    """Numbers of the rows that do not meet a requirement; excluded designs are left aside.
+
+    A design without a stable state meets none, nor does one where a value is NaN or has none.
+    """
+    values = {name: designs[name].to_numpy() for name in rule.names}
+    met = designs["n_stable"].to_numpy() > 0
+    for column in values.values():
+        met &= ~np.isnan(column)
+    truth = np.broadcast_to(np.asarray(rule(values), float), len(designs))
+    met &= np.isfinite(truth) & (truth != 0.0)
+    return np.flatnonzero(~met & _in_question(designs))
+
+
+def check_requirements(
+    designs: pd.DataFrame, requirements: Sequence[Expression]
+) -> tuple[Verdict, ...]:
+    """Hold every requirement against every design that is not excluded.
+
+    Raises NothingSelectedError if none is left: an empty space meets every requirement.
+    """
+    n_checked = int(_in_question(designs).sum())
+    if not n_checked:
+        raise NothingSelectedError(
+            f"no design to check: the table has {len(designs):,}, all of them excluded"
+        )
+    return tuple(Verdict(designs, rule, n_checked, failing(designs, rule)) for rule in requirements)
+
+
+def _in_question(designs: pd.DataFrame) -> Flags:
+    return (designs["status"] != "excluded").to_numpy(bool)
+
+
+def _listed(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.8g}" for name, value in values.items())

@@ -1,0 +1,90 @@
+"""Every way to the states, against extended precision."""
+
+import numpy as np
+import pytest
+
+from dpgcli.benchmark.methods import other_ways, ways
+from dpgcli.benchmark.timing import measured, numpy_kernel, peak_bytes
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.reference.equilibria import extended_states
+from dpgcli.states.patterns import inverted_units
+
+PATTERNS = inverted_units(np.arange(8, dtype=np.uint64), 3)
+WORST = {  # mm
+    "rigid bars, unit by unit": 1e-3,
+    "units looked up, poses composed": 1e-7,
+    "chain, rigid bars, 1e-12": 1e-3,
+    "chain, 0.001": 1e-7,
+    "chain, 1e-06": 1e-7,
+    "chain, 1e-09": 1e-12,
+    "chain, 1e-12": 1e-12,
+    "lattice, 1e-12": 1e-11,
+}
+
+
+def finger(linear_stiffness: float, force_linearity: float = 0.043) -> Finger:
+    values = {**STUDY, "force_linearity": force_linearity}
+    return uniform_finger(3, **values, linear_stiffness=linear_stiffness)
+
+
+def test_errors_of_the_ladder() -> None:
+    reference = extended_states(finger(1e4), PATTERNS)
+    seen = {}
+    for way in ways(finger(1e4), PATTERNS):
+        found = way.run()
+        error = np.hypot(*(found.pose[:2] - reference.pose[:2]))
+        energy = np.abs(found.energy - reference.energy)
+        assert error.max() <= WORST[way.name], way.name
+        assert energy.max() <= 1e3 * WORST[way.name], way.name
+        seen[way.name] = float(error.max())
+    assert list(seen) == list(WORST)
+    assert seen["rigid bars, unit by unit"] > 1e-4, "dropping the bars must be seen"
+    assert seen["units looked up, poses composed"] > 1e-10, "and what is of second order"
+
+
+def test_rigid_bars_have_fewer_ways() -> None:
+    names = [way.name for way in ways(finger(np.inf), PATTERNS)]
+    assert names == ["rigid bars, unit by unit", *(n for n in WORST if n.startswith("chain, ")
+                                                   and "rigid" not in n)]  # fmt: skip
+
+
+def test_a_pattern_without_a_state_is_missing_from_every_way() -> None:
+    impossible = finger(1e4, force_linearity=0.5)
+    for way in ways(impossible, PATTERNS):
+        found = way.run()
+        assert np.isfinite(found.pose[:, 0]).all(), way.name
+        assert np.isnan(found.pose[:, 1:]).all(), way.name
+        assert np.isnan(found.energy[1:]).all(), way.name
+
+
+def test_others_find_the_same_states() -> None:
+    few = PATTERNS[:, [3, 5]]
+    reference = extended_states(finger(1e4), few)
+    for way in other_ways(finger(1e4), few):
+        found = way.run()
+        assert np.hypot(*(found.pose[:2] - reference.pose[:2])).max() < 1e-3, way.name
+        assert np.abs(found.pose[2] - reference.pose[2]).max() < 1e-4, way.name
+        assert np.abs(found.energy - reference.energy).max() < 1e-6, way.name
+
+
+def test_times_are_ordered_and_of_one_call() -> None:
+    calls = []
+    times = measured(lambda: calls.append(sum(range(20_000))), 3)
+    assert 0.0 < times.wall_min <= times.wall <= times.wall_max
+    assert len(calls) >= 3 + 2
+    assert times.wall < 0.1, "a call, not a round of calls"
+
+
+def test_a_long_call_is_timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dpgcli.benchmark.timing.LONGEST", 0.0)
+    calls = []
+    times = measured(lambda: calls.append(1), 9)
+    assert (len(calls), times.wall_min) == (1, times.wall_max)
+
+
+def test_the_kernel_is_fixed_work() -> None:
+    assert numpy_kernel()() == pytest.approx(numpy_kernel()())
+
+
+def test_peak_memory_counts_arrays() -> None:
+    assert peak_bytes(lambda: np.ones(2**20)) == pytest.approx(8 * 2**20, rel=0.01)

@@ -1,0 +1,142 @@
+"""Tables of designs of whatever origin, and facts of runs."""
+
+import datetime
+import io
+import json
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from dpgcli.errors import UsageError
+from dpgcli.files.table_reader import read_designs, read_record, read_run
+
+N = 4
+COLUMNS: dict[str, Any] = {
+    "design": [0, 1, 2, 3],
+    "height_mm": [4.5, 5.5, 6.5, 7.5],
+    "calibration": ["given"] * N,
+    "status": ["stable", "stable", "stable", "invalid"],
+    "reason": ["", "", "", "no such finger"],
+    "n_stable": [8, 8, 8, 0],
+    "reach_max_mm": [40.0, 41.0, 42.0, None],
+}
+NOT_NUMBERS = {
+    "text": pa.array(["1"] * N),
+    "binary": pa.array([b"\xff"] * N),
+    "dates": pa.array([datetime.date(2020, 1, 1)] * N),
+    "lists": pa.array([[1.0]] * N),
+    "structs": pa.array([{"a": 1}] * N),
+    "categories": pa.array(["a"] * N).dictionary_encode(),
+}
+NOT_WHOLE = {
+    **NOT_NUMBERS,
+    "fractions": pa.array([0.5] * N),
+    "gaps": pa.array([1, None, 3, 4]),
+    "nan": pa.array([np.nan] * N),
+    "inf": pa.array([np.inf] * N),
+    "beyond 63 bits": pa.array([2**63] * N, pa.uint64()),
+    "nothing": pa.nulls(N),
+}
+NOT_TEXT = {
+    **{name: NOT_NUMBERS[name] for name in ("binary", "dates", "lists", "structs")},
+    "numbers": pa.array([1.0, np.nan, 2.0, 3.0]),
+    "flags": pa.array([True] * N),
+}
+
+
+def read(tmp_path: Path, **changes: Any) -> pd.DataFrame:
+    pq.write_table(pa.table({**COLUMNS, **changes}), tmp_path / "t.parquet")
+    return read_designs(tmp_path / "t.parquet")[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "kind", "values"),
+    [("design", "whole numbers", v) for v in NOT_WHOLE.items()]
+    + [("n_stable", "whole numbers", v) for v in NOT_WHOLE.items()]
+    + [("height_mm", "numbers", v) for v in NOT_NUMBERS.items()]
+    + [("status", "text", v) for v in NOT_TEXT.items()]
+    + [("reason", "text", v) for v in NOT_TEXT.items()],
+)
+def test_a_column_of_another_type_is_named(
+    tmp_path: Path, column: str, kind: str, values: tuple[str, Any]
+) -> None:
+    with pytest.raises(UsageError, match=f"column {column}: expected {kind}, found "):
+        read(tmp_path, **{column: values[1]})
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        pa.array([1, 2, 3, 4], pa.uint8()),
+        pa.array([1, 2, 3, 4], pa.uint64()),
+        pa.array([1.0, 2.0, 3.0, 4.0], pa.float32()),
+        pa.array(np.array([1, 2, 3, 4], np.float16)),
+        pa.array([Decimal("1.00"), Decimal(2), Decimal(3), Decimal(4)]),
+        pa.array([1, 2, 3, 4]).dictionary_encode(),
+    ],
+    ids=lambda values: str(values.type),
+)
+def test_numbers_are_numbers_however_they_are_stored(tmp_path: Path, values: Any) -> None:
+    found = read(tmp_path, **dict.fromkeys(("design", "height_mm", "n_stable", "own"), values))
+    for column in ("design", "height_mm", "n_stable", "own"):
+        assert found[column].tolist() == [1, 2, 3, 4]
+    assert found["design"].dtype == np.int64
+
+
+def test_whole_numbers_of_64_bits_keep_their_sign(tmp_path: Path) -> None:
+    found = read(tmp_path, own=pa.array([2**64 - 1] * N, pa.uint64()))
+    assert found["own"].tolist() == [2.0**64] * N
+
+
+@pytest.mark.parametrize("kind", [pa.string(), pa.large_string(), pa.dictionary("int8", "string")])
+def test_text_is_text_and_nothing_is_empty(tmp_path: Path, kind: Any) -> None:
+    found = read(tmp_path, reason=pa.array(["a", None, "", "b"]).cast(kind))
+    assert found["reason"].tolist() == ["a", "", "", "b"]
+
+
+def test_columns_that_nobody_can_use_are_left_out(tmp_path: Path) -> None:
+    found = read(tmp_path, **NOT_NUMBERS)
+    assert list(found) == list(COLUMNS)
+
+
+@pytest.mark.parametrize("reasons", [["", "", "", "no such finger"], [""] * N])
+@pytest.mark.parametrize("with_index", [False, True])
+def test_a_table_that_went_through_csv_is_the_same(
+    tmp_path: Path, reasons: list[str], with_index: bool
+) -> None:
+    """Where empty text comes back as NaN."""
+    expected = read(tmp_path, reason=reasons)
+    text = expected.to_csv(index=with_index)
+    pd.read_csv(io.StringIO(text), index_col=0 if with_index else None).to_parquet(
+        tmp_path / "t.parquet"
+    )
+    pd.testing.assert_frame_equal(read_designs(tmp_path / "t.parquet")[0], expected)
+
+
+def test_a_column_twice(tmp_path: Path) -> None:
+    table = pa.table(COLUMNS)
+    pq.write_table(table.append_column("n_stable", table["n_stable"]), tmp_path / "t.parquet")
+    with pytest.raises(UsageError, match="expected each column once, found n_stable again"):
+        read_designs(tmp_path / "t.parquet")
+
+
+@pytest.mark.parametrize("depth", [8, 200, 990, 100_000])
+@pytest.mark.parametrize("level", ['{"a": ', "["])
+def test_facts_that_are_nested_deeply(tmp_path: Path, level: str, depth: int) -> None:
+    end = "]" if level == "[" else "}"
+    (tmp_path / "run.json").write_text('{"rows": ' + level * depth + "1" + end * depth + "}")
+    for reader in (read_run, read_record):
+        with pytest.raises(UsageError, match=r"run\.json"):
+            reader(tmp_path / "run.json")
+
+
+def test_facts_are_a_few_levels_deep(tmp_path: Path) -> None:
+    facts = {"states": {"stable": 8}, "command": ["dpg"]}
+    (tmp_path / "run.json").write_text(json.dumps(facts))
+    assert read_run(tmp_path / "run.json") == facts

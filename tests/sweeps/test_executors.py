@@ -1,0 +1,208 @@
+"""Chunks at a workplace: every case once, whatever dies."""
+
+import importlib
+import os
+import resource
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import forkserver, get_context
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dpgcli.errors import WorkplaceError
+from dpgcli.sweeps.executors import (
+    Chunk,
+    Runner,
+    Workplace,
+    chunked,
+    process_pool,
+    processes,
+    serial,
+)
+
+
+@pytest.fixture
+def deadly() -> Iterator[Any]:
+    """Functions that worker processes can import too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(Path(__file__).parent)
+        yield importlib.import_module("deadly")
+
+
+def results(runner: "Runner[Any]", chunks: Iterator[Chunk]) -> dict[int, Any]:
+    """Values by case; every case must come once."""
+    values: dict[int, Any] = {}
+    for result in runner.run(chunks):
+        cases = range(result.chunk.start, result.chunk.stop)
+        assert values.keys().isdisjoint(cases)
+        values |= dict.fromkeys(cases) if result.value is None else {}
+        values |= dict(zip(cases, result.value or (), strict=False))
+    return values
+
+
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=8), st.integers(1, 7))
+def test_chunks_cover_what_is_missing_and_are_cut_at_fixed_places(
+    lengths: list[int], size: int
+) -> None:
+    missing, here = [], 0
+    for length in lengths:
+        missing.append((here, here + length))
+        here += length + 2
+    chunks = list(chunked(missing, size))
+    cases = [case for chunk in chunks for case in range(chunk.start, chunk.stop)]
+    assert cases == [case for start, stop in missing for case in range(start, stop)]
+    assert all(c.start // size == (c.stop - 1) // size for c in chunks)
+
+
+@pytest.mark.parametrize("workplace", [serial(), processes(1), processes(3)])
+def test_nothing_dies(deadly: Any, tmp_path: Path, workplace: Workplace) -> None:
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    assert results(runner, chunked([(0, 20)], 3)) == {case: case**2 for case in range(20)}
+    assert runner.deaths == []
+
+
+def test_a_worker_that_dies_once_costs_nothing(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, once=[7]))
+    assert results(runner, chunked([(0, 20)], 4)) == {case: case**2 for case in range(20)}
+    assert Chunk(4, 8) in runner.deaths
+
+
+def test_a_case_that_always_kills_is_alone_in_failing(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=[5]))
+    found = results(runner, chunked([(0, 12)], 4))
+    assert found == {case: None if case == 5 else case**2 for case in range(12)}
+    assert len((tmp_path / "5").read_text()) >= 2, "retried at least once"
+
+
+def test_several_die_at_once(deadly: Any, tmp_path: Path) -> None:
+    given = deadly.arguments(tmp_path, always=[0, 3], once=[4, 9])
+    found = results(Runner(processes(3), deadly.squares, given), chunked([(0, 12)], 2))
+    assert found == {case: None if case in (0, 3) else case**2 for case in range(12)}
+
+
+def test_workers_that_always_die_end_the_run(deadly: Any, tmp_path: Path) -> None:
+    """Then it is not the cases' fault, and none of them is reported as failed."""
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(64)))
+    found = []
+    with pytest.raises(WorkplaceError, match=r"17 cases in a row .* is there memory enough"):
+        found += runner.run(chunked([(0, 64)], 8))
+    assert found == []
+
+
+def test_a_few_cases_that_all_kill_are_failures(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(3)))
+    assert results(runner, chunked([(0, 3)], 2)) == dict.fromkeys(range(3))
+
+
+def test_a_worker_that_dies_as_it_is_tried_is_tried_again(deadly: Any, tmp_path: Path) -> None:
+    """Whatever kills workers from outside may hit that one, too."""
+    opened = []
+
+    def fragile(n_workers: int) -> ProcessPoolExecutor:
+        opened.append(n_workers)
+        doomed = deadly.dies if len(opened) in (2, 3) else None
+        return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=doomed)
+
+    workplace = Workplace("the pool", fragile, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path, once=[4]))
+    assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}
+    assert opened[:4] == [2, 1, 1, 1]
+
+
+def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
+    def broken(n_workers: int) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=deadly.dies)
+
+    workplace = Workplace("the pool", broken, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    with pytest.raises(WorkplaceError, match="the pool: workers do not start"):
+        list(runner.run(chunked([(0, 20)], 3)))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("workplace", [serial(), processes(2)])
+def test_an_error_of_the_function_is_raised(deadly: Any, workplace: Workplace) -> None:
+    runner: Runner[int] = Runner(workplace, deadly.refused, lambda c: (c,))
+    with pytest.raises(ZeroDivisionError, match="of its own"):
+        list(runner.run(chunked([(0, 9)], 1)))
+
+
+def test_processes_are_other_processes(deadly: Any) -> None:
+    runner: Runner[int] = Runner(processes(2), deadly.process_id, lambda c: (c,))
+    numbers = {result.value for result in runner.run(chunked([(0, 8)], 1))}
+    assert os.getpid() not in numbers
+    assert len(numbers) <= 2
+
+
+def test_few_chunks_are_under_way_at_a_time(deadly: Any, tmp_path: Path) -> None:
+    """A space may be far larger than memory: chunks are made when they are needed."""
+    made = []
+
+    def arguments(chunk: Chunk) -> Any:
+        made.append(chunk)
+        return deadly.arguments(tmp_path)(chunk)
+
+    runner = Runner(processes(2), deadly.squares, arguments)
+    running = runner.run(chunked([(0, 100)], 1))
+    next(running)
+    assert len(made) <= 2 * 2 + 2
+    running.close()
+
+
+def test_a_reader_that_stops_early_leaves_no_thread_behind(deadly: Any, tmp_path: Path) -> None:
+    running = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path)).run(
+        chunked([(0, 50)], 1)
+    )
+    next(running)
+    running.close()
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread():
+            thread.join(timeout=10)
+            assert not thread.is_alive()
+
+
+@pytest.mark.parametrize(("n_times", "ends_well"), [(1, True), (99, False)])
+def test_a_fork_server_that_is_killed_is_started_again(
+    deadly: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, n_times: int, ends_well: bool
+) -> None:
+    """Just after it has been looked at, and before it is asked for a worker."""
+    server: Any = vars(forkserver)["_forkserver"]
+    killed = []
+
+    def unlucky(n_workers: int) -> Any:
+        pool = process_pool(n_workers)
+        monkeypatch.undo()
+        if len(killed) < n_times:
+            killed.append(server._forkserver_pid)
+            os.kill(killed[-1], signal.SIGKILL)
+            os.waitid(os.P_PID, killed[-1], os.WEXITED | os.WNOWAIT)
+            monkeypatch.setattr(server, "ensure_running", lambda: None)
+        return pool
+
+    workplace = Workplace("the pool", unlucky, 2)
+    runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
+    if ends_well:
+        assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}
+    else:
+        with pytest.raises(WorkplaceError, match=r"do not start \(the fork server is gone\)"):
+            list(runner.run(chunked([(0, 12)], 3)))
+    assert killed
+
+
+def test_a_system_that_allows_no_more_processes(deadly: Any, tmp_path: Path) -> None:
+    runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path))
+    process_pool(1).shutdown()  # what is started once is there
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with pytest.raises(WorkplaceError, match="start a process: Too many open files"):
+        try:
+            n_open = len(list(Path("/dev/fd").iterdir()))
+            resource.setrlimit(resource.RLIMIT_NOFILE, (n_open + 9, limits[1]))
+            list(runner.run(chunked([(0, 12)], 3)))
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)

@@ -1,0 +1,108 @@
+"""Which designs meet a threshold, and what is said of those that do not."""
+
+from math import nan
+
+import pandas as pd
+import pytest
+
+from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.sweeps.gate import (
+    check_requirements,
+    failing,
+    number_columns,
+    requirement,
+    swept_names,
+)
+
+DESIGNS = pd.DataFrame(
+    {
+        "design": [10, 11, 12, 13, 14, 15],
+        "height_mm": [4.0, 4.5, 5.0, 5.5, 6.0, 6.5],
+        "units": [3, 3, 3, 4, 4, 4],
+        "calibration": ["given"] * 4 + ["", ""],
+        "status": ["stable", "stable", "partly_stable", "partly_stable", "invalid", "excluded"],
+        "reason": ["", "", "", "", "too tall, found 6", ""],
+        "n_stable": [8, 8, 5, 0, 0, 0],
+        "area_mm2": [1.0, 2.0, 3.0, nan, nan, nan],
+        "gap_mm": [1.0, nan, 1.0, nan, nan, nan],
+    }
+)
+COLUMNS = number_columns(DESIGNS)
+
+
+def test_swept_values_stand_between_the_number_and_the_calibration() -> None:
+    assert swept_names(DESIGNS) == ["height_mm", "units"]
+
+
+def test_columns_of_text_are_no_numbers() -> None:
+    assert COLUMNS == ["design", "height_mm", "units", "n_stable", "area_mm2", "gap_mm"]
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("area_mm2 >= 1", [3, 4]),
+        ("area_mm2 > 1", [0, 3, 4]),
+        ("not area_mm2 > 2.5", [2, 3, 4]),  # a NaN is not "not larger"
+        ("area_mm2 > 0 or gap_mm > 0", [1, 3, 4]),  # one known value does not do
+        ("height_mm > 0", [3, 4]),  # without a state nothing is met
+        ("n_stable == 0", [0, 1, 2, 3, 4]),
+        ("1 < 2", [3, 4]),
+        ("2 < 1", [0, 1, 2, 3, 4]),
+        ("units == 3 and n_stable ** 2 > 30", [2, 3, 4]),
+    ],
+)
+def test_rows_that_fail(text: str, rows: list[int]) -> None:
+    assert failing(DESIGNS, requirement(text, COLUMNS)).tolist() == rows
+
+
+def test_checking_leaves_the_table_as_it_was() -> None:
+    before = DESIGNS.copy(deep=True)
+    check_requirements(DESIGNS, [requirement("abs(area_mm2 - gap_mm) < 1", COLUMNS)])
+    pd.testing.assert_frame_equal(DESIGNS, before)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("area_mm > 1", "no column area_mm of numbers; the nearest is area_mm2"),
+        ("status == 1", "no column status of numbers"),
+        ("area_mm2", "expected a comparison, found a number"),
+        ("area_mm2 >", "not an expression"),
+        ("", "not an expression"),
+        ("__import__('os')", "unknown function __import__"),
+        ("abs(area_mm2, height_mm) > 1", "does not take 2 values"),
+        ("sqrt(1, 2) > 1", "does not take 2 values"),
+        ("-" * 498 + "1", ""),
+        ("x" * 501, "longer than 500"),
+    ],
+)
+def test_what_is_no_requirement_is_refused(text: str, said: str) -> None:
+    with pytest.raises(UsageError, match=r"^--require ") as caught:
+        requirement(text, COLUMNS)
+    assert said in str(caught.value)
+
+
+def test_a_verdict_names_designs_values_and_what_was_found() -> None:
+    (verdict,) = check_requirements(DESIGNS, [requirement("area_mm2 > 2", COLUMNS)])
+    assert (verdict.n_checked, verdict.is_met) == (5, False)
+    assert str(verdict) == "not met: area_mm2 > 2: 4 of 5 designs"
+    assert list(map(str, verdict.failures())) == [
+        "design 10 (height_mm = 4, units = 3): area_mm2 = 1",
+        "design 11 (height_mm = 4.5, units = 3): area_mm2 = 2",
+        "design 13 (height_mm = 5.5, units = 4): partly_stable: no stable state",
+        "design 14 (height_mm = 6, units = 4): invalid: too tall, found 6",
+    ]
+    assert [failure.design for failure in verdict.failures(2)] == [10, 11]
+
+
+def test_a_requirement_that_all_meet() -> None:
+    (verdict,) = check_requirements(DESIGNS.head(3), [requirement("area_mm2 >= 1", COLUMNS)])
+    assert verdict.is_met
+    assert str(verdict) == "met: area_mm2 >= 1: all 3 designs"
+
+
+@pytest.mark.parametrize("designs", [DESIGNS.tail(1), DESIGNS.head(0)])
+def test_an_empty_space_meets_nothing(designs: pd.DataFrame) -> None:
+    with pytest.raises(NothingSelectedError, match="no design to check"):
+        check_requirements(designs, [requirement("area_mm2 > 0", COLUMNS)])
