@@ -19,18 +19,17 @@ from dpgcli.benchmark.methods import Found, Way, other_ways, ways
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
-from dpgcli.states.certify import certify
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
 from dpgcli.states.rows import Columns
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.stress.cases import check_law
@@ -204,10 +203,9 @@ class Bench:
             inverted = np.tile(patterns, n_designs)
 
             def whole(finger: Finger = finger, lanes: Any = lanes, on: Flags = inverted) -> None:
-                units = Units.of(finger).designs(lanes)
-                batch = solve(units, Chain, on, DEFAULT_TOLERANCE)
-                certify(batch, units, DEFAULT_TOLERANCE)
-                tip(batch, with_compliance=True)
+                units = Units.of(finger).take_lanes(lanes)
+                settled = settle(units, chain_potential, on, DEFAULT_TOLERANCE)
+                tip(settled, with_compliance=True)
 
             yield {
                 **self._facts("designs", "chain, all designs differ", len(lanes)),

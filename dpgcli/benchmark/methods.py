@@ -13,13 +13,14 @@ from dpgcli.arrays import Array, Flags, total
 from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.benchmark.peers import peers, tip_pose
 from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation, Internal
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.states.certify import Status, certify
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.certify import Status
 from dpgcli.states.guess import geometric_guess, stroke_guess
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, RUNGS
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -60,16 +61,16 @@ def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
             continue
         used, name = (rigid, "chain, rigid bars") if rung.drops_bars else (finger, "chain")
         tolerance = rung.tolerance
-        yield way(f"{name}, {tolerance:g}", _solver(used, inverted, Chain, tolerance))
+        yield way(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
     if not finger.is_rigid:
-        lattice = _solver(finger, inverted, Lattice, DEFAULT_TOLERANCE)
+        lattice = _solver(finger, inverted, lattice_potential, DEFAULT_TOLERANCE)
         yield way(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
 
 
 def other_ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
     """What one would do without the package, state by state, each prepared for the finger."""
     lattice, network = Lattice(finger), SpringNetwork.of(finger)
-    starts = lattice.coordinates(stroke_guess(finger, inverted, PEERS_START))
+    starts = lattice.of_shape(stroke_guess(finger, inverted, PEERS_START))
     for peer in peers():
         solve_one = peer.prepare(finger)
 
@@ -85,7 +86,7 @@ def _looked_up(finger: Finger, inverted: Flags) -> Found:
     units = Units.of(finger)
     chain = Chain(finger)
     shape = geometric_guess(finger, inverted, units.first_order)
-    coordinates = chain.coordinates(shape)
+    coordinates = chain.of_shape(shape)
     pose, _ = chain.tip(coordinates)
     openings = chain.openings(coordinates)
     energy = _energy(finger, shape, openings)
@@ -106,14 +107,13 @@ def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
 
 
 def _solver(
-    finger: Finger, inverted: Flags, formulate: Callable[[Finger], Formulation], tolerance: float
+    finger: Finger, inverted: Flags, formulate: Formulate, tolerance: float
 ) -> Callable[[], Found]:
     def run() -> Found:
-        units = Units.of(finger)
-        batch = solve(units, formulate, inverted, tolerance)
-        is_stable = certify(batch, units, tolerance) == Status.STABLE
-        pose = tip(batch, with_compliance=False).pose
-        energy = np.asarray(sum(batch.equilibrium.energies.values()))
+        settled = settle(Units.of(finger), formulate, inverted, tolerance)
+        is_stable = settled.status == Status.STABLE
+        pose = tip(settled, with_compliance=False).pose
+        energy = np.asarray(sum(settled.equilibrium.energies.values()))
         return Found(np.where(is_stable, pose, np.nan), np.where(is_stable, energy, np.nan))
 
     return run

@@ -162,7 +162,7 @@ class FingerFit:
         states = self._states(values)
         free = [place for place, p in enumerate(self._parameters) if p.is_free]
         steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
-        found = sensitivities(states.batch, steps)
+        found = sensitivities(states.settled, steps)
         slopes = found.strut_angles
         if self.target == Target.TIPS:
             moved = states.pose[:, None] + 1j * STEP * found.pose

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.mechanics.chain import Chain, internal
+from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.certify import Batch, Status, certify
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Settled, Status
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 
 
@@ -90,14 +91,18 @@ class LatticeStates:
     `angles`, `openings` and `pushes` as in `KnownStates`.
     """
 
-    batch: Batch
-    status: NDArray[np.uint8]
+    settled: Settled
     pose: Array
     tip: Array
     layer: Array
     angles: Array
     openings: Array
     pushes: Array
+
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """`Status` codes, (state,)."""
+        return self.settled.status
 
 
 def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStates:
@@ -106,24 +111,22 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     The layer's line lies as far to the left of the stations as the data's tip does.
     """
     units = Units.of(finger)
-    batch = solve(units, Chain, patterns, DEFAULT_TOLERANCE)
-    status = certify(batch, units, DEFAULT_TOLERANCE)
-    is_state = status == Status.STABLE
-    coordinates = batch.equilibrium.coordinates
-    _, near, far, _ = internal(coordinates, finger.is_rigid)
+    settled = settle(units, chain_potential, patterns, DEFAULT_TOLERANCE)
+    is_state = settled.status == Status.STABLE
+    chain, values = settled.potential.coordinates, settled.equilibrium.coordinates
+    _, near, far, _ = internal(values, finger.is_rigid)
     angles = np.where(is_state, -np.cumsum(near + far, axis=0), np.nan)
-    stations = batch.formulation.stations(coordinates)
+    stations = chain.stations(values)
     x, y = (np.where(is_state, nodes, np.nan) for nodes in (stations.base_x, stations.base_y))
     pose = np.stack((x[-1], y[-1], angles[-1]))
     base = np.where(is_state, 0.0, np.nan)[None]
     poses = np.stack([np.concatenate((base, rows)) for rows in (x, y, angles)])
     line = Frame(frame.first_station, (0.0, frame.tip[1])).tips(poses)
     tip = frame.tips(pose)
-    openings = batch.formulation.openings(coordinates)
-    pushes = -batch.formulation.finger.springs(openings).force
+    openings = chain.openings(values)
+    pushes = -settled.finger.springs(openings).force
     return LatticeStates(
-        batch=batch,
-        status=status,
+        settled=settled,
         pose=pose,
         tip=tip,
         layer=np.concatenate((line, tip[:, None]), axis=1),

@@ -1,7 +1,7 @@
 """Symmetric banded matrices, factorized in batches: A = L D Lᵀ, batch index innermost.
 
 Storage: `band[k, j]` holds A[j+k, j] for the whole batch, shape (bandwidth + 1, size, batch).
-`reach[j]` says how far down column j may be nonzero, fill-in included; less than the
+`column_depths[j]` says how far down column j may be nonzero, fill-in included; less than the
 bandwidth where the matrix is sparser there. There is no pivoting: the signs of D are the
 signs of the eigenvalues (Sylvester's law of inertia), and a positive definite matrix
 needs none. One singular matrix spoils its own lane only, and nobody is warned of it: the
@@ -23,25 +23,25 @@ class Factorization:
 
     lower: Array
     pivots: Array
-    reach: tuple[int, ...]
+    column_depths: tuple[int, ...]
 
 
 @in_lanes
-def factorize(band: Array, reach: tuple[int, ...]) -> Factorization:
+def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
     """Factorize in place; `band` is used up.
 
     >>> band = np.array([[[4.0], [3.0]], [[2.0], [0.0]]])  # [[4, 2], [2, 3]]
     >>> factorize(band, (1, 0)).pivots.ravel()
     array([4., 2.])
     """
-    for column, depth in enumerate(reach):
+    for column, depth in enumerate(column_depths):
         if depth == 0:
             continue
         below = band[1 : depth + 1, column].copy()
         factors = np.divide(below, band[0, column], out=band[1 : depth + 1, column])
         for k in range(depth):
             band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
-    return Factorization(band[1:], band[0], reach)
+    return Factorization(band[1:], band[0], column_depths)
 
 
 @in_lanes
@@ -49,7 +49,7 @@ def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
     """Overwrite b with y = L⁻¹ b; shape (size, batch) or (size, number, batch)."""
     y = right_hand_sides
     lower = factorization.lower
-    for column, depth in enumerate(factorization.reach):
+    for column, depth in enumerate(factorization.column_depths):
         if depth:
             factors = lower[:depth, column]
             if y.ndim == 3:
@@ -62,7 +62,7 @@ def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
 def backward(factorization: Factorization, y: Array) -> Array:
     """Overwrite y with x = L⁻ᵀ y, shape (size, batch)."""
     lower = factorization.lower
-    for column in range(len(factorization.reach) - 1, -1, -1):
-        for k in range(factorization.reach[column]):
+    for column in range(len(factorization.column_depths) - 1, -1, -1):
+        for k in range(factorization.column_depths[column]):
             y[column] -= lower[k, column] * y[column + 1 + k]
     return y

@@ -13,7 +13,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
-from dpgcli.mechanics.terms import Evaluation, Potential, evaluate
+from dpgcli.equilibrium.contracts import Coordinates
+from dpgcli.equilibrium.potential import Evaluation, Potential
 
 SUFFICIENT_DECREASE = 1e-4
 SMALLEST_FRACTION = 2.0**-40  # of a step; below it a lane has stalled
@@ -29,8 +30,8 @@ class Equilibrium:
 
     `residual` is the max-norm of the gradient as a force, N; `relative_residual` the same
     over the forces in play; `curvature` the smallest pivot over the stiffness it is measured
-    by, positive where the Hessian is positive definite and no pivot's sign in doubt. Shapes
-    (batch,) but for `coordinates` and `gradient`, (size, batch).
+    by, positive where the Hessian is positive definite and no pivot's sign in doubt. `energies`
+    are by kind. Shapes (batch,) but for `coordinates` and `gradient`, (size, batch).
     """
 
     coordinates: Array
@@ -50,7 +51,7 @@ class Equilibrium:
                 return {key: put(own[key], other[key]) for key in own}
             if isinstance(own, Factorization):
                 pair = put(own.lower, other.lower), put(own.pivots, other.pivots)
-                return Factorization(*pair, own.reach)
+                return Factorization(*pair, own.column_depths)
             changed = own.copy()
             changed[..., lanes] = other[..., taken]
             return changed
@@ -61,7 +62,7 @@ class Equilibrium:
 
 @in_lanes
 def minimize(
-    potential: Potential, guess: Array, tolerance: float, max_iterations: int = 200
+    potential: Potential[Coordinates], guess: Array, tolerance: float, max_iterations: int = 200
 ) -> Equilibrium:
     """Walk from `guess`, shape (size, batch), until each lane's relative residual is small.
 
@@ -76,7 +77,7 @@ def minimize(
     walk = _Walk.at(potential, final)
     final = final.copy()
     for count in range(max_iterations):
-        evaluation = evaluate(walk.potential, walk.trial)
+        evaluation = walk.potential.evaluate(walk.trial)
         newly = walk.look(evaluation, tolerance)
         iterations[lanes[newly]] = count
         if walk.finished.all():
@@ -90,7 +91,7 @@ def minimize(
             walk, evaluation = walk.only(keep), _only(evaluation, keep)
         walk.step_from(evaluation)
     final[:, lanes] = walk.here
-    return _equilibrium(potential, final, evaluate(potential, final), iterations)
+    return _equilibrium(potential, final, potential.evaluate(final), iterations)
 
 
 @dataclass
@@ -100,7 +101,7 @@ class _Walk:
     `fraction` of `step` is what is tried; `settled` says that the last accepted step was small.
     """
 
-    potential: Potential
+    potential: Potential[Coordinates]
     here: Array
     trial: Array
     energy: Array
@@ -112,7 +113,7 @@ class _Walk:
     finished: Flags
 
     @classmethod
-    def at(cls, potential: Potential, guess: Array) -> "_Walk":
+    def at(cls, potential: Potential[Coordinates], guess: Array) -> "_Walk":
         """Lanes at their guesses, about to be looked at for the first time."""
         n = guess.shape[1]
         yes, no = np.ones(n, bool), np.zeros(n, bool)
@@ -145,37 +146,39 @@ class _Walk:
             self.slope = np.where(self.accepted, slope, self.slope)
             self.fraction = np.where(self.accepted, 1.0, 0.5 * self.fraction)
             self.settled = self.accepted & (length <= SETTLED)
-        self.trial = self.potential.moved(self.here, self.fraction * self.step)
+        self.trial = self.potential.coordinates.moved(self.here, self.fraction * self.step)
         if self.finished.any():
             self.trial = np.where(self.finished, self.here, self.trial)
 
     def only(self, keep: Indices) -> "_Walk":
         """The walk of some lanes, the batch index still innermost in memory."""
         arrays = [np.take(getattr(self, f.name), keep, axis=-1) for f in fields(self)[1:]]
-        return _Walk(self.potential.designs(keep), *arrays)
+        return _Walk(self.potential.take_lanes(keep), *arrays)
 
 
 def _falls(evaluation: Evaluation, energy: Array, expected: Array) -> Flags:
     """Whether the energy fell enough, given that it is known up to rounding only."""
-    magnitude = sum(np.abs(part) for part in evaluation.energies.values())
+    magnitude = sum(np.abs(part) for part in evaluation.energies)
     allowed = energy + SUFFICIENT_DECREASE * expected + ROUNDING * magnitude
     return np.asarray(evaluation.energy <= allowed)
 
 
-def _downhill(potential: Potential, evaluation: Evaluation) -> tuple[Array, Array, Array]:
+def _downhill(
+    potential: Potential[Coordinates], evaluation: Evaluation
+) -> tuple[Array, Array, Array]:
     """The step, the slope of the energy along it and its length over the cap; uses the Hessian."""
-    factorization = factorize(evaluation.hessian, potential.reach)
+    factorization = factorize(evaluation.hessian, potential.column_depths)
     stiffness = np.maximum(np.abs(factorization.pivots), np.finfo(float).tiny)
     step = forward(factorization, -evaluation.gradient)
     step /= stiffness
     step = backward(factorization, step)
-    length = _largest(step, potential.step_cap)
+    length = _largest(step, potential.coordinates.step_cap)
     step /= np.maximum(1.0, length)
     return step, total(evaluation.gradient * step), length
 
 
-def _relative_residual(potential: Potential, gradient: Array) -> Array:
-    return _largest(gradient, potential.gradient_scale)
+def _relative_residual(potential: Potential[Coordinates], gradient: Array) -> Array:
+    return _largest(gradient, potential.coordinates.gradient_scale)
 
 
 def _largest(values: Array, scale: Array) -> Array:
@@ -187,26 +190,29 @@ def _largest(values: Array, scale: Array) -> Array:
 
 def _only(evaluation: Evaluation, keep: Indices) -> Evaluation:
     return Evaluation(
-        {kind: part[keep] for kind, part in evaluation.energies.items()},
+        tuple(part[keep] for part in evaluation.energies),
         np.take(evaluation.gradient, keep, axis=-1),
         np.take(evaluation.hessian, keep, axis=-1),
     )
 
 
 def _equilibrium(
-    potential: Potential, coordinates: Array, evaluation: Evaluation, iterations: Indices
+    potential: Potential[Coordinates],
+    coordinates: Array,
+    evaluation: Evaluation,
+    iterations: Indices,
 ) -> Equilibrium:
     diagonal = evaluation.hessian[0].copy()
-    factorization = factorize(evaluation.hessian, potential.reach)
+    factorization = factorize(evaluation.hessian, potential.column_depths)
     gradient = evaluation.gradient
     return Equilibrium(
         coordinates,
         gradient,
-        evaluation.energies,
+        potential.by_kind(evaluation.energies),
         factorization,
-        residual=_largest(gradient, potential.force_unit),
+        residual=_largest(gradient, potential.coordinates.force_unit),
         relative_residual=_relative_residual(potential, gradient),
-        curvature=_curvature(factorization.pivots, diagonal, potential.stiffness_scale),
+        curvature=_curvature(factorization.pivots, diagonal, potential.coordinates.stiffness_scale),
         iterations=iterations,
     )
 

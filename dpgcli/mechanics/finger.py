@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
-from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, Law, SpringResponse
+from dpgcli.equilibrium.contracts import Response, take_lanes
+from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, Law
 
 ARRAYS = (
     "segment_length",
@@ -45,6 +46,8 @@ class Finger:
     - `dome_travel` D: mm, of the pole of the inverted dome at rest, where the law is of its own
       travel; 0 where the opening stands for it
 
+    `acting` (unit, design) is the state of the domes, given beside the energy: 1 where a dome acts
+    on its neighbor, 0 where it does not, a dome that only pushes and stands in its ground state.
     `law` says how the domes answer.
     """
 
@@ -57,6 +60,7 @@ class Finger:
     hinge_stiffness: Array
     linear_stiffness: Array
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    acting: Array = field(default_factory=lambda: np.ones((1, 1)))
     law: Law = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -89,7 +93,7 @@ class Finger:
     def force_scale(self) -> Array:
         """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design)."""
         hinge = self.hinge_stiffness / self.segment_height**2
-        return (self.bistable_stiffness + hinge) * self.stroke
+        return (self.acting * self.bistable_stiffness + hinge) * self.stroke
 
     @property
     def straight_length(self) -> Array:
@@ -103,15 +107,16 @@ class Finger:
         contact = 0.0 * self.dome_travel
         if self.dome_travel.any():
             contact = np.where(self.dome_travel > 0.0, self.dome_travel - self.stroke, 0.0)
-        return Dome(self.bistable_stiffness, self.force_linearity, self.stroke, contact)
+        stiffness = self.acting * self.bistable_stiffness
+        return Dome(stiffness, self.force_linearity, self.stroke, contact)
 
-    def springs(self, extension: Array) -> SpringResponse:
+    def springs(self, extension: Array) -> Response:
         """Energy, force and stiffness of the bistable springs at extensions (unit, batch)."""
         return self.law.response(extension, self.domes)
 
     def changed(self, **arrays: Array) -> "Finger":
         """The finger with other arrays."""
-        return replace(self, **{**self.arrays(), **arrays})  # type: ignore[arg-type]  # all arrays
+        return replace(self, **arrays)  # type: ignore[arg-type]  # all arrays
 
     def with_values(self, values: Mapping[str, float]) -> "Finger":
         """The finger with other values, the same in all units, by the names in `KEYS`."""
@@ -119,33 +124,31 @@ class Finger:
 
     def with_units(self, places: Sequence[int]) -> "Finger":
         """A finger of some of the units, counted from 0; a unit may repeat."""
-        picked = {k: v if len(v) == 1 else v[list(places)] for k, v in self.arrays().items()}
+        arrays = {**self.arrays(), "acting": self.acting}.items()
+        picked = {k: v if len(v) == 1 else v[list(places)] for k, v in arrays}
         return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
 
     def with_bars(self, stiffness: float) -> "Finger":
         """The finger with bars of another stiffness k_L (N/mm); infinite makes them rigid."""
         return self.changed(linear_stiffness=np.array([[stiffness]]))
 
-    def with_pattern(self, inverted: Flags) -> "Finger":
-        """The finger in each pattern, (unit, batch): itself, unless only inverted domes act."""
-        if not self.law.pushes_only:
-            return self
-        return self.changed(bistable_stiffness=self.bistable_stiffness * inverted)
+    def with_domes(self, inverted: Flags) -> "Finger":
+        """The finger with domes in these states, (unit, batch): as far as its law asks for them."""
+        return self.changed(acting=self.law.acting(inverted))
 
     def with_domes_held(self, inverted: Flags) -> "Finger":
         """The finger whose inverted domes are held where each alone would rest, (unit, batch)."""
         rest = self.law.rests(self.domes).well / self.stroke
         share = np.where(np.isnan(rest), 1.0, rest) * inverted
-        held = self.with_pattern(inverted).changed(force_linearity=share)
+        held = self.with_domes(inverted).changed(force_linearity=share)
         return replace(held, law=HELD)
 
-    def designs(self, index: Indices) -> "Finger":
+    def take_lanes(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
-        arrays = self.arrays().items()
-        taken = {k: v if v.shape[1] == 1 else np.take(v, index, axis=1) for k, v in arrays}
-        return self.changed(**taken)
+        arrays = {**self.arrays(), "acting": self.acting}.items()
+        return self.changed(**{k: take_lanes(v, index) for k, v in arrays})
 
-    def units(self, first: int, stop: int) -> "Finger":
+    def section(self, first: int, stop: int) -> "Finger":
         """The finger cut down to units first+1 … stop, counted from the base."""
         return self.with_units(range(first, stop))
 

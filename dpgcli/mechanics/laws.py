@@ -9,19 +9,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Flags
+from dpgcli.equilibrium.contracts import Response
 from dpgcli.mechanics.curve import Curve
 
 
-class SpringResponse(NamedTuple):
-    """Energy, its first and its second derivative by the spring's own coordinate."""
-
-    energy: Array
-    force: Array
-    stiffness: Array
-
-
-def quadratic(coordinate: Array, stiffness: Array) -> SpringResponse:
+def quadratic(coordinate: Array, stiffness: Array) -> Response:
     """Respond as a linear or torsional spring: E = ½ k q².
 
     >>> import numpy as np
@@ -29,10 +22,10 @@ def quadratic(coordinate: Array, stiffness: Array) -> SpringResponse:
     (np.float64(6.0), np.float64(6.0))
     """
     force = stiffness * coordinate
-    return SpringResponse(0.5 * force * coordinate, force, stiffness)
+    return Response(0.5 * force * coordinate, force, stiffness)
 
 
-def bistable(extension: Array, stiffness: Array, linearity: Array, stroke: Array) -> SpringResponse:
+def bistable(extension: Array, stiffness: Array, linearity: Array, stroke: Array) -> Response:
     """Respond as the study's bistable spring, E = ½ k_b x² [1 + (1−α)(x²/d² − 2x/d)].
 
     With u = x/d and β = 1−α, written so that nothing cancels near the wells:
@@ -51,7 +44,7 @@ def bistable(extension: Array, stiffness: Array, linearity: Array, stroke: Array
     relative = extension / stroke
     remaining = 1.0 - relative
     pull = stiffness * extension
-    return SpringResponse(
+    return Response(
         0.5 * pull * extension * (linearity + softening * remaining * remaining),
         pull * (linearity + softening * remaining * (remaining - relative)),
         stiffness * (1.0 - 6.0 * softening * relative * remaining),
@@ -82,6 +75,26 @@ class Rests(NamedTuple):
     well: Array
 
 
+class Touching(NamedTuple):
+    """Extensions (mm) between which a dome acts; infinite where it does at any."""
+
+    lowest: Array
+    highest: Array
+
+
+class Attached:
+    """What a dome that pushes and pulls has in common: it acts in any state, at any extension."""
+
+    def acting(self, inverted: Flags) -> Array:
+        """1."""
+        return np.ones((1, 1))
+
+    def touching(self, dome: Dome) -> Touching:
+        """Everywhere."""
+        everywhere = np.full_like(np.real(dome.stroke), np.inf)
+        return Touching(-everywhere, everywhere)
+
+
 class Law(Protocol):
     """How a dome answers to the extension of its spring."""
 
@@ -90,28 +103,29 @@ class Law(Protocol):
         """What tables and summaries say stiffness figures come from."""
 
     @property
-    def pushes_only(self) -> bool:
-        """Whether only inverted domes act, and only by pushing."""
-
-    @property
     def curve(self) -> Curve | None:
         """The table behind the law; none where the study's polynomial is."""
 
-    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+    def response(self, extension: Array, dome: Dome) -> Response:
         """Energy (mJ), force (N) and stiffness (N/mm) at an extension (mm)."""
 
     def rests(self, dome: Dome) -> Rests:
         """Where the spring alone is at rest when inverted."""
 
+    def acting(self, inverted: Flags) -> Array:
+        """1 where a dome acts on its neighbor, else 0; (1, 1) where it does in any state."""
 
-class Published:
+    def touching(self, dome: Dome) -> Touching:
+        """Between which extensions (mm) a dome acts."""
+
+
+class Published(Attached):
     """The study's law, `bistable`: the spring pushes and pulls."""
 
     description = "published law, pushing and pulling"
-    pushes_only = False
     curve = None
 
-    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+    def response(self, extension: Array, dome: Dome) -> Response:
         """The study's polynomial."""
         return bistable(extension, dome.stiffness, dome.linearity, dome.stroke)
 
@@ -125,24 +139,23 @@ class Published:
         return Rests((3.0 * beta - root) * quarter, (3.0 * beta + root) * quarter)
 
 
-class Tabulated:
+class Tabulated(Attached):
     """A law from a curve: E = k_b D² ê((x + c)/D) with D = d + c (our normalization).
 
     The dimensionless ê is a twice continuously differentiable spline through calibrated points.
     """
 
     description = "tabulated law, pushing and pulling"
-    pushes_only = False
 
     def __init__(self, curve: Curve) -> None:
         self.curve = curve
 
-    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+    def response(self, extension: Array, dome: Dome) -> Response:
         """The spline and its derivatives, in mm and N."""
         travel = dome.stroke + dome.contact
         energy, slope, bend = self.curve((extension + dome.contact) / travel)
         force = dome.stiffness * travel
-        return SpringResponse(force * travel * energy, force * slope, dome.stiffness * bend)
+        return Response(force * travel * energy, force * slope, dome.stiffness * bend)
 
     def rests(self, dome: Dome) -> Rests:
         """Those of the curve."""
@@ -155,10 +168,8 @@ class PushOnly:
     """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
 
     Outside them dome and neighbor do not touch, the energy is constant there. Only inverted
-    domes act: the finger of a pattern has no springs in its ground units.
+    domes act: which those are is a state of contact, given beside the energy.
     """
-
-    pushes_only = True
 
     def __init__(self, law: Published | Tabulated) -> None:
         self.law = law
@@ -170,7 +181,7 @@ class PushOnly:
         energy = self.law.description.split(" law")[0]
         return f"push-only law, {energy} energy of the dome"
 
-    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+    def response(self, extension: Array, dome: Dome) -> Response:
         """The law's own response where dome and neighbor touch."""
         top, well = self.law.rests(dome)
         place = np.real(extension)
@@ -179,14 +190,23 @@ class PushOnly:
         apart = np.where(np.isnan(apart), 0.0, apart)  # never inverted: never in touch
         energy, *derivatives = self.law.response(np.where(touches, extension, apart), dome)
         force, stiffness = (np.where(touches, values, 0.0) for values in derivatives)
-        return SpringResponse(energy, force, stiffness)
+        return Response(energy, force, stiffness)
 
     def rests(self, dome: Dome) -> Rests:
         """Those of the dome itself."""
         return self.law.rests(dome)
 
+    def acting(self, inverted: Flags) -> Array:
+        """1 where a dome is inverted."""
+        return inverted.astype(float)
 
-class Held:
+    def touching(self, dome: Dome) -> Touching:
+        """From the top of its barrier to its well; nowhere if it has none."""
+        top, well = self.law.rests(dome)
+        return Touching(top, well)
+
+
+class Held(Attached):
     """A dome held about some opening: a linear spring that rests at `linearity` strokes.
 
     No dome does that; a search that holds domes open until bars and hinges have settled, and
@@ -194,10 +214,9 @@ class Held:
     """
 
     description = "domes held"
-    pushes_only = False
     curve = None
 
-    def response(self, extension: Array, dome: Dome) -> SpringResponse:
+    def response(self, extension: Array, dome: Dome) -> Response:
         """As of a linear spring of the dome's stiffness."""
         return quadratic(extension - dome.linearity * dome.stroke, dome.stiffness)
 

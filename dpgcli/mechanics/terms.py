@@ -1,75 +1,81 @@
-"""The contract between an energy and whatever minimizes it.
+"""A finger's energy as terms, measure × law, in either system of coordinates."""
 
-A term adds its gradient and Hessian to those of the whole and returns its energy. What a
-scene does not need is not in the list of terms, rather than multiplied by zero.
-"""
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
-
-import numpy as np
+from typing import Self
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.equilibrium.contracts import Response, Term, take_lanes
+from dpgcli.equilibrium.potential import Potential
+from dpgcli.mechanics import laws
+from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.lattice import Lattice
 
-
-class Term(Protocol):
-    """One kind of energy, over coordinates of shape (size, batch)."""
-
-    @property
-    def kind(self) -> str: ...
-
-    def add_to(self, coordinates: Array, gradient: Array, hessian: Array) -> Array:
-        """Add to gradient (size, batch) and band (bandwidth + 1, size, batch); return energy."""
+Formulate = Callable[[Finger], FingerPotential]
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """An energy with its derivatives: `energies` by kind, each of shape (batch,)."""
+class DomeSprings:
+    """The law of domes with the constants of some fingers' domes, by extension (mm)."""
 
-    energies: dict[str, Array]
-    gradient: Array
-    hessian: Array
+    law: laws.Law
+    domes: laws.Dome
 
-    @property
-    def energy(self) -> Array:
-        first, *rest = self.energies.values()
-        return sum(rest, start=first)
+    def __call__(self, scalar: Array) -> Response:
+        """Energy (mJ), force (N) and stiffness (N/mm)."""
+        return self.law.response(scalar, self.domes)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        return type(self)(self.law, laws.Dome(*(take_lanes(part, index) for part in self.domes)))
 
 
-class Potential(Protocol):
-    """A sum of terms over one set of coordinates, in the storage of `equilibrium.banded`.
+@dataclass(frozen=True)
+class Quadratic:
+    """A linear or torsional spring, E = ½ k q²; k of shape (1 or cell, 1 or batch)."""
 
-    `reach` is the sparsity of the Hessian, column by column. `force_unit` (size, batch or 1)
-    turns a component of the gradient into a force in N: 1 for a length, a lever for an
-    angle. `gradient_scale` is the force in play at each coordinate, in the gradient's own unit,
-    `stiffness_scale` the stiffness that a coordinate's curvature is measured by, and `step_cap`
-    the largest change of a coordinate that one step may make.
+    stiffness: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness."""
+        return laws.quadratic(scalar, self.stiffness)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        return type(self)(take_lanes(self.stiffness, index))
+
+
+def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
+    """Domes; two corners per hinge, each of stiffness 2 k_θ; bars.
+
+    Hinges without stiffness, and rigid bars, are no terms.
     """
-
-    @property
-    def terms(self) -> tuple[Term, ...]: ...
-    @property
-    def reach(self) -> tuple[int, ...]: ...
-    @property
-    def force_unit(self) -> Array: ...
-    @property
-    def gradient_scale(self) -> Array: ...
-    @property
-    def stiffness_scale(self) -> Array: ...
-    @property
-    def step_cap(self) -> Array: ...
-
-    def designs(self, index: Indices) -> "Potential":
-        """The same potential for the lanes at `index`."""
-
-    def moved(self, coordinates: Array, step: Array) -> Array:
-        """Where a step leads: coordinates + step, or better where that would strain bars."""
+    finger = coordinates.finger
+    corner, bar = Quadratic(2.0 * finger.hinge_stiffness), Quadratic(finger.linear_stiffness)
+    hinges = coordinates.corners if finger.hinge_stiffness.any() else ()
+    return (
+        Term("bistable", coordinates.opening, DomeSprings(finger.law, finger.domes)),
+        *(Term("hinge", angle, corner) for angle in hinges),
+        *(Term("bar", extension, bar) for extension in coordinates.bars),
+    )
 
 
-def evaluate(potential: Potential, coordinates: Array) -> Evaluation:
-    """Add up the terms at `coordinates`, shape (size, batch)."""
-    gradient = np.zeros_like(coordinates)
-    bandwidth = max(potential.reach)
-    hessian = np.zeros((bandwidth + 1, *coordinates.shape), coordinates.dtype)
-    energies = {t.kind: t.add_to(coordinates, gradient, hessian) for t in potential.terms}
-    return Evaluation(energies, gradient, hessian)
+def chain_potential(finger: Finger) -> Potential[Chain]:
+    """The energy of an unloaded finger in internal coordinates, the default.
+
+    >>> import numpy as np
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> potential = chain_potential(uniform_finger(1, **STUDY, linear_stiffness=1e4))
+    >>> potential.kinds, potential.coordinates.size
+    (('bistable', 'hinge', 'bar'), 4)
+    """
+    chain = Chain(finger)
+    return Potential(chain, spring_terms(chain))
+
+
+def lattice_potential(finger: Finger) -> Potential[Lattice]:
+    """The energy of an unloaded finger in node coordinates; ValueError for rigid bars."""
+    lattice = Lattice(finger)
+    return Potential(lattice, spring_terms(lattice))

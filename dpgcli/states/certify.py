@@ -1,6 +1,6 @@
 """Whether an equilibrium is a stable state of its pattern: residual, curvature, wells, shape."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.equilibrium.newton import Equilibrium
-from dpgcli.mechanics.formulation import Formulation
+from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
+from dpgcli.mechanics.finger import Finger
 from dpgcli.states.crossing import crosses_itself, outline
 from dpgcli.states.units import Units
 from dpgcli.states.wells import Wells
@@ -50,23 +51,30 @@ _MEANINGS = {
 
 
 @dataclass(frozen=True)
-class Batch:
-    """States of one finger (or one per lane), each at an equilibrium, shape (…, batch).
+class Settled:
+    """Equilibria of one finger (or one per lane), certified, shapes (…, batch).
 
-    `reached` says which wells the units ended in, `is_folded` which lanes are no finger, and
-    `is_balanced` where what is left of the forces is too small to matter.
+    `inverted` is the pattern that was asked for, `reached` says which wells the units ended in,
+    `is_folded` which lanes are no finger, and `is_balanced` where what is left of the forces is too
+    small to matter. `status` holds `Status` codes.
     """
 
-    formulation: Formulation
+    potential: FingerPotential
     equilibrium: Equilibrium
     inverted: Flags
     reached: Flags
     is_folded: Flags
     is_balanced: Flags
+    status: NDArray[np.uint8]
+
+    @property
+    def finger(self) -> Finger:
+        """The finger in the states of its domes."""
+        return self.potential.coordinates.finger
 
 
 @dataclass(frozen=True)
-class States:
+class SolvedStates:
     """Certified states, arrays of shape (…, state): what every method gives.
 
     `status` holds `Status` codes. `pose` is tip x, y (mm) and angle (rad), `tip_error` in mm,
@@ -82,40 +90,47 @@ class States:
     residual: Array
 
 
-def batch_at(
-    units: Units, formulation: Formulation, inverted: Flags, equilibrium: Equilibrium
-) -> Batch:
-    """What the certificate needs to know of shapes, as found for these patterns."""
-    extension, is_folded, lever = formulation.springs(equilibrium.coordinates)
-    reached = extension > units.wells.spring_barrier
-    if units.finger.law.pushes_only:  # a dome that does not act is not inverted by its neighbors
-        reached = reached & inverted
-    loop = units.shortest_loop
-    if loop is not None:
-        nodes = formulation.stations(equilibrium.coordinates)
-        is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
-    is_balanced = _is_balanced(formulation, equilibrium, lever, reached, units.wells)
-    return Batch(formulation, equilibrium, inverted, reached, is_folded, is_balanced)
-
-
-def certify(
-    batch: Batch, units: Units, tolerance: float, own: slice = slice(None)
-) -> NDArray[np.uint8]:
-    """The gravest reason why a lane is not a certified state of its pattern.
+def certified(
+    units: Units,
+    potential: FingerPotential,
+    inverted: Flags,
+    equilibrium: Equilibrium,
+    tolerance: float,
+    own: slice = slice(None),
+) -> Settled:
+    """Equilibria found for these patterns, (unit, batch), and whether they are their states.
 
     `own` are the units that must have reached their wells; `units` are all.
     """
-    equilibrium = batch.equilibrium
-    inverted, reached = batch.inverted[own], batch.reached[own]
+    coordinates = potential.coordinates
+    extension, is_folded, lever = coordinates.springs(equilibrium.coordinates)
+    # a dome that does not act is not inverted by its neighbors
+    reached = (extension > units.wells.spring_barrier) & (coordinates.finger.acting > 0.0)
+    loop = units.shortest_loop
+    if loop is not None:
+        nodes = coordinates.stations(equilibrium.coordinates)
+        is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
+    is_balanced = _is_balanced(coordinates, equilibrium, lever, reached, units.wells)
+    unknown = np.zeros(inverted.shape[1], np.uint8)
+    settled = Settled(potential, equilibrium, inverted, reached, is_folded, is_balanced, unknown)
+    return replace(settled, status=certify(settled, units, tolerance, own))
+
+
+def certify(
+    settled: Settled, units: Units, tolerance: float, own: slice = slice(None)
+) -> NDArray[np.uint8]:
+    """The gravest reason why a lane is not a certified state of its pattern, `Status` codes."""
+    equilibrium = settled.equilibrium
+    inverted, reached = settled.inverted[own], settled.reached[own]
     elsewhere = reached != inverted
-    has_none = np.broadcast_to(units.have_no_well, batch.inverted.shape)[own]
+    has_none = np.broadcast_to(units.have_no_well, settled.inverted.shape)[own]
     is_curved = equilibrium.curvature > MARGINAL_CURVATURE
     checks = (
         (~is_curved, Status.MARGINAL),
         (elsewhere.any(axis=0), Status.ANOTHER_PATTERN),
         ((elsewhere & inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
-        (batch.is_folded, Status.FOLDED),
-        (is_curved & ~batch.is_balanced, Status.NOT_CONVERGED),
+        (settled.is_folded, Status.FOLDED),
+        (is_curved & ~settled.is_balanced, Status.NOT_CONVERGED),
         (~(equilibrium.relative_residual <= tolerance), Status.NOT_CONVERGED),
     )
     status = np.full(inverted.shape[1], Status.STABLE, np.uint8)
@@ -125,7 +140,11 @@ def certify(
 
 
 def _is_balanced(
-    formulation: Formulation, equilibrium: Equilibrium, lever: Array, reached: Flags, wells: Wells
+    coordinates: FingerCoordinates,
+    equilibrium: Equilibrium,
+    lever: Array,
+    reached: Flags,
+    wells: Wells,
 ) -> Flags:
     """Whether what is left of the forces is too small to decide that there is a state, (batch,).
 
@@ -140,8 +159,8 @@ def _is_balanced(
 
     The residual would not do: stiff bars leave rounding in it that does not move a corner.
     """
-    finger = formulation.finger
-    moments = np.abs(formulation.corner_moments(equilibrium.coordinates, equilibrium.gradient))
+    finger = coordinates.finger
+    moments = np.abs(coordinates.corner_moments(equilibrium.coordinates, equilibrium.gradient))
     unbalance = moments.max(axis=0) / finger.segment_height
     on_opening = (moments / np.where(lever > 0.0, lever, finger.segment_height)).max(axis=0)
     borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)

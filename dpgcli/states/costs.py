@@ -2,7 +2,7 @@
 
 from dpgcli.states.columns import Group
 from dpgcli.states.halves import Split
-from dpgcli.states.solve import lanes_at_once
+from dpgcli.states.settle import lanes_at_once
 
 # Measured on one core of a 2020s server, in seconds.
 UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}

@@ -12,7 +12,7 @@ from math import ceil
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.formulation import Stations
+from dpgcli.mechanics.coordinates import Stations
 
 FULL_TURN = 2.0 * np.pi
 FEWEST_APART = 2  # cells that share no station

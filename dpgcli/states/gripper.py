@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.formulation import Stations
+from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.scene import Gripper
 
 

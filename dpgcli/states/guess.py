@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.wells import ByUnit, Wells, single_units
 
 
@@ -46,8 +45,8 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
         return FirstOrder(rigid_angle, zero, zero, zero, zero, zero, zero)
     angle = rigid_angle.reshape(1, -1)
     rest = np.zeros_like(angle)
-    chain = Chain(flat)
-    at_well = evaluate(chain, chain.coordinates(Internal(rest, angle, angle, rest)))
+    potential = chain_potential(flat)
+    at_well = potential.evaluate(potential.coordinates.of_shape(Internal(rest, angle, angle, rest)))
     stiffness = np.broadcast_to(finger.linear_stiffness, (units, designs))
     # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
     band, gradient = at_well.hessian, at_well.gradient

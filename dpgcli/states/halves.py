@@ -15,6 +15,7 @@ is known exactly at the shared strut, and every state is certified by it (our de
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,13 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
+from dpgcli.equilibrium.potential import Evaluation, Potential
 from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.terms import Evaluation, evaluate
-from dpgcli.states.certify import Batch, certify
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Settled
 from dpgcli.states.crossing import Outline, outline
 from dpgcli.states.patterns import chunks, inverted_units
-from dpgcli.states.solve import lanes_at_once, solve
+from dpgcli.states.settle import lanes_at_once, settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -104,6 +106,13 @@ class Split:
         wells = self.units.wells
         return float(np.minimum(np.abs(wells.reset_force), wells.snap_force).min())
 
+    @cached_property
+    def strut_force(self) -> float:
+        """The forces in play at the shared strut in the state in which they are smallest, N."""
+        ground = np.zeros((self.n_units, 1), bool)
+        chain = Chain(self.units.finger.with_domes(ground))
+        return float(chain.gradient_scale[4 * self.n_inner - 1, 0])
+
     @property
     def n_solves(self) -> int:
         """Half-fingers solved for both tables."""
@@ -111,54 +120,53 @@ class Split:
 
     def inner(self) -> Half:
         """Units 1 … n_inner, with context beyond them."""
-        solved = self._solved(0, self.n_inner + self.context, own=slice(0, self.n_inner))
-        return _joined([self._inner(batch, status) for batch, status in solved])
+        settled = self._settled(0, self.n_inner + self.context, own=slice(0, self.n_inner))
+        return _joined([self._inner(states) for states in settled])
 
     def outer(self) -> Half:
         """Units n_inner + 1 … n, with context before them."""
         first = self.n_inner - self.context
-        solved = self._solved(first, self.n_units, own=slice(self.context, None))
-        return _joined([self._outer(batch, status) for batch, status in solved])
+        settled = self._settled(first, self.n_units, own=slice(self.context, None))
+        return _joined([self._outer(states) for states in settled])
 
-    def _solved(
-        self, first: int, stop: int, own: slice
-    ) -> Iterator[tuple[Batch, NDArray[np.uint8]]]:
+    def _settled(self, first: int, stop: int, own: slice) -> Iterator[Settled]:
         units = self.units.section(first, stop)
         for codes in chunks(2 ** (stop - first), lanes_at_once(stop - first)):
-            batch = solve(units, Chain, inverted_units(codes, stop - first), self.tolerance)
-            yield batch, certify(batch, units, self.tolerance, own)
+            inverted = inverted_units(codes, stop - first)
+            yield settle(units, chain_potential, inverted, self.tolerance, own=own)
 
-    def _cut(self, first: int, stop: int) -> Chain:
-        return Chain(self.units.finger.units(first, stop))
-
-    def _inner(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
-        chain = self._cut(0, self.n_inner)
-        own = batch.equilibrium.coordinates[: len(chain.reach)]
-        at_own = evaluate(chain, own)
+    def _inner(self, settled: Settled) -> Half:
+        potential = chain_potential(settled.finger.section(0, self.n_inner))
+        chain = potential.coordinates
+        own = settled.equilibrium.coordinates[: chain.size]
+        at_own = potential.evaluate(own)
         pose, jacobian = chain.tip(own)
-        energies, joint = at_own.energies, None
+        joint = None
         if not chain.finger.is_rigid:
-            beyond = self._cut(self.n_inner, self.n_units).finger.straight_length[0]
-            joint = _inner_joint(chain, own, at_own, jacobian, beyond)
+            beyond = self.units.finger.section(self.n_inner, self.n_units).straight_length[0]
+            joint = _inner_joint(potential, own, at_own, jacobian, beyond)
         # an error of the angle moves all that is beyond
         lever = self.units.finger.straight_length[0]
-        half = self._half(batch, status, slice(0, self.n_inner), pose, energies, lever, joint)
+        energies = potential.by_kind(at_own.energies)
+        half = self._half(settled, slice(0, self.n_inner), pose, energies, lever, joint)
         return self._with_outline(half, chain, own)
 
-    def _outer(self, batch: Batch, status: NDArray[np.uint8]) -> Half:
-        chain = self._cut(self.n_inner, self.n_units)
-        coordinates = batch.equilibrium.coordinates
-        pose, jacobian = chain.tip(coordinates[-len(chain.reach) :])
-        energies, joint, held = batch.equilibrium.energies, None, None
+    def _outer(self, settled: Settled) -> Half:
+        finger = settled.finger
+        chain = Chain(finger.section(self.context, finger.n_units))
+        coordinates = settled.equilibrium.coordinates
+        pose, jacobian = chain.tip(coordinates[-chain.size :])
+        energies, joint, held = settled.equilibrium.energies, None, None
         if not chain.finger.is_rigid:
-            context = self._cut(self.n_inner - self.context, self.n_inner)
-            at_context = evaluate(context, coordinates[: len(context.reach)])
-            energies = {k: e - at_context.energies.get(k, 0.0) for k, e in energies.items()}
-            held = _held(batch, at_context)
-            joint = _outer_joint(batch, context, at_context, jacobian)
+            context = chain_potential(finger.section(0, self.context))
+            at_context = context.evaluate(coordinates[: context.coordinates.size])
+            of_context = context.by_kind(at_context.energies)
+            energies = {kind: e - of_context.get(kind, 0.0) for kind, e in energies.items()}
+            held = _held(settled, at_context)
+            joint = _outer_joint(settled, context, at_context, jacobian)
         own = slice(self.context, None)
-        half = self._half(batch, status, own, pose, energies, 0.0, joint, held)
-        return self._with_outline(half, chain, coordinates[-len(chain.reach) :])
+        half = self._half(settled, own, pose, energies, 0.0, joint, held)
+        return self._with_outline(half, chain, coordinates[-chain.size :])
 
     def _with_outline(self, half: Half, chain: Chain, own: Array) -> Half:
         """The half with its outline, as if its first strut were upright, if that is needed."""
@@ -169,8 +177,7 @@ class Split:
 
     def _half(
         self,
-        batch: Batch,
-        status: NDArray[np.uint8],
+        settled: Settled,
         own: slice,
         pose: Array,
         energies: dict[str, Array],
@@ -178,14 +185,14 @@ class Split:
         joint: Joint | None,
         held: Held | None = None,
     ) -> Half:
-        at_tip = tip(batch, with_compliance=False)
+        at_tip = tip(settled, with_compliance=False)
         return Half(
-            status,
-            batch.reached[own],
+            settled.status,
+            settled.reached[own],
             pose,
             energies,
-            batch.equilibrium.residual,
-            batch.equilibrium.relative_residual,
+            settled.equilibrium.residual,
+            settled.equilibrium.relative_residual,
             at_tip.error + lever * at_tip.angle_error,
             joint,
             held,
@@ -193,10 +200,10 @@ class Split:
 
 
 def _inner_joint(
-    chain: Chain, own: Array, at_own: Evaluation, jacobian: Array, beyond: float
+    potential: Potential[Chain], own: Array, at_own: Evaluation, jacobian: Array, beyond: float
 ) -> Joint:
     """The strut is the last unknown: its pivot is the stiffness left once the rest follows."""
-    factorization = factorize(at_own.hessian, chain.reach)
+    factorization = factorize(at_own.hessian, potential.column_depths)
     following = np.zeros_like(own)
     following[-1] = 1.0
     moved = total(jacobian * backward(factorization, following)[:, None])
@@ -205,19 +212,21 @@ def _inner_joint(
 
 
 @in_lanes
-def _outer_joint(batch: Batch, context: Chain, at_context: Evaluation, jacobian: Array) -> Joint:
+def _outer_joint(
+    settled: Settled, context: Potential[Chain], at_context: Evaluation, jacobian: Array
+) -> Joint:
     """A unit force on the strut moves context and outer half: what the context takes is known.
 
     Uses up the context's Hessian.
     """
-    strut = len(context.reach) - 1
-    equilibrium = batch.equilibrium
+    strut = context.coordinates.size - 1
+    equilibrium = settled.equilibrium
     answer = np.zeros_like(equilibrium.coordinates)
     answer[strut] = 1.0
     forward(equilibrium.factorization, answer)
     answer /= equilibrium.factorization.pivots
     backward(equilibrium.factorization, answer)
-    of_context = factorize(at_context.hessian, context.reach).pivots[strut]
+    of_context = factorize(at_context.hessian, context.column_depths).pivots[strut]
     moved = total(jacobian * (answer[strut + 1 :] / answer[strut])[:, None])
     return Joint(
         equilibrium.coordinates[strut],
@@ -227,16 +236,17 @@ def _outer_joint(batch: Batch, context: Chain, at_context: Evaluation, jacobian:
     )
 
 
-def _held(batch: Batch, at_context: Evaluation) -> Held:
+def _held(settled: Settled, at_context: Evaluation) -> Held:
     """The strut's column of the Hessian, without what the context adds on the diagonal."""
     strut = len(at_context.gradient) - 1
-    column = evaluate(batch.formulation, batch.equilibrium.coordinates).hessian[:, strut]
+    column = settled.potential.evaluate(settled.equilibrium.coordinates).hessian[:, strut]
+    chain = settled.potential.coordinates
     on_strut = column[0] - at_context.hessian[0, strut]
     near = slice(strut + 1, strut + len(column))
     return Held(
         on_strut,
-        _largest(column[1:], batch.formulation.force_unit[near]),
-        _largest(column[1:], batch.formulation.gradient_scale[near]),
+        _largest(column[1:], chain.force_unit[near]),
+        _largest(column[1:], chain.gradient_scale[near]),
     )
 
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.mechanics.chain import Chain
-from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, States, Status
+from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, SolvedStates, Status
 from dpgcli.states.crossing import Outline, diagonals, is_simple
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
@@ -17,7 +16,7 @@ from dpgcli.states.patterns import inverted_units
 STATES_AT_ONCE = 2**16
 
 
-def paired_states(split: Split) -> Iterator[States]:
+def paired_states(split: Split) -> Iterator[SolvedStates]:
     """All states in the order of their codes; a pair that does not fit is `NOT_CONVERGED`."""
     inner, outer = split.inner(), split.outer()
     rows = max(1, STATES_AT_ONCE >> split.n_outer)
@@ -65,7 +64,7 @@ class _Fit(NamedTuple):
     is_convex: Flags
 
 
-def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
+def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> SolvedStates:
     x, y, turn = block.inner(inner.pose)
     cos, sin = np.cos(turn), np.sin(turn)
     along, across, beyond = block.outer(outer.pose)
@@ -86,7 +85,7 @@ def _pair(split: Split, inner: Half, outer: Half, block: _Block) -> States:
     status[crosses & (status != Status.NOT_CONVERGED)] = Status.FOLDED
     codes = (block.patterns[:, None] << split.n_outer) + np.arange(2**split.n_outer)
     reached = (block.flat(block.inner(inner.reached)), block.flat(block.outer(outer.reached)))
-    return States(
+    return SolvedStates(
         inverted=inverted_units(codes.ravel().astype(np.uint64), split.n_units),
         reached=np.concatenate(reached),
         status=status,
@@ -155,8 +154,7 @@ def _fit(split: Split, inner: Half, outer: Half, block: _Block) -> _Fit:
     stiffness = inner_stiffness + outer_stiffness
     step = -(pull + outer_stiffness * apart) / stiffness
     gap = np.abs(apart)
-    strut = 4 * split.n_inner - 1
-    scale = float(Chain(split.units.finger).gradient_scale[strut, 0])
+    scale = split.strut_force
     return _Fit(
         np.maximum(residual + block.outer(outer.held.force) * gap, at_strut),
         np.maximum(relative + block.outer(outer.held.relative_force) * gap, at_strut / scale),

@@ -7,11 +7,10 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation
-from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, declared, named
 from dpgcli.states.costs import peak_bytes, seconds
@@ -30,7 +29,7 @@ from dpgcli.states.rungs import (
 )
 from dpgcli.states.units import Units
 
-FORMULATIONS: dict[str, type[Chain] | type[Lattice]] = {"chain": Chain, "lattice": Lattice}
+FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
 ON_REQUEST = (Group.NODES, Group.UNCERTAINTY)
@@ -148,14 +147,14 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     n_states = 2**n if selection is None else len(selection)
     if n_states > MOST_SELECTED:
         raise UsageError(too_many(n, "the finger has"))
-    formulation = FORMULATIONS[request.formulation](finger)
-    terms = tuple(term.kind for term in formulation.terms)
+    potential = FORMULATIONS[request.formulation](finger)
+    terms = potential.kinds
     is_fitted = scene.uncertainty is not None and request.formulation == "chain"
     available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
     dropped = rung is not None and rung.drops_bars
     columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
     groups = {column.group for column in columns}
-    split = _split(units, request, selection is None, n_states, groups)
+    split = _split(units, potential, request, selection is None, groups)
     n_solves = n_states if split is None else split.n_solves
     return Plan(
         scene=scene,
@@ -166,12 +165,12 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         selection=selection,
         n_states=n_states,
         terms=terms,
-        unknowns=len(formulation.reach),
+        unknowns=potential.coordinates.size,
         n_unit_solves=units.wells.exists.size,
         n_finger_solves=n_solves,
         columns=columns,
         omissions=(*_omissions(scene, units, split, n_solves, rung), *left_out),
-        residual_limit=request.tolerance * _largest_force(formulation),
+        residual_limit=request.tolerance * _largest_force(potential),
         bar_flexibility=flexibility,
         rung=rung,
         error_bound=bound,
@@ -182,8 +181,9 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     )
 
 
-def _largest_force(formulation: Formulation) -> float:
-    return float((formulation.gradient_scale / formulation.force_unit).max())
+def _largest_force(potential: FingerPotential) -> float:
+    scales = potential.coordinates
+    return float((scales.gradient_scale / scales.force_unit).max())
 
 
 def _check(scene: Scene, request: Request) -> None:
@@ -263,14 +263,22 @@ def _why_left_out(group: Group, n_states: int) -> str:
 
 
 def _split(
-    units: Units, request: Request, is_whole: bool, n_states: int, groups: set[Group]
+    units: Units,
+    potential: FingerPotential,
+    request: Request,
+    is_whole: bool,
+    groups: set[Group],
 ) -> Split | None:
     """Where to cut the finger, if all states are wanted and that is cheaper."""
     fits = groups <= {Group.STATES, Group.ENERGIES} and request.formulation == "chain"
-    fits = fits and not units.finger.law.pushes_only  # a half's springs depend on its pattern
-    if not (is_whole and fits and n_states >= FEWEST_PAIRED_STATES):
+    n_units = units.finger.n_units
+    if not (is_whole and fits and 2**n_units >= FEWEST_PAIRED_STATES):
         return None
-    n_inner = units.finger.n_units // 2
+    n_inner = n_units // 2
+    cut = n_inner * potential.coordinates.size // n_units
+    shared = slice(cut if units.finger.is_rigid else cut - 1, cut)  # a strut
+    if not potential.is_separable(shared):
+        return None
     for context in range(0 if units.finger.is_rigid else 1, LARGEST_CONTEXT + 1):
         if _agrees(units.finger, n_inner, context, 0.1 * request.tolerance):
             return Split(units, n_inner, context, request.tolerance)
@@ -279,7 +287,7 @@ def _split(
 
 def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> bool:
     """Whether halves with that much context fit, tried on the units around the cut."""
-    around = finger.units(n_inner - context - 1, n_inner + context + 1)
+    around = finger.section(n_inner - context - 1, n_inner + context + 1)
     trial = Split(Units.of(around), context + 1, context, tolerance)
     return all((s.status != Status.NOT_CONVERGED).all() for s in paired_states(trial))
 

@@ -13,7 +13,7 @@ from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.rows import Columns, as_text, solved_rows, state_columns
-from dpgcli.states.solve import lanes_at_once
+from dpgcli.states.settle import lanes_at_once
 
 
 @dataclass

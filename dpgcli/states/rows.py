@@ -1,6 +1,5 @@
 """From certified states to the columns of a table, named as in `columns`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
-from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation, Stations
+from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
 from dpgcli.mechanics.scene import Gripper, Uncertainty
-from dpgcli.states.certify import Batch, States, Status, certify
+from dpgcli.mechanics.terms import Formulate
+from dpgcli.states.certify import Settled, SolvedStates, Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.gripper import grip
 from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import sensitivities
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
 from dpgcli.states.units import Units
 
@@ -37,7 +36,7 @@ def _is_state(status: NDArray[np.uint8]) -> Flags:
     return np.asarray((status == Status.STABLE) | (status == Status.MARGINAL))
 
 
-def state_columns(states: States) -> Columns:
+def state_columns(states: SolvedStates) -> Columns:
     """What every method knows; numbers of a pattern that has no state are NaN."""
     is_state = _is_state(states.status)
     energies = states.energies
@@ -66,7 +65,7 @@ class Wanted:
     units lack of the scene are numbers, or arrays by lane.
     """
 
-    formulate: Callable[[Finger], Formulation]
+    formulate: Formulate
     tolerance: float
     groups: frozenset[Group]
     gripper: Gripper | None = None
@@ -80,41 +79,41 @@ def solved_rows(units: Units, inverted: Flags, wanted: Wanted) -> Columns:
 
     The units have one design, or one for each state.
     """
-    batch = solve(units, wanted.formulate, inverted, wanted.tolerance)
-    status = certify(batch, units, wanted.tolerance)
-    at_tip = tip(batch, with_compliance=Group.STIFFNESS in wanted.groups)
-    states = States(
+    settled = settle(units, wanted.formulate, inverted, wanted.tolerance)
+    at_tip = tip(settled, with_compliance=Group.STIFFNESS in wanted.groups)
+    states = SolvedStates(
         inverted,
-        batch.reached,
-        status,
+        settled.reached,
+        settled.status,
         at_tip.pose,
         at_tip.error + wanted.dropped_error,
-        batch.equilibrium.energies,
-        batch.equilibrium.residual,
+        settled.equilibrium.energies,
+        settled.equilibrium.residual,
     )
-    return state_columns(states) | _batch_columns(wanted, batch, at_tip, status)
+    return state_columns(states) | _settled_columns(wanted, settled, at_tip)
 
 
-def _batch_columns(wanted: Wanted, batch: Batch, at_tip: Tip, status: NDArray[np.uint8]) -> Columns:
+def _settled_columns(wanted: Wanted, settled: Settled, at_tip: Tip) -> Columns:
     """What only a solve of the whole finger knows, for the groups that are wanted."""
     groups = wanted.groups
     columns: Columns = {}
     if Group.EIGENVALUE in groups:
-        columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(batch)
+        columns["min_eigenvalue_N_per_mm"] = min_eigenvalues(settled)
     if at_tip.compliance is not None and at_tip.stiffness is not None:
         columns |= _stiffness_columns(at_tip.compliance, at_tip.stiffness)
     if wanted.uncertainty is not None and Group.UNCERTAINTY in groups:
-        columns |= _uncertainty_columns(batch, wanted.uncertainty)
-    coordinates = batch.equilibrium.coordinates
+        columns |= _uncertainty_columns(settled, wanted.uncertainty)
+    coordinates = settled.potential.coordinates
+    values = settled.equilibrium.coordinates
     if Group.OPENINGS in groups:
-        openings = batch.formulation.openings(coordinates)
+        openings = coordinates.openings(values)
         columns |= {f"opening_{i}_mm": x for i, x in enumerate(openings, start=1)}
     if Group.GRIPPER in groups or Group.NODES in groups:
-        columns |= _shape_columns(wanted, batch.formulation, coordinates)
-    is_state = _is_state(status)
+        columns |= _shape_columns(wanted, coordinates, values)
+    is_state = _is_state(settled.status)
     return {
-        name: values & is_state if values.dtype == bool else np.where(is_state, values, np.nan)
-        for name, values in columns.items()
+        name: column & is_state if column.dtype == bool else np.where(is_state, column, np.nan)
+        for name, column in columns.items()
     }
 
 
@@ -132,9 +131,9 @@ def _stiffness_columns(compliance: Array, stiffness: Array) -> Columns:
     }
 
 
-def _uncertainty_columns(batch: Batch, uncertainty: Uncertainty) -> Columns:
+def _uncertainty_columns(settled: Settled, uncertainty: Uncertainty) -> Columns:
     """σ² = s C sᵀ with s the tip's derivatives by fitted values and C their covariance."""
-    slopes = sensitivities(batch, uncertainty.directions).pose
+    slopes = sensitivities(settled, uncertainty.directions).pose
     terms = [
         covariance * slopes[:, k] * slopes[:, m]
         for (k, m), covariance in np.ndenumerate(uncertainty.covariance)
@@ -147,9 +146,9 @@ def _uncertainty_columns(batch: Batch, uncertainty: Uncertainty) -> Columns:
     }
 
 
-def _shape_columns(wanted: Wanted, formulation: Formulation, coordinates: Array) -> Columns:
+def _shape_columns(wanted: Wanted, coordinates: FingerCoordinates, values: Array) -> Columns:
     """Node positions with the clamped ones, of the finger or of the gripper's two."""
-    nodes = _with_base(formulation.stations(coordinates), formulation.finger.segment_height)
+    nodes = _with_base(coordinates.stations(values), coordinates.finger.segment_height)
     if wanted.gripper is None:
         return _node_columns("", nodes, 1.0)
     gripped = grip(wanted.gripper, wanted.layer_thickness, nodes)

@@ -18,9 +18,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.formulation import Internal
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.coordinates import Internal
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.tip import TIP_ROUNDING
 from dpgcli.states.units import Units
 from dpgcli.states.wells import single_units
@@ -123,7 +122,8 @@ def _corner_stiffness(units: Units) -> Array:
     rest = np.zeros((1, 1))
     least = np.full_like(angle, np.inf)
     for corner, inverted in ((np.zeros_like(angle), False), (angle, True)):
-        chain = Chain(bent.with_pattern(np.full(angle.shape, inverted)))
-        band = evaluate(chain, chain.coordinates(Internal(rest, corner, corner, rest))).hessian
+        potential = chain_potential(bent.with_domes(np.full(angle.shape, inverted)))
+        at = potential.coordinates.of_shape(Internal(rest, corner, corner, rest))
+        band = potential.evaluate(at).hessian
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
     return np.where(least > 0.0, least, 0.0).reshape(shape)

@@ -14,10 +14,10 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.equilibrium.banded import backward, forward
-from dpgcli.mechanics.chain import Chain, internal
+from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import evaluate
-from dpgcli.states.certify import Batch
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Settled
 
 STEP = 1e-100
 Direction = Mapping[str, Array]
@@ -35,49 +35,45 @@ class Sensitivities:
     strut_angles: Array
 
 
-def sensitivities(batch: Batch, directions: Sequence[Direction]) -> Sensitivities:
+def sensitivities(settled: Settled, directions: Sequence[Direction]) -> Sensitivities:
     """Derivatives of states by changes of their finger.
 
-    `batch` is one of the chain's; a direction gives the rates of change of some of the finger's
-    arrays by name, each (1 or unit, 1 or design).
+    `settled` is in the chain's coordinates; a direction gives the rates of change of some of the
+    finger's arrays by name, each (1 or unit, 1 or design).
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
-    >>> from dpgcli.states.solve import solve
+    >>> from dpgcli.states.settle import settle
     >>> from dpgcli.states.units import Units
     >>> units = Units.of(uniform_finger(1, **STUDY))
-    >>> batch = solve(units, Chain, np.array([[True]]), 1e-12)
-    >>> found = sensitivities(batch, [{"segment_length": np.ones((1, 1))}])
+    >>> settled = settle(units, chain_potential, np.array([[True]]), 1e-12)
+    >>> found = sensitivities(settled, [{"segment_length": np.ones((1, 1))}])
     >>> print(abs(found.pose[2]).round(12))  # turning does not depend on L in the rigid limit
     [[0.]]
     """
-    found = [_along(batch, direction) for direction in directions]
+    found = [_along(settled, direction) for direction in directions]
     return Sensitivities(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _along(batch: Batch, direction: Direction) -> tuple[Array, ...]:
-    equilibrium = batch.equilibrium
+def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
+    equilibrium = settled.equilibrium
     coordinates = equilibrium.coordinates
     here = cast("Array", coordinates + 0j)
-    moved = Chain(_moved(batch, direction))
+    moved = chain_potential(_moved(settled, direction))
     with np.errstate(divide="ignore", invalid="ignore"):  # lanes that are no states
-        forces = evaluate(moved, here).gradient.imag / STEP
+        forces = moved.evaluate(here).gradient.imag / STEP
         change = forward(equilibrium.factorization, -forces)
         change /= equilibrium.factorization.pivots
         change = backward(equilibrium.factorization, change)
         stepped = here + 1j * STEP * change
-        stations = moved.stations(stepped)
-        _, near, far, _ = internal(change, moved.finger.is_rigid)
+        stations = moved.coordinates.stations(stepped)
+        _, near, far, _ = internal(change, moved.coordinates.finger.is_rigid)
         turns = -np.cumsum(near + far, axis=0)
     x, y = (nodes[-1].imag / STEP for nodes in (stations.base_x, stations.base_y))
     return np.stack((x, y, turns[-1])), turns
 
 
-def _moved(batch: Batch, direction: Direction) -> Finger:
+def _moved(settled: Settled, direction: Direction) -> Finger:
     """The finger an imaginary step along a direction."""
-    finger = batch.formulation.finger
-    arrays = {}
-    for name, rates in direction.items():
-        if name == "bistable_stiffness" and finger.law.pushes_only:
-            rates = rates * batch.inverted  # ground units have no springs
-        arrays[name] = getattr(finger, name) + 1j * STEP * rates
-    return finger.changed(**arrays)
+    finger = settled.finger
+    rates = direction.items()
+    return finger.changed(**{n: getattr(finger, n) + 1j * STEP * rate for n, rate in rates})

@@ -6,7 +6,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, total
 from dpgcli.equilibrium.banded import forward
-from dpgcli.states.certify import MARGINAL_CURVATURE, Batch
+from dpgcli.states.certify import MARGINAL_CURVATURE, Settled
 
 TIP_ROUNDING = 8.0 * np.finfo(float).eps
 CANCELLED = 1e-3  # of the product: below it the determinant is found without cancellation
@@ -29,7 +29,7 @@ class Tip:
     stiffness: Array | None = None
 
 
-def tip(batch: Batch, *, with_compliance: bool) -> Tip:
+def tip(settled: Settled, *, with_compliance: bool) -> Tip:
     """Pose, error and compliance C = J H⁻¹ Jᵀ of the tip from the factorization at hand.
 
     The error is twice the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a
@@ -37,9 +37,9 @@ def tip(batch: Batch, *, with_compliance: bool) -> Tip:
     since between very stiff bars of the lattice that step itself has lost its digits; infinite
     for a marginal state.
     """
-    equilibrium = batch.equilibrium
-    finger = batch.formulation.finger
-    pose, jacobian = batch.formulation.tip(equilibrium.coordinates)
+    equilibrium = settled.equilibrium
+    finger = settled.finger
+    pose, jacobian = settled.potential.coordinates.tip(equilibrium.coordinates)
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
     sides = forward(equilibrium.factorization, sides)
     with np.errstate(all="ignore"):  # a mechanism has no stiffness, or nearly none
@@ -86,7 +86,7 @@ def _determinant(x: Array, y: Array) -> Array:
     return np.asarray(square * np.where(np.sqrt(apart) > smallest, apart, 0.0))
 
 
-def min_eigenvalues(batch: Batch) -> Array:
+def min_eigenvalues(settled: Settled) -> Array:
     """Smallest eigenvalue of the Hessian in node coordinates, N/mm, shape (batch,).
 
     At an equilibrium the compliance of all nodes is C = J H⁻¹ Jᵀ with J the nodes' derivatives
@@ -94,9 +94,9 @@ def min_eigenvalues(batch: Batch) -> Array:
     do not touch its digits, and rigid bars need no special case. NaN where H is not positive
     definite.
     """
-    equilibrium = batch.equilibrium
+    equilibrium = settled.equilibrium
     positive = np.asarray((equilibrium.factorization.pivots > 0.0).all(axis=0))
-    nodes = batch.formulation.station_jacobian(equilibrium.coordinates)
+    nodes = settled.potential.coordinates.station_jacobian(equilibrium.coordinates)
     sides = forward(equilibrium.factorization, nodes)
     roots = np.sqrt(np.where(positive, equilibrium.factorization.pivots, 1.0))
     matrices = np.where(positive, sides / roots[:, None], 0.0).transpose(2, 0, 1)

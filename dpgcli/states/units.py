@@ -62,11 +62,16 @@ class Units:
 
     def section(self, first: int, stop: int) -> "Units":
         """Units first+1 … stop, counted from the base, with all that is known of them."""
-        finger = self.finger.units(first, stop)
-        return Units(finger, self.wells.units(first, stop), self.first_order.units(first, stop))
+        return Units(
+            self.finger.section(first, stop),
+            self.wells.section(first, stop),
+            self.first_order.section(first, stop),
+        )
 
-    def designs(self, index: Indices) -> "Units":
+    def take_lanes(self, index: Indices) -> "Units":
         """One design for each lane, by index, so that designs and patterns share a batch."""
         return Units(
-            self.finger.designs(index), self.wells.designs(index), self.first_order.designs(index)
+            self.finger.take_lanes(index),
+            self.wells.take_lanes(index),
+            self.first_order.take_lanes(index),
         )

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
 
@@ -28,12 +29,12 @@ BISECTIONS = 48  # of one 512th of the range: down to rounding
 class ByUnit:
     """Arrays of shape (unit or 1, design or 1)."""
 
-    def designs(self, index: Indices) -> Self:
+    def take_lanes(self, index: Indices) -> Self:
         """The designs at `index`, in its order; a design may repeat."""
         arrays = (getattr(self, field.name) for field in fields(self))
-        return type(self)(*(v if v.shape[1] == 1 else np.take(v, index, axis=1) for v in arrays))
+        return type(self)(*(take_lanes(v, index) for v in arrays))
 
-    def units(self, first: int, stop: int) -> Self:
+    def section(self, first: int, stop: int) -> Self:
         """The units first+1 … stop, counted from the base."""
         arrays = (getattr(self, field.name) for field in fields(self))
         return type(self)(*(v if len(v) == 1 else v[first:stop] for v in arrays))
@@ -102,10 +103,8 @@ def _opened(finger: Finger, widest: Array) -> Array:
 
     A dome that only pushes has to be in touch, or nothing would hold the unit there.
     """
-    opening = finger.stroke
-    if finger.law.pushes_only:
-        well = finger.law.rests(finger.domes).well
-        opening = np.where(np.isnan(well), opening, IN_TOUCH * well)
+    highest = finger.law.touching(finger.domes).highest
+    opening = np.where(np.isfinite(highest), IN_TOUCH * highest, finger.stroke)
     return np.asarray(np.minimum(opening, widest))
 
 
@@ -140,9 +139,9 @@ def _searched_wells(finger: Finger) -> Wells:
     own = finger.law.rests(domes).well + domes.contact  # a travel; the unit's is shorter
     furthest = WIDEST * np.where(np.isnan(own), whole, own)
     widest = np.minimum(furthest - domes.contact, (1.0 - 1e-9) * lever)
-    lowest = finger.law.rests(domes).top if finger.law.pushes_only else 0.0 * widest
+    lowest = finger.law.touching(domes).lowest
     within_reach = ~(lowest >= widest)  # of a unit whose bars are rigid
-    lowest = np.where(within_reach & ~np.isnan(lowest), lowest, 0.0)
+    lowest = np.where(within_reach & np.isfinite(lowest), lowest, 0.0)
     shares = np.linspace(0.0, 1.0, SEARCHED + 1)[1:, None, None]
     grid = lowest + (widest - lowest) * shares
     slope = _rigid_slope(finger, grid)

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.certify import Status, certify
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
 from dpgcli.states.margins import limits, margins
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
@@ -244,8 +244,8 @@ def _last_linearity(unit: Finger) -> float:
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         units = Units.of(changed(unit, force_linearity=middle))
-        batch = solve(units, Chain, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
-        is_stable = certify(batch, units, DEFAULT_TOLERANCE)[0] == Status.STABLE
+        settled = settle(units, chain_potential, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
+        is_stable = settled.status[0] == Status.STABLE
         low, high = (middle, high) if is_stable else (low, middle)
     return low
 

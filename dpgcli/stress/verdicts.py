@@ -11,14 +11,14 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation, Internal
-from dpgcli.mechanics.terms import evaluate
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
-from dpgcli.states.certify import Batch, Status, certify
+from dpgcli.states.certify import Settled, Status
+from dpgcli.states.guess import stroke_guess
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.states.solve import search, solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
@@ -113,21 +113,22 @@ def answered(case: Case) -> Answer:
     """What the solver says, in the case's own units of length."""
     scale = case.variant.scale
     units = Units.of(scaled(case.variant.finger, scale))
-    batch = _batch(case, units)
-    at_tip = tip(batch, with_compliance=False)
-    stations = batch.formulation.stations(batch.equilibrium.coordinates)
-    floor, condition = _numerics(batch.formulation, batch.equilibrium.coordinates)
+    settled = _settled(case, units)
+    equilibrium = settled.equilibrium
+    at_tip = tip(settled, with_compliance=False)
+    stations = settled.potential.coordinates.stations(equilibrium.coordinates)
+    floor, condition = _numerics(settled.potential, equilibrium.coordinates)
     return Answer(
-        status=Status(certify(batch, units, DEFAULT_TOLERANCE)[0]),
-        reached=batch.reached,
+        status=Status(settled.status[0]),
+        reached=settled.reached,
         nodes=np.stack(stations, axis=1).reshape(-1, 1) / scale,
         pose=at_tip.pose[:, 0] / np.array([scale, scale, 1.0]),
         tip_error=float(at_tip.error[0]) / scale,
         angle_error=float(at_tip.angle_error[0]),
-        residual=float(batch.equilibrium.residual[0]),
+        residual=float(equilibrium.residual[0]),
         residual_floor=floor,
         condition=condition,
-        iterations=int(batch.equilibrium.iterations[0]),
+        iterations=int(equilibrium.iterations[0]),
     )
 
 
@@ -140,32 +141,30 @@ def scaled(finger: Finger, scale: float) -> Finger:
     return finger.changed(**changes)
 
 
-def _batch(case: Case, units: Units) -> Batch:
+def _settled(case: Case, units: Units) -> Settled:
     """Where the search ends, from wherever the case begins it."""
-    start = case.variant.start
+    begin, shape = case.variant.start, None
+    if begin.corners is not None:
+        rest = np.zeros((1, 1))
+        near, far = (np.full((1, 1), angle) for angle in begin.corners)
+        shape = Internal(rest, near, far, rest)
+    elif begin.strokes is not None:
+        shape = stroke_guess(units.finger, case.inverted, begin.strokes)
     formulate = FORMULATIONS[case.formulation]
-    if start.corners is None:
-        strokes = start.strokes
-        return solve(units, formulate, case.inverted, DEFAULT_TOLERANCE, strokes=strokes)
-    formulation = formulate(units.finger)
-    rest = np.zeros((1, 1))
-    near, far = (np.full((1, 1), angle) for angle in start.corners)
-    guess = Internal(rest, near, far, rest)
-    at = formulation.coordinates(guess)
-    return search(units, formulation, case.inverted, at, DEFAULT_TOLERANCE)
+    return settle(units, formulate, case.inverted, DEFAULT_TOLERANCE, start=shape)
 
 
-def _numerics(formulation: Formulation, coordinates: Array) -> tuple[float, float]:
+def _numerics(potential: FingerPotential, coordinates: Array) -> tuple[float, float]:
     """What rounding leaves of the residual (N), and the condition of the Hessian H.
 
     Each coordinate q is stored to within ε/2 of itself, and evaluating as much again: ε |H| |q|.
     The condition, in the 2-norm, is that of H scaled to a unit diagonal: of what no choice of
     units for the coordinates can mend (van der Sluis 1969, to a factor of their number).
     """
-    hessian = _dense(evaluate(formulation, coordinates).hessian)
+    hessian = _dense(potential.evaluate(coordinates).hessian)
     if not np.isfinite(hessian).all():
         return np.nan, np.inf
-    rounding = np.abs(hessian) @ np.abs(coordinates) / formulation.force_unit
+    rounding = np.abs(hessian) @ np.abs(coordinates) / potential.coordinates.force_unit
     own = np.sqrt(np.abs(np.diag(hessian)))
     own[own == 0.0] = 1.0
     condition = float(np.linalg.cond(hessian / own / own[:, None]))

@@ -13,8 +13,8 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.scene_file import variant
 from dpgcli.files.sections import unit_of
 from dpgcli.files.sweep_file.space import UNITS, flattened
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.scene import Origin, Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.columns import Column, Group, Kind, declared
 from dpgcli.states.rows import Columns
 from dpgcli.sweeps.designs import choices, design_states
@@ -153,14 +153,14 @@ class Evaluation:
     def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "Iterator[_Solved]":
         group = [scenes[place] for place in places]
         if self.target_error is None:
-            for block in design_states(group, Chain, self.tolerance, self.groups):
+            for block in design_states(group, chain_potential, self.tolerance, self.groups):
                 yield _Solved(np.array(places)[block.places], block.rows, block.metrics)
             return
         for choice in choices(group, self.target_error):
             rung = choice.rung
             chosen = [group[place] for place in choice.places]
             for block in design_states(
-                chosen, Chain, rung.tolerance, self.groups, drops_bars=rung.drops_bars
+                chosen, chain_potential, rung.tolerance, self.groups, drops_bars=rung.drops_bars
             ):
                 if block.metrics is not None:
                     block.metrics["rung"] = np.full(len(block.places), rung.name)

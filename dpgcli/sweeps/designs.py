@@ -1,6 +1,6 @@
 """Many designs at once: all states of each in bounded blocks, and their metrics."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from dpgcli.arrays import Array, Codes, Indices
 from dpgcli.mechanics.finger import ARRAYS, Finger
-from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.scene import Gripper, Scene
+from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.columns import Group
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.rows import Columns, Wanted, solved_rows
 from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
-from dpgcli.states.solve import lanes_at_once
+from dpgcli.states.settle import lanes_at_once
 from dpgcli.states.units import Units
 from dpgcli.sweeps.metrics import Metrics
 
@@ -55,7 +55,7 @@ class Block(NamedTuple):
 
 def design_states(
     scenes: Sequence[Scene],
-    formulate: Callable[[Finger], Formulation],
+    formulate: Formulate,
     tolerance: float,
     groups: frozenset[Group],
     *,
@@ -94,7 +94,7 @@ def design_states(
 
 def _designs(units: Units, index: Indices) -> Units:
     """Units of the designs at `index`; what there is one design of stays one."""
-    return units.designs(index) if units.wells.exists.shape[1] > 1 else units
+    return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 
 
 def _joined(parts: Sequence[Columns], *, drops_bars: bool) -> Columns:

@@ -10,11 +10,11 @@ from dpgcli.arrays import Array
 from dpgcli.benchmark import peers
 from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.benchmark.peers import Solve, tip_pose
+from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import lattice_potential
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
@@ -46,7 +46,7 @@ def task() -> Task:
     assert (rows["status"] == "stable").all()
     return Task(
         finger,
-        Lattice(finger).coordinates(stroke_guess(finger, inverted, 1.0)),
+        Lattice(finger).of_shape(stroke_guess(finger, inverted, 1.0)),
         np.stack([rows[name] for name in ("tip_x_mm", "tip_y_mm", "tip_angle_rad")]),
         rows["energy_mJ"],
     )
@@ -79,7 +79,7 @@ def solver(name: str, finger: Finger) -> Solve:
 
 def shaken(finger: Finger, seed: int) -> Array:
     """The straight finger with its nodes moved by about 0.3 mm, (4 n,)."""
-    straight = Lattice(finger).coordinates(Internal(*np.zeros((4, 1, 1))))
+    straight = Lattice(finger).of_shape(Internal(*np.zeros((4, 1, 1))))
     return straight[:, 0] + np.random.default_rng(seed).normal(0.0, 0.3, len(straight))
 
 
@@ -112,7 +112,7 @@ def test_peers_reach_the_stable_states(name: str, task: Task) -> None:
 @pytest.mark.parametrize("name", TOLERANCES)
 def test_peers_take_graded_fingers(name: str, graded_finger: Callable[..., Finger]) -> None:
     finger = graded_finger(2, 5)
-    start = Lattice(finger).coordinates(stroke_guess(finger, np.array([[True], [True]]), 1.0))
+    start = Lattice(finger).of_shape(stroke_guess(finger, np.array([[True], [True]]), 1.0))
     rows = predict(Scene(finger, sources=())).arrays()
     assert rows["status"][3] == "stable"
     pose = tip_pose(solver(name, finger)(start[:, 0])[:, None])
@@ -125,7 +125,7 @@ def test_energy_and_gradient_are_those_of_the_lattice(
 ) -> None:
     finger = graded_finger(1 + seed, seed)
     nodes = shaken(finger, seed)
-    expected = evaluate(Lattice(finger), nodes[:, None])
+    expected = lattice_potential(finger).evaluate(nodes[:, None])
     value, gradient = SpringNetwork.of(finger).energy_and_gradient(nodes)
     assert value == pytest.approx(expected.energy[0], rel=1e-12)
     largest = np.abs(gradient).max()
@@ -162,7 +162,7 @@ def test_springable_gives_up_in_silence(task: Task, capsys: pytest.CaptureFixtur
 def test_tip_angle_counts_full_turns() -> None:
     finger = uniform_finger(20, **REFERENCE)
     rest, corner = np.zeros((1, 1)), np.full((20, 1), 0.2)
-    nodes = Lattice(finger).coordinates(Internal(rest, corner, corner, rest))
+    nodes = Lattice(finger).of_shape(Internal(rest, corner, corner, rest))
     assert tip_pose(nodes)[2] == pytest.approx(-8.0, rel=1e-13)
 
 

@@ -15,12 +15,12 @@ from dpgcli.arrays import keep_freed_memory
 from dpgcli.files.table_writer import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import lanes_at_once, solve
+from dpgcli.states.settle import lanes_at_once, settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -38,7 +38,7 @@ def varied_designs(n_units: int, n_designs: int) -> Finger:
 
 
 def certified(units: Units, inverted: Any, formulation: Any) -> None:
-    batch = solve(units, formulation, inverted, 1e-12)
+    batch = settle(units, formulation, inverted, 1e-12)
     status = certify(batch, units, 1e-12)
     tip(batch, with_compliance=True)
     assert (status == Status.STABLE).all()
@@ -54,11 +54,11 @@ def test_all_states_of_many_five_unit_designs(benchmark: Any) -> None:
     finger = varied_designs(5, n_designs)
     inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), n_designs)
     designs = np.repeat(np.arange(n_designs), 32)
-    benchmark(lambda: certified(Units.of(finger).designs(designs), inverted, Chain))
+    benchmark(lambda: certified(Units.of(finger).take_lanes(designs), inverted, Chain))
     note_rate(benchmark, inverted.shape[1])
 
 
-@pytest.mark.parametrize("formulation", [Chain, Lattice])
+@pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 def test_states_of_one_five_unit_finger(benchmark: Any, formulation: Any) -> None:
     keep_freed_memory()
     units = Units.of(uniform_finger(5, **REFERENCE))

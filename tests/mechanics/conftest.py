@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal
 
 
 @pytest.fixture(scope="session")

@@ -7,21 +7,20 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain
+from dpgcli.equilibrium.potential import Potential
+from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation, Internal
-from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 
-FORMULATIONS: dict[str, tuple[type[Chain] | type[Lattice], float]] = {
-    "chain": (Chain, 1e4),
-    "rigid": (Chain, np.inf),
-    "lattice": (Lattice, 1e4),
+FORMULATIONS: dict[str, tuple[Formulate, float]] = {
+    "chain": (chain_potential, 1e4),
+    "rigid": (chain_potential, np.inf),
+    "lattice": (lattice_potential, 1e4),
 }
 OPENING_ANGLE = np.deg2rad(17.36175941)  # of an inverted unit with rigid bars
-Case = tuple[Formulation, Array, Array]
+Case = tuple[FingerPotential, Array, Array]
 
 
 def energy_of(u: Array) -> Array:
@@ -58,12 +57,12 @@ def case(
     finger = replace(finger, law=LAWS[law])
     potential = formulation(finger)
     shape = random_shape(n_units, 12)
-    if finger.law.pushes_only:  # where domes and neighbors touch
+    if isinstance(finger.law, PushOnly):  # where domes and neighbors touch
         corner = np.arcsin(0.75 * finger.stroke / (2.0 * finger.segment_height))
         chord, near, far, strut = (0.05 * part for part in shape)
         shape = Internal(chord, corner + near, corner + far, strut)
-    coordinates = potential.coordinates(shape)
-    lever = np.broadcast_to(potential.force_unit, coordinates.shape)[:, 0]
+    coordinates = potential.coordinates.of_shape(shape)
+    lever = np.broadcast_to(potential.coordinates.force_unit, coordinates.shape)[:, 0]
     return potential, coordinates, 1.0 / lever  # 1 mm, or as much of an angle
 
 
@@ -72,12 +71,11 @@ def agree(exact: Array, numeric: Array) -> bool:
     return bool(np.abs(exact - numeric).max() <= 1e-7 * np.abs(numeric).max())
 
 
-def derivatives(potential: Formulation, kind: str, coordinates: Array) -> tuple[Array, ...]:
-    """Energy, gradient and band of the term of one kind."""
-    (term,) = (term for term in potential.terms if term.kind == kind)
-    gradient = np.zeros_like(coordinates)
-    hessian = np.zeros((max(potential.reach) + 1, *coordinates.shape))
-    return term.add_to(coordinates, gradient, hessian), gradient, hessian
+def derivatives(potential: FingerPotential, kind: str, coordinates: Array) -> tuple[Array, ...]:
+    """Energy, gradient and band of the terms of one kind."""
+    terms = tuple(term for term in potential.terms if term.kind == kind)
+    evaluation = Potential(potential.coordinates, terms).evaluate(coordinates)
+    return evaluation.energy, evaluation.gradient, evaluation.hessian
 
 
 @pytest.mark.parametrize("kind", ["bistable", "hinge", "bar"])
@@ -86,7 +84,7 @@ def test_gradient_is_the_derivative_of_the_energy(
 ) -> None:
     potential, coordinates, scale = case
     if kind not in {term.kind for term in potential.terms}:
-        assert potential.finger.is_rigid and kind == "bar"
+        assert potential.coordinates.finger.is_rigid and kind == "bar"
         return
     _, gradient, _ = derivatives(potential, kind, coordinates)
     numeric = central_difference(lambda x: derivatives(potential, kind, x)[0], coordinates, scale)
@@ -102,7 +100,7 @@ def test_hessian_is_the_derivative_of_the_gradient(
 ) -> None:
     potential, coordinates, scale = case
     if kind not in {term.kind for term in potential.terms}:
-        assert potential.finger.is_rigid and kind == "bar"
+        assert potential.coordinates.finger.is_rigid and kind == "bar"
         return
     exact = dense(derivatives(potential, kind, coordinates)[2])[:, :, 0] * np.outer(scale, scale)
     numeric = central_difference(
@@ -118,11 +116,11 @@ def test_pose_jacobians_are_derivatives(
     potential, coordinates, scale = case
 
     def nodes(x: Array) -> Array:
-        return np.stack(potential.stations(x), axis=1).reshape(-1, x.shape[1])
+        return np.stack(potential.coordinates.stations(x), axis=1).reshape(-1, x.shape[1])
 
     for exact, function in (
-        (potential.tip(coordinates)[1], lambda x: potential.tip(x)[0]),
-        (potential.station_jacobian(coordinates), nodes),
+        (potential.coordinates.tip(coordinates)[1], lambda x: potential.coordinates.tip(x)[0]),
+        (potential.coordinates.station_jacobian(coordinates), nodes),
     ):
         exact = exact * scale[:, None, None]
         numeric = central_difference(function, coordinates, scale)
@@ -144,27 +142,29 @@ def test_reach_covers_the_hessian(
     arrays = graded_finger(n_units, 1, linear_stiffness=stiffness).arrays()
     arrays["hinge_stiffness"] = arrays["hinge_stiffness"] * has_hinges
     potential = formulation(Finger(n_units, **arrays))
-    band = evaluate(potential, potential.coordinates(random_shape(n_units, 2))).hessian
+    band = potential.evaluate(potential.coordinates.of_shape(random_shape(n_units, 2))).hessian
     depth = np.arange(len(band))[:, None]
-    assert not band[depth[:, 0, None] > np.array(potential.reach)].any()
+    assert not band[depth[:, 0, None] > np.array(potential.column_depths)].any()
     assert ("hinge" in {term.kind for term in potential.terms}) is has_hinges
 
 
 def test_single_unit_has_the_closed_form(reference_finger: Callable[..., Finger]) -> None:
-    unit = Chain(reference_finger(1))
+    unit = chain_potential(reference_finger(1))
     half = 0.5 * OPENING_ANGLE
     open_unit = np.full((2, 1), half)
-    evaluation = evaluate(unit, open_unit)
-    assert unit.openings(open_unit) == pytest.approx(3.2450151985, abs=1e-9)
-    assert unit.openings(open_unit) == pytest.approx(2 * 10.75 * np.sin(half), rel=1e-15)
+    evaluation = unit.evaluate(open_unit)
+    assert unit.coordinates.openings(open_unit) == pytest.approx(3.2450151985, abs=1e-9)
+    assert unit.coordinates.openings(open_unit) == pytest.approx(
+        2 * 10.75 * np.sin(half), rel=1e-15
+    )
     assert evaluation.energy == pytest.approx(4.3613588754, abs=1e-10)
     assert np.abs(evaluation.gradient).max() <= 1e-6  # the angle is rounded to 1e-8 degrees
 
 
 def test_single_unit_turns_over_at_its_barrier(reference_finger: Callable[..., Finger]) -> None:
-    unit = Chain(reference_finger(1))
+    unit = chain_potential(reference_finger(1))
     barrier = np.full((2, 1), np.arcsin(0.5 * 2.0041742418 / 10.75))
-    evaluation = evaluate(unit, barrier)
+    evaluation = unit.evaluate(barrier)
     assert evaluation.energy == pytest.approx(6.0382332675, abs=1e-10)
     assert np.abs(evaluation.gradient).max() <= 1e-6
 
@@ -173,7 +173,7 @@ def test_single_unit_snaps_and_resets_at_the_known_forces(
     reference_finger: Callable[..., Finger],
 ) -> None:
     half = np.linspace(0.0, 0.5 * OPENING_ANGLE, 20_001)
-    gradient = evaluate(Chain(reference_finger(1)), np.stack((half, half))).gradient
+    gradient = chain_potential(reference_finger(1)).evaluate(np.stack((half, half))).gradient
     force = 0.5 * gradient.sum(axis=0) / (10.75 * np.cos(half))  # de/dφ over dx/dφ
     assert force.max() == pytest.approx(4.72618, abs=1e-5)
     assert force.min() == pytest.approx(-2.05467, abs=1e-5)
@@ -182,7 +182,7 @@ def test_single_unit_snaps_and_resets_at_the_known_forces(
 def test_hinge_stiffens_the_closed_unit_by_its_share(
     reference_finger: Callable[..., Finger], dense: Callable[[Array], Array]
 ) -> None:
-    closed = evaluate(Chain(reference_finger(1)), np.zeros((2, 1)))
+    closed = chain_potential(reference_finger(1)).evaluate(np.zeros((2, 1)))
     per_angle = 0.25 * dense(closed.hessian).sum()  # d²e/dφ² with a = b = φ/2
     assert per_angle / 10.75**2 == pytest.approx(12.84 + 24.2 / 10.75**2, rel=1e-14)
 
@@ -195,9 +195,9 @@ def test_hinge_stiffens_the_closed_unit_by_its_share(
         ("11111", 44.65422600, -42.23246372, -78.12616759, 21.80666611),
     ],
 )
-@pytest.mark.parametrize("formulation", [Chain, Lattice])
+@pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 def test_equilibria_are_the_reference_ones(
-    formulation: type[Chain] | type[Lattice],
+    formulation: Formulate,
     pattern: str,
     tip_x: float,
     tip_y: float,
@@ -209,16 +209,16 @@ def test_equilibria_are_the_reference_ones(
     potential = formulation(reference_finger(len(pattern), 1e4))
     half = np.array([[0.5 * OPENING_ANGLE * int(c)] for c in pattern])
     rest = np.zeros((1, 1))
-    x = potential.coordinates(Internal(rest, half, half, rest))
+    x = potential.coordinates.of_shape(Internal(rest, half, half, rest))
     for _ in range(5):  # plain Newton, independent of the package's solver
-        evaluation = evaluate(potential, x)
+        evaluation = potential.evaluate(x)
         x = x - np.linalg.solve(dense(evaluation.hessian)[:, :, 0], evaluation.gradient)
-    nodes = potential.stations(x)
+    nodes = potential.coordinates.stations(x)
     base = np.concatenate((np.zeros((1, 2)), np.stack((nodes.base_x, nodes.base_y), 1)[:, :, 0]))
     last = base[-1] - base[-2]
     assert base[-1] == pytest.approx([tip_x, tip_y], abs=1e-8)
     assert np.degrees(np.arctan2(last[1], last[0])) == pytest.approx(chord_angle, abs=1e-8)
-    assert evaluate(potential, x).energy == pytest.approx(energy, abs=1e-8)
+    assert potential.evaluate(x).energy == pytest.approx(energy, abs=1e-8)
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)
@@ -228,12 +228,13 @@ def test_designs_are_picked_in_order(
     formulation, stiffness = FORMULATIONS[name]
     potential = formulation(graded_finger(3, 5, n_designs=6, linear_stiffness=stiffness))
     index = np.array([4, 0, 4])
-    picked = potential.designs(index)
+    picked = potential.take_lanes(index)
     for attribute in ("gradient_scale", "step_cap"):
-        assert np.array_equal(getattr(picked, attribute), getattr(potential, attribute)[:, index])
-    coordinates = potential.coordinates(random_shape(3, 6, batch=6))
-    whole = evaluate(potential, coordinates)
-    part = evaluate(picked, coordinates[:, index])
+        taken = getattr(potential.coordinates, attribute)[:, index]
+        assert np.array_equal(getattr(picked.coordinates, attribute), taken)
+    coordinates = potential.coordinates.of_shape(random_shape(3, 6, batch=6))
+    whole = potential.evaluate(coordinates)
+    part = picked.evaluate(coordinates[:, index])
     assert np.array_equal(part.hessian, whole.hessian[:, :, index])
 
 
@@ -249,17 +250,20 @@ def test_lane_has_the_same_bits_in_any_batch(
 ) -> None:
     formulation, stiffness = FORMULATIONS[name]
     potential = formulation(graded_finger(n_units, 7, n_designs=1000, linear_stiffness=stiffness))
-    coordinates = potential.coordinates(random_shape(n_units, 8, batch=1000))
-    whole = evaluate(potential, coordinates)
-    tip, openings = potential.tip(coordinates), potential.openings(coordinates)
+    coordinates = potential.coordinates.of_shape(random_shape(n_units, 8, batch=1000))
+    whole = potential.evaluate(coordinates)
+    tip, openings = (
+        potential.coordinates.tip(coordinates),
+        potential.coordinates.openings(coordinates),
+    )
     for first in (0, 500, 993):
         lanes = np.arange(first, first + batch)
-        alone, x = potential.designs(lanes), np.ascontiguousarray(coordinates[:, lanes])
-        part = evaluate(alone, x)
+        alone, x = potential.take_lanes(lanes), np.ascontiguousarray(coordinates[:, lanes])
+        part = alone.evaluate(x)
         assert np.array_equal(part.gradient, whole.gradient[:, lanes])
         assert np.array_equal(part.hessian, whole.hessian[:, :, lanes])
-        for kind, energy in part.energies.items():
-            assert np.array_equal(energy, whole.energies[kind][lanes]), kind
-        assert np.array_equal(alone.openings(x), openings[:, lanes])
-        assert np.array_equal(alone.tip(x)[0], tip[0][:, lanes])
-        assert np.array_equal(alone.tip(x)[1], tip[1][:, :, lanes])
+        for energy, of_whole in zip(part.energies, whole.energies, strict=True):
+            assert np.array_equal(energy, of_whole[lanes])
+        assert np.array_equal(alone.coordinates.openings(x), openings[:, lanes])
+        assert np.array_equal(alone.coordinates.tip(x)[0], tip[0][:, lanes])
+        assert np.array_equal(alone.coordinates.tip(x)[1], tip[1][:, :, lanes])

@@ -5,8 +5,8 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.formulation import Internal
 from dpgcli.mechanics.lattice import Lattice
 
 FINGER = uniform_finger(2, **STUDY, linear_stiffness=1e4)
@@ -20,7 +20,7 @@ def shape(**second_unit: float) -> Internal:
 
 def is_folded(finger: Finger, at: Internal, formulation: type[Chain | Lattice] = Chain) -> bool:
     potential = formulation(finger)
-    return bool(potential.springs(potential.coordinates(at)).is_folded[0])
+    return bool(potential.springs(potential.of_shape(at)).is_folded[0])
 
 
 @pytest.mark.parametrize("formulation", [Chain, Lattice])
@@ -74,9 +74,7 @@ def test_what_is_possible_is_a_quadrilateral_whose_sides_do_not_cross() -> None:
         low, high = np.array([-14.0, -1.8, -1.8, -12.0]), np.array([6.0, 1.8, 1.8, 10.0])
         at = Internal(*(np.array([[value]]) for value in random.uniform(low, high)))
         chain = Chain(unit)
-        b_x, b_y, t_x, t_y = (
-            float(values[0, 0]) for values in chain.stations(chain.coordinates(at))
-        )
+        b_x, b_y, t_x, t_y = (float(values[0, 0]) for values in chain.stations(chain.of_shape(at)))
         corners = np.array([(0.0, 0.0), (b_x, b_y), (t_x, t_y), (0.0, 10.75)])
         folded = is_folded(unit, at)
         n_possible += not folded

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Internal
-from dpgcli.mechanics.lattice import FINEST_TOLERANCE, Lattice, vectors
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.lattice import FINEST_TOLERANCE, Lattice
+from dpgcli.mechanics.lattice_geometry import vectors
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 
-FORMULATIONS = pytest.mark.parametrize("formulation", [Chain, Lattice])
+FORMULATIONS = pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 LENGTHS = {"segment_length", "segment_height", "stroke"}
 
 
@@ -25,16 +25,25 @@ def test_a_shape_is_the_same_in_both_formulations(
 ) -> None:
     n_units = 1 + seed % 8
     finger, shape = graded_finger(n_units, seed), random_shape(n_units, 100 + seed, batch=3)
-    chain, lattice = Chain(finger), Lattice(finger)
-    bars, nodes = chain.coordinates(shape), lattice.coordinates(shape)
-    energies = evaluate(chain, bars).energies
-    assert list(energies) == list(evaluate(lattice, nodes).energies)
-    for kind, energy in evaluate(lattice, nodes).energies.items():
+    chain, lattice = chain_potential(finger), lattice_potential(finger)
+    bars, nodes = chain.coordinates.of_shape(shape), lattice.coordinates.of_shape(shape)
+    energies = chain.by_kind(chain.evaluate(bars).energies)
+    of_lattice = lattice.by_kind(lattice.evaluate(nodes).energies)
+    assert list(energies) == list(of_lattice)
+    for kind, energy in of_lattice.items():
         assert energy == pytest.approx(energies[kind], rel=1e-12)
-    assert lattice.openings(nodes) == pytest.approx(chain.openings(bars), abs=1e-12)
-    assert lattice.tip(nodes)[0] == pytest.approx(chain.tip(bars)[0], abs=1e-12)
-    assert (lattice.springs(nodes).is_folded == chain.springs(bars).is_folded).all()
-    for mine, other in zip(lattice.stations(nodes), chain.stations(bars), strict=True):
+    assert lattice.coordinates.openings(nodes) == pytest.approx(
+        chain.coordinates.openings(bars), abs=1e-12
+    )
+    assert lattice.coordinates.tip(nodes)[0] == pytest.approx(
+        chain.coordinates.tip(bars)[0], abs=1e-12
+    )
+    assert (
+        lattice.coordinates.springs(nodes).is_folded == chain.coordinates.springs(bars).is_folded
+    ).all()
+    for mine, other in zip(
+        lattice.coordinates.stations(nodes), chain.coordinates.stations(bars), strict=True
+    ):
         assert mine == pytest.approx(other, abs=1e-12)
 
 
@@ -43,11 +52,11 @@ def test_forces_are_the_same_in_both_formulations(
     seed: int, graded_finger: Callable[..., Finger], random_shape: Callable[..., Internal]
 ) -> None:
     finger, shape = graded_finger(4, seed), random_shape(4, 50 + seed)
-    chain, lattice = Chain(finger), Lattice(finger)
-    bars = chain.coordinates(shape)
-    on_nodes = evaluate(lattice, lattice.coordinates(shape)).gradient[:, 0]
-    on_bars = evaluate(chain, bars).gradient[:, 0]
-    through_nodes = chain.station_jacobian(bars)[:, :, 0] @ on_nodes
+    chain, lattice = chain_potential(finger), lattice_potential(finger)
+    bars = chain.coordinates.of_shape(shape)
+    on_nodes = lattice.evaluate(lattice.coordinates.of_shape(shape)).gradient[:, 0]
+    on_bars = chain.evaluate(bars).gradient[:, 0]
+    through_nodes = chain.coordinates.station_jacobian(bars)[:, :, 0] @ on_nodes
     assert through_nodes == pytest.approx(on_bars, rel=1e-11, abs=1e-11 * np.abs(on_bars).max())
 
 
@@ -56,10 +65,10 @@ def test_corner_moments_are_the_same_in_both_formulations(
     seed: int, graded_finger: Callable[..., Finger], random_shape: Callable[..., Internal]
 ) -> None:
     finger, shape = graded_finger(4, seed), random_shape(4, 60 + seed)
-    chain, lattice = Chain(finger), Lattice(finger)
-    bars, nodes = chain.coordinates(shape), lattice.coordinates(shape)
-    on_nodes = lattice.corner_moments(nodes, evaluate(lattice, nodes).gradient)
-    on_bars = chain.corner_moments(bars, evaluate(chain, bars).gradient)
+    chain, lattice = chain_potential(finger), lattice_potential(finger)
+    bars, nodes = chain.coordinates.of_shape(shape), lattice.coordinates.of_shape(shape)
+    on_nodes = lattice.coordinates.corner_moments(nodes, lattice.evaluate(nodes).gradient)
+    on_bars = chain.coordinates.corner_moments(bars, chain.evaluate(bars).gradient)
     assert on_nodes == pytest.approx(on_bars, rel=1e-10, abs=1e-10 * np.abs(on_bars).max())
 
 
@@ -68,9 +77,9 @@ def test_forces_along_bars_do_no_work_at_corners(
 ) -> None:
     """100 N between the ends of every bar, as rounding leaves them: no corner feels it."""
     finger = graded_finger(5, 7)
-    lattice = Lattice(finger)
-    nodes = lattice.coordinates(random_shape(5, 8))
-    cell = vectors(finger, nodes)
+    lattice = lattice_potential(finger)
+    nodes = lattice.coordinates.of_shape(random_shape(5, 8))
+    cell = vectors(nodes, finger.segment_height)
     pulls = np.zeros((5, 4, 1))
     for vector, ends in ((cell.chord, (None, 0)), (cell.far, (0, 2))):
         along = (100.0 * vector / np.hypot(*vector)).transpose(1, 0, 2)
@@ -80,7 +89,7 @@ def test_forces_along_bars_do_no_work_at_corners(
             pulls[:-1, 0:2] -= along[1:]
         else:
             pulls[:, start : start + 2] -= along
-    moments = lattice.corner_moments(nodes, pulls.reshape(-1, 1))
+    moments = lattice.coordinates.corner_moments(nodes, pulls.reshape(-1, 1))
     assert np.abs(pulls).max() > 50.0
     assert np.abs(moments).max() < 1e-10
 
@@ -88,28 +97,30 @@ def test_forces_along_bars_do_no_work_at_corners(
 def test_tip_angle_counts_full_turns(reference_finger: Callable[..., Finger]) -> None:
     finger = reference_finger(20, 1e4)
     rest, corner = np.zeros((1, 1)), np.full((20, 1), 0.2)
-    for formulation in (Chain(finger), Lattice(finger)):
-        tip, _ = formulation.tip(formulation.coordinates(Internal(rest, corner, corner, rest)))
+    for formulation in (chain_potential(finger), lattice_potential(finger)):
+        tip, _ = formulation.coordinates.tip(
+            formulation.coordinates.of_shape(Internal(rest, corner, corner, rest))
+        )
         assert tip[2] == pytest.approx(-8.0, rel=1e-13)
 
 
 def test_coordinates_broadcast_over_units_and_lanes(
     graded_finger: Callable[..., Finger],
 ) -> None:
-    lattice = Lattice(graded_finger(3, 1, n_designs=4))
+    lattice = lattice_potential(graded_finger(3, 1, n_designs=4))
     rest = np.zeros((1, 1))
-    nodes = lattice.coordinates(Internal(rest, rest, rest, rest))
-    stations = np.cumsum(lattice.finger.segment_length, axis=0)
+    nodes = lattice.coordinates.of_shape(Internal(rest, rest, rest, rest))
+    stations = np.cumsum(lattice.coordinates.finger.segment_length, axis=0)
     assert nodes.shape == (12, 4)
     assert np.array_equal(nodes[0::4], stations) and np.array_equal(nodes[2::4], stations)
     assert not nodes[1::4].any()
-    assert np.array_equal(nodes[3::4], np.tile(lattice.finger.segment_height, (3, 1)))
+    assert np.array_equal(nodes[3::4], np.tile(lattice.coordinates.finger.segment_height, (3, 1)))
 
 
 @FORMULATIONS
 @given(n_units=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
 def test_energies_survive_a_mirror(
-    formulation: type[Chain] | type[Lattice],
+    formulation: Formulate,
     n_units: int,
     seed: int,
     graded_finger: Callable[..., Finger],
@@ -131,7 +142,7 @@ def test_energies_survive_a_mirror(
 @FORMULATIONS
 @given(n_units=st.integers(1, 6), seed=st.integers(0, 2**32 - 1), unit=st.floats(1e-3, 1e3))
 def test_energies_do_not_depend_on_the_unit_of_length(
-    formulation: type[Chain] | type[Lattice],
+    formulation: Formulate,
     n_units: int,
     seed: int,
     unit: float,
@@ -158,18 +169,20 @@ def test_newton_gets_below_the_rounding_floor(
     reference_finger: Callable[..., Finger],
     dense: Callable[[Array], Array],
 ) -> None:
-    lattice = Lattice(reference_finger(5, linear_stiffness))
+    lattice = lattice_potential(reference_finger(5, linear_stiffness))
     half = 0.5 * np.deg2rad(17.36175941) * np.array(list(product((0.0, 1.0), repeat=5))).T
     rest = np.zeros((1, 1))
-    x = lattice.coordinates(Internal(rest, half, half, rest))
+    x = lattice.coordinates.of_shape(Internal(rest, half, half, rest))
     for _ in range(5):
-        evaluation = evaluate(lattice, x)
+        evaluation = lattice.evaluate(x)
         matrices = dense(evaluation.hessian).transpose(2, 0, 1)
         x = x - np.linalg.solve(matrices, evaluation.gradient.T[:, :, None])[:, :, 0].T
-    residual = np.abs(evaluate(lattice, x).gradient)
-    assert (residual.max(axis=0) <= lattice.rounding_floor).all()
-    assert (residual <= FINEST_TOLERANCE * lattice.gradient_scale).all()
-    assert residual.max() > 0.01 * lattice.rounding_floor  # and the floor is not far below
+    residual = np.abs(lattice.evaluate(x).gradient)
+    assert (residual.max(axis=0) <= lattice.coordinates.rounding_floor).all()
+    assert (residual <= FINEST_TOLERANCE * lattice.coordinates.gradient_scale).all()
+    assert (
+        residual.max() > 0.01 * lattice.coordinates.rounding_floor
+    )  # and the floor is not far below
 
 
 def test_scales_by_head(reference_finger: Callable[..., Finger]) -> None:
@@ -197,5 +210,5 @@ def test_rigid_bars_are_refused(reference_finger: Callable[..., Finger]) -> None
         Lattice(reference_finger(2))
 
 
-def _energies(potential: Chain | Lattice, shape: Internal) -> dict[str, Array]:
-    return evaluate(potential, potential.coordinates(shape)).energies
+def _energies(potential: FingerPotential, shape: Internal) -> dict[str, Array]:
+    return potential.by_kind(potential.evaluate(potential.coordinates.of_shape(shape)).energies)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dpgcli.equilibrium.contracts import Response
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.curve import spline
 
@@ -13,9 +14,7 @@ linearities = st.floats(0.0, 1.0)
 sizes = st.floats(0.1, 100.0)
 
 
-def bistable(
-    extension: float, stiffness: float, linearity: float, stroke: float
-) -> laws.SpringResponse:
+def bistable(extension: float, stiffness: float, linearity: float, stroke: float) -> Response:
     return laws.bistable(*map(np.array, (extension, stiffness, linearity, stroke)))
 
 

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import ARRAYS, Finger, uniform_finger
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.laws import bistable
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference import energy, equilibria
 from dpgcli.reference import units as units_module
 from dpgcli.reference.energy import ElasticBars, RigidBars
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
 from dpgcli.reference.units import Unit, extended_units, inverted_angle, spring_barrier
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import min_eigenvalues, tip
 from dpgcli.states.units import Units
 
@@ -44,8 +44,8 @@ def units_of(*patterns: str) -> Flags:
 
 
 def solver_nodes(finger: Finger, inverted: Flags) -> Array:
-    batch = solve(Units.of(finger), Chain, inverted, 1e-12)
-    stations = batch.formulation.stations(batch.equilibrium.coordinates)
+    batch = settle(Units.of(finger), chain_potential, inverted, 1e-12)
+    stations = batch.potential.coordinates.stations(batch.equilibrium.coordinates)
     return np.stack(stations, axis=1).reshape(4 * finger.n_units, -1)
 
 
@@ -137,11 +137,11 @@ def test_agrees_with_the_solver(linear_stiffness: float) -> None:
     finger = graded_finger(3, linear_stiffness)
     inverted = units_of("010", "110", "111")
     states = extended_states(finger, inverted)
-    batch = solve(Units.of(finger), Chain, inverted, 1e-12)
+    batch = settle(Units.of(finger), chain_potential, inverted, 1e-12)
     at_tip = tip(batch, with_compliance=False)
     assert np.abs(states.pose[:2] - at_tip.pose[:2]).max() < 1e-12
     assert np.abs(states.pose[2] - at_tip.pose[2]).max() < 1e-13
-    openings = batch.formulation.openings(batch.equilibrium.coordinates)
+    openings = batch.potential.coordinates.openings(batch.equilibrium.coordinates)
     assert np.abs(states.openings - openings).max() < 1e-13
     assert states.min_eigenvalue == pytest.approx(min_eigenvalues(batch), rel=1e-9)
 

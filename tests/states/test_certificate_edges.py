@@ -9,16 +9,15 @@ import pytest
 from dpgcli.arrays import Flags
 from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import Finger, uniform_finger
-from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
-from dpgcli.states.certify import Batch, Status, batch_at, certify
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.certify import Settled, Status, certified, certify
 from dpgcli.states.guess import geometric_guess
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.pairs import _Block, _fit, paired_states
-from dpgcli.states.solve import search, solve
+from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
@@ -28,24 +27,24 @@ Patterns = Callable[[int], Flags]
 
 
 @pytest.fixture
-def stable(reference_finger: Fingers) -> tuple[Batch, Units]:
+def stable(reference_finger: Fingers) -> tuple[Settled, Units]:
     units = Units.of(reference_finger(3, 1e4))
-    batch = solve(units, Chain, np.array([[True], [False], [True]]), 1e-12)
+    batch = settle(units, chain_potential, np.array([[True], [False], [True]]), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     return batch, units
 
 
-def status_with(stable: tuple[Batch, Units], **changes: object) -> Status:
+def status_with(stable: tuple[Settled, Units], **changes: object) -> Status:
     """The status if some numbers of the equilibrium were others."""
     batch, units = stable
     equilibrium = replace(batch.equilibrium, **changes)  # type: ignore[arg-type]
-    changed = batch_at(units, batch.formulation, batch.inverted, equilibrium)
-    return Status(certify(changed, units, 1e-12)[0])
+    changed = certified(units, batch.potential, batch.inverted, equilibrium, 1e-12)
+    return Status(changed.status[0])
 
 
 @pytest.mark.parametrize("residual", [np.nan, np.inf, 1.1e-12])
 def test_a_residual_above_the_tolerance_or_none_at_all(
-    stable: tuple[Batch, Units], residual: float
+    stable: tuple[Settled, Units], residual: float
 ) -> None:
     relative = np.array([residual])
     assert status_with(stable, relative_residual=relative) is Status.NOT_CONVERGED
@@ -53,12 +52,12 @@ def test_a_residual_above_the_tolerance_or_none_at_all(
 
 @pytest.mark.parametrize("curvature", [np.nan, -1.0, 0.0, 1.4e-8])
 def test_a_curvature_that_is_not_safely_positive(
-    stable: tuple[Batch, Units], curvature: float
+    stable: tuple[Settled, Units], curvature: float
 ) -> None:
     assert status_with(stable, curvature=np.array([curvature])) is Status.MARGINAL
 
 
-def test_the_gravest_reason_is_given(stable: tuple[Batch, Units]) -> None:
+def test_the_gravest_reason_is_given(stable: tuple[Settled, Units]) -> None:
     batch, units = stable
     folded = replace(batch, is_folded=np.ones(1, bool))
     assert certify(folded, units, 1e-12).tolist() == [Status.FOLDED]
@@ -72,7 +71,7 @@ def test_the_gravest_reason_is_given(stable: tuple[Batch, Units]) -> None:
 
 @pytest.mark.parametrize(("share", "status"), [(0.09, "STABLE"), (0.11, "NOT_CONVERGED")])
 def test_an_unbalance_that_a_weak_well_would_not_bear(
-    stable: tuple[Batch, Units], share: float, status: str
+    stable: tuple[Settled, Units], share: float, status: str
 ) -> None:
     """A moment of 1e-6 N times H is small against the forces in play, not against that well."""
     batch, units = stable
@@ -85,7 +84,7 @@ def test_an_unbalance_that_a_weak_well_would_not_bear(
 
 @pytest.mark.parametrize(("part", "status"), [(0.9, "STABLE"), (1.1, "NOT_CONVERGED")])
 def test_an_unbalance_that_a_fold_so_near_would_not_bear(
-    stable: tuple[Batch, Units], part: float, status: str
+    stable: tuple[Settled, Units], part: float, status: str
 ) -> None:
     """Curvature 1e-3: a tenth of κ²/96 of (k_b + k_θ/H²) d, which is 45.67 N."""
     gradient = stable[0].equilibrium.gradient.copy()
@@ -94,7 +93,7 @@ def test_an_unbalance_that_a_fold_so_near_would_not_bear(
     assert status_with(stable, gradient=gradient, curvature=curvature) is Status[status]
 
 
-def test_a_faint_hinge_is_no_fold(stable: tuple[Batch, Units]) -> None:
+def test_a_faint_hinge_is_no_fold(stable: tuple[Settled, Units]) -> None:
     """Rounding is allowed whatever the curvature."""
     gradient = stable[0].equilibrium.gradient.copy()
     gradient[2] = 0.9e-14 * 45.6729 * 10.75
@@ -136,9 +135,9 @@ def test_between_very_stiff_bars_no_state_is_certified_that_is_none(ratio: float
     """What rounding leaves of the bars' forces exceeds all that the dome can do."""
     units = Units.of(uniform_finger(1, **STIFF, linear_stiffness=6.0 * ratio))
     inverted = np.ones((1, 1), bool)
-    chain = solve(units, Chain, inverted, 1e-12)
+    chain = settle(units, chain_potential, inverted, 1e-12)
     assert certify(chain, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
-    lattice = solve(units, Lattice, inverted, 1e-12)
+    lattice = settle(units, lattice_potential, inverted, 1e-12)
     assert certify(lattice, units, 1e-12)[0] != Status.STABLE
     assert not lattice.is_balanced[0] or not lattice.reached[0, 0]
 
@@ -155,15 +154,17 @@ def test_a_strut_pulled_through_its_base_is_folded() -> None:
         hinge_stiffness=100.0,
         linear_stiffness=0.2,
     )
-    units, chain, inverted = Units.of(finger), Chain(finger), np.ones((2, 1), bool)
-    guess = chain.coordinates(geometric_guess(finger, inverted, units.first_order))
-    astray = search(units, chain, inverted, guess, 1e-12)
+    units, chain, inverted = Units.of(finger), chain_potential(finger), np.ones((2, 1), bool)
+    guess = chain.coordinates.of_shape(geometric_guess(finger, inverted, units.first_order))
+    astray = settle_from(units, chain, inverted, guess, 1e-12)
     assert 10.0 + astray.equilibrium.coordinates[3, 0] == pytest.approx(-2.4958, abs=1e-4)
     assert astray.equilibrium.relative_residual[0] < 1e-12
     assert certify(astray, units, 1e-12).tolist() == [Status.FOLDED]
-    found = solve(units, Chain, inverted, 1e-12)
+    found = settle(units, chain_potential, inverted, 1e-12)
     assert certify(found, units, 1e-12).tolist() == [Status.STABLE]
-    nodes = np.stack(found.formulation.stations(found.equilibrium.coordinates), axis=1).ravel()
+    nodes = np.stack(
+        found.potential.coordinates.stations(found.equilibrium.coordinates), axis=1
+    ).ravel()
     network = SpringNetwork.of(finger)
     assert np.abs(network.energy_and_gradient(nodes)[1]).max() < 1e-10
     assert np.linalg.eigvalsh(network.hessian(nodes))[0] > 1e-3
@@ -224,7 +225,9 @@ def test_units_of_halves_are_those_of_the_whole(
     )
     split = Split(Units.of(finger), 3, 2, 1e-12)
     (pairs,) = paired_states(split)
-    direct = certify(solve(split.units, Chain, all_patterns(6), 1e-12), split.units, 1e-12)
+    direct = certify(
+        settle(split.units, chain_potential, all_patterns(6), 1e-12), split.units, 1e-12
+    )
     fits = pairs.status != Status.NOT_CONVERGED
     assert (direct[fits] == Status.ANOTHER_PATTERN).sum() > 16
     assert (pairs.status[fits] == direct[fits]).all()
@@ -233,10 +236,10 @@ def test_units_of_halves_are_those_of_the_whole(
 def test_a_walk_near_a_fold_goes_on_to_where_rounding_ends_it(reference_finger: Fingers) -> None:
     """There, a tolerance of 1e-3 would let a unit stop that has nowhere to rest."""
     finger = reference_finger(1, force_linearity=0.0964682337467354 + 1e-5)
-    units, chain = Units.of(finger), Chain(finger)
+    units, chain = Units.of(finger), chain_potential(finger)
     start = np.full((2, 1), np.arcsin(0.765 * 3.5 / 21.5))
-    assert np.abs(chain.corner_moments(start, start * 0.0)).max() == 0.0
-    batch = search(units, chain, np.ones((1, 1), bool), start, 1e-3)
+    assert np.abs(chain.coordinates.corner_moments(start, start * 0.0)).max() == 0.0
+    batch = settle_from(units, chain, np.ones((1, 1), bool), start, 1e-3)
     assert certify(batch, units, 1e-3)[0] != Status.STABLE
 
 
@@ -252,7 +255,7 @@ def test_soft_bars_do_not_prove_that_there_is_no_well(reference_finger: Fingers)
     assert never.have_no_well.all(), "the dome itself turns over nowhere"
 
 
-def test_a_unit_in_its_well_is_there_whatever_rigid_bars_say(stable: tuple[Batch, Units]) -> None:
+def test_a_unit_in_its_well_is_there_whatever_rigid_bars_say(stable: tuple[Settled, Units]) -> None:
     """Beyond a rigid fold, elastic bars may still leave a well: who rests in it is bistable."""
     batch, units = stable
     none = replace(units.wells, exists=np.zeros((1, 1), bool))
@@ -267,15 +270,16 @@ def test_at_a_rigid_fold_the_walk_goes_on_until_the_elastic_well_is_sure(
     linearity = 0.0964682337467354 * (1.0 + past)
     finger = reference_finger(1, 12.84e9, force_linearity=linearity)
     units, inverted = Units.of(finger), np.ones((1, 1), bool)
-    batch = solve(units, Chain, inverted, 1e-12)
+    batch = settle(units, chain_potential, inverted, 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
-    far = minimize(Chain(finger), batch.equilibrium.coordinates * 1.0001, 1e-12)
-    assert not batch_at(units, Chain(finger), inverted, far).is_balanced[0]
+    potential = chain_potential(finger)
+    far = minimize(potential, batch.equilibrium.coordinates * 1.0001, 1e-12)
+    assert not certified(units, potential, inverted, far, 1e-12).is_balanced[0]
 
 
-@pytest.mark.parametrize("formulation", [Chain, Lattice])
+@pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 def test_near_a_right_angle_moments_count_by_their_lever(
-    formulation: type[Chain | Lattice],
+    formulation: Formulate,
 ) -> None:
     """A corner near 90° hardly extends the spring: the lattice's last digits are forces there."""
     finger = uniform_finger(
@@ -289,7 +293,7 @@ def test_near_a_right_angle_moments_count_by_their_lever(
         linear_stiffness=4.33e14,
     )
     units = Units.of(finger)
-    batch = solve(units, formulation, np.ones((1, 1), bool), 1e-12)
+    batch = settle(units, formulation, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12)[0] != Status.STABLE
 
 
@@ -302,7 +306,9 @@ def test_a_dome_that_only_pushes_keeps_the_state_that_elastic_bars_leave_it(
     both = reference_finger(3, 12.84 * ratio, force_linearity=linearity)
     pushing = Units.of(replace(both, law=PushOnly(PUBLISHED)))
     inverted = np.array([[True], [False], [True]])
-    batches = [solve(units, Chain, inverted, 1e-12) for units in (Units.of(both), pushing)]
+    batches = [
+        settle(units, chain_potential, inverted, 1e-12) for units in (Units.of(both), pushing)
+    ]
     tips = [tip(batch, with_compliance=False).pose[:, 0] for batch in batches]
     assert certify(batches[1], pushing, 1e-12).tolist() == [Status.STABLE]
     assert tips[1] == pytest.approx(tips[0], abs=1e-7)
@@ -317,7 +323,7 @@ def test_a_dome_beyond_the_lever_leaves_the_ground_state(reference_finger: Finge
     assert not units.wells.exists.any()
     assert np.isfinite(units.wells.angle).all()
     inverted = np.array([[False, True], [False, False], [False, False]])
-    batch = solve(units, Chain, inverted, 1e-12)
+    batch = settle(units, chain_potential, inverted, 1e-12)
     assert certify(batch, units, 1e-12)[0] == Status.STABLE
 
 
@@ -326,7 +332,7 @@ def test_a_dome_without_a_second_well_is_never_inverted(reference_finger: Finger
     energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
     law = Tabulated(spline(tuple(travel), tuple(energy)))
     units = Units.of(replace(reference_finger(1, 1e4), law=law))
-    batch = solve(units, Chain, np.ones((1, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
 
 
@@ -345,7 +351,7 @@ def test_soft_units_meet_wherever_a_curve_has_its_well(reference_finger: Fingers
         linear_stiffness=7.0,
     )
     units = Units.of(replace(finger, law=Tabulated(spline(tuple(travel), tuple(energy)))))
-    batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.FOLDED]
 
 
@@ -364,6 +370,6 @@ def test_wells_are_the_same_alone_and_in_a_batch() -> None:
     )
     together = inverted_wells(finger)
     for design in range(200):
-        alone = inverted_wells(finger.designs(np.array([design])))
+        alone = inverted_wells(finger.take_lanes(np.array([design])))
         for field in fields(alone):
             assert getattr(alone, field.name)[0, 0] == getattr(together, field.name)[0, design]

@@ -8,21 +8,21 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
-from dpgcli.states.certify import Status, batch_at, certify
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status, certified, certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import search, solve
+from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
 
 
-def certified(finger: Finger, guess: Array, inverted: Flags) -> NDArray[np.uint8]:
+def statuses(finger: Finger, guess: Array, inverted: Flags) -> NDArray[np.uint8]:
     units = Units.of(finger)
-    return certify(search(units, Chain(finger), inverted, guess, 1e-12), units, 1e-12)
+    return settle_from(units, chain_potential(finger), inverted, guess, 1e-12).status
 
 
 @pytest.mark.parametrize("linear_stiffness", [1e3, 1e6, np.inf])
@@ -59,7 +59,7 @@ def test_a_finger_without_hinges_is_a_mechanism(
     reference_finger: Fingers, linear_stiffness: float
 ) -> None:
     finger = reference_finger(3, linear_stiffness, hinge_stiffness=0.0)
-    batch = solve(Units.of(finger), Chain, np.zeros((3, 1), bool), 1e-12)
+    batch = settle(Units.of(finger), chain_potential, np.zeros((3, 1), bool), 1e-12)
     assert certify(batch, Units.of(finger), 1e-12).tolist() == [Status.MARGINAL]
 
 
@@ -75,7 +75,7 @@ def test_one_hingeless_unit_leaves_the_search_finite(reference_finger: Fingers) 
     hinges = np.array([[24.2], [0.0], [24.2]])
     finger = Finger(3, **(reference_finger(3, 1e4).arrays() | {"hinge_stiffness": hinges}))
     units = Units.of(finger)
-    batch = solve(units, Chain, np.zeros((3, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.zeros((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.MARGINAL]
 
 
@@ -95,10 +95,10 @@ def test_one_hingeless_unit_is_predicted_without_warnings(
 def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:
     finger = reference_finger(1)
     half = np.arcsin(2.004174241840 / 21.5)
-    chain, units = Chain(finger), Units.of(finger)
+    chain, units = chain_potential(finger), Units.of(finger)
     at_barrier = minimize(chain, np.full((2, 1), half), 1e-3, max_iterations=1)
     reached = np.ones((1, 1), bool)
-    batch = batch_at(units, chain, reached, at_barrier)
+    batch = certified(units, chain, reached, at_barrier, 1e-3)
     assert batch.reached.tolist() == [[True]]
     assert certify(batch, units, 1e-3).tolist() == [Status.MARGINAL]
 
@@ -107,7 +107,7 @@ def test_a_minimum_beyond_a_right_angle_is_called_folded(reference_finger: Finge
     """Struts swung past each other, sin a = −L/H: the dome's spring is at rest, upside down."""
     finger = reference_finger(1, segment_length=9.0, hinge_stiffness=5.0)
     guess = np.full((2, 1), np.arcsin(9.0 / 10.75) - np.pi)
-    folded = certified(finger, guess, np.zeros((1, 1), bool))
+    folded = statuses(finger, guess, np.zeros((1, 1), bool))
     assert folded.tolist() == [Status.FOLDED]
 
 
@@ -115,13 +115,13 @@ def test_crossed_struts_are_not_called_stable(reference_finger: Fingers) -> None
     """L < H: struts that lean over each other turn the dome's spring round before 90°."""
     finger = reference_finger(1, segment_length=4.0, hinge_stiffness=10.0)
     guess = np.full((2, 1), -np.arcsin(4.0 / 10.75))
-    assert certified(finger, guess, np.zeros((1, 1), bool)).tolist() != [Status.STABLE]
+    assert statuses(finger, guess, np.zeros((1, 1), bool)).tolist() != [Status.STABLE]
 
 
 def test_an_unreachable_tolerance_is_not_converged(graded_finger: Fingers) -> None:
     units = Units.of(graded_finger(4, 42, 1e4))
     inverted = np.ones((4, 1), bool)
-    batch = solve(units, Chain, inverted, 1e-30)
+    batch = settle(units, chain_potential, inverted, 1e-30)
     assert certify(batch, units, 1e-30).tolist() == [Status.NOT_CONVERGED]
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
@@ -136,14 +136,14 @@ def test_near_the_loss_of_bistability_elastic_fingers_keep_their_states(
     """Elastic bars make room for the dome: bistability is lost later than with rigid ones."""
     linearity = 0.0964682337467354 - margin
     units = Units.of(reference_finger(3, linear_stiffness, force_linearity=linearity))
-    batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
 def test_at_the_rigid_fold_elastic_fingers_keep_their_states(reference_finger: Fingers) -> None:
     linearity = 0.0964682337467354 - 1e-12
     units = Units.of(reference_finger(3, 50.0, force_linearity=linearity))
-    batch = solve(units, Chain, np.ones((3, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
@@ -162,8 +162,8 @@ def test_with_soft_bars_patterns_are_distinct_minima(
 ) -> None:
     """k_L down to k_b: the wells the pattern names are told apart by the rigid barrier."""
     units = Units.of(reference_finger(5, 12.84 * relative_stiffness))
-    batch = solve(units, Chain, all_patterns(5), 1e-12)
+    batch = settle(units, chain_potential, all_patterns(5), 1e-12)
     assert (certify(batch, units, 1e-12) == Status.STABLE).all()
-    openings = batch.formulation.openings(batch.equilibrium.coordinates)
+    openings = batch.potential.coordinates.openings(batch.equilibrium.coordinates)
     assert openings[batch.inverted].min() > 0.85 * 3.5
     assert openings[~batch.inverted].max() < 0.1 * 3.5

@@ -8,13 +8,13 @@ import shapely
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
+from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Stations
-from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
-from dpgcli.states.solve import search, solve
+from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
@@ -36,13 +36,13 @@ def stations(batch_of: Units, coordinates: Array) -> Stations:
 
 
 @pytest.mark.parametrize(("n_units", "status"), [(20, "STABLE"), (21, "FOLDED"), (32, "FOLDED")])
-@pytest.mark.parametrize("formulation", [Chain, Lattice])
+@pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 def test_a_finger_of_the_study_meets_itself_from_21_units_on(
-    reference_finger: Fingers, n_units: int, status: str, formulation: type[Chain | Lattice]
+    reference_finger: Fingers, n_units: int, status: str, formulation: Formulate
 ) -> None:
     """17.36° a unit: 20 turn by 347°, 21 by 365°."""
     units = Units.of(reference_finger(n_units, 1e4))
-    batch = solve(units, formulation, np.ones((n_units, 1), bool), 1e-12)
+    batch = settle(units, formulation, np.ones((n_units, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status[status]]
 
 
@@ -63,7 +63,7 @@ def test_no_state_is_certified_that_crosses_itself_and_none_refused_that_does_no
         )
         units = Units.of(finger)
         inverted = random.random((n, 60)) < random.random(60) ** 0.3
-        batch = solve(units, Chain, inverted, 1e-10)
+        batch = settle(units, chain_potential, inverted, 1e-10)
         is_open = simple(stations(units, batch.equilibrium.coordinates), 10.75)
         assert (is_open == ~batch.is_folded).all()
         n_crossing += (~is_open).sum()
@@ -76,7 +76,7 @@ def test_pairs_say_what_the_whole_finger_says(
 ) -> None:
     units = Units.of(reference_finger(12, 1e6, stroke=8.0))
     (pairs,) = paired_states(Split(units, 6, 2, 1e-12))
-    direct = certify(solve(units, Chain, all_patterns(12), 1e-12), units, 1e-12)
+    direct = certify(settle(units, chain_potential, all_patterns(12), 1e-12), units, 1e-12)
     fits = pairs.status != Status.NOT_CONVERGED
     assert (pairs.status[fits] == direct[fits]).all()
     assert (direct[fits] == Status.FOLDED).sum() > 100
@@ -95,7 +95,7 @@ def test_a_loop_of_soft_units_is_looked_for_by_their_stroke(reference_finger: Fi
 
 def test_a_shape_given_as_a_start_is_looked_at_too(reference_finger: Fingers) -> None:
     finger = reference_finger(24, 1e4)
-    units, chain = Units.of(finger), Chain(finger)
+    units, chain = Units.of(finger), chain_potential(finger)
     inverted = np.ones((24, 1), bool)
-    start = solve(units, Chain, inverted, 1e-12).equilibrium.coordinates
-    assert search(units, chain, inverted, start, 1e-12).is_folded.tolist() == [True]
+    start = settle(units, chain_potential, inverted, 1e-12).equilibrium.coordinates
+    assert settle_from(units, chain, inverted, start, 1e-12).is_folded.tolist() == [True]

@@ -10,10 +10,9 @@ import pytest
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation
-from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -24,14 +23,14 @@ FOLD = 0.0964682337467354  # α at which the reference unit loses its second wel
 def true_and_stated_errors(
     finger: Finger,
     inverted: Flags,
-    formulate: Callable[[Finger], Formulation],
+    formulate: Formulate,
     extended_state: Extended,
 ) -> tuple[float, float]:
     units = Units.of(finger)
-    batch = solve(units, formulate, inverted, 1e-12)
+    batch = settle(units, formulate, inverted, 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     at_tip = tip(batch, with_compliance=False)
-    stations = batch.formulation.stations(batch.equilibrium.coordinates)
+    stations = batch.potential.coordinates.stations(batch.equilibrium.coordinates)
     nodes = np.stack(stations, axis=1).reshape(-1)
     truth = extended_state(finger, nodes)
     assert truth.is_minimum
@@ -51,7 +50,9 @@ def test_tip_error_covers_the_true_error(
     pattern: str,
 ) -> None:
     finger = graded_finger(len(pattern), 11, 12.84 * relative_stiffness)
-    error, stated = true_and_stated_errors(finger, units_of(pattern), Chain, extended_state)
+    error, stated = true_and_stated_errors(
+        finger, units_of(pattern), chain_potential, extended_state
+    )
     assert error <= stated < 1e-9
 
 
@@ -63,7 +64,9 @@ def test_tip_error_of_the_lattice_covers_the_true_error(
     relative_stiffness: float,
 ) -> None:
     finger = graded_finger(2, 12, 12.84 * relative_stiffness)
-    error, stated = true_and_stated_errors(finger, units_of("11"), Lattice, extended_state)
+    error, stated = true_and_stated_errors(
+        finger, units_of("11"), lattice_potential, extended_state
+    )
     assert error <= stated < 1e-6
 
 
@@ -75,7 +78,7 @@ def test_tip_error_covers_the_true_error_near_the_loss_of_bistability(
     margin: float,
 ) -> None:
     finger = reference_finger(2, 1e6, force_linearity=FOLD - margin)
-    error, stated = true_and_stated_errors(finger, units_of("11"), Chain, extended_state)
+    error, stated = true_and_stated_errors(finger, units_of("11"), chain_potential, extended_state)
     assert error <= stated
 
 
@@ -89,7 +92,7 @@ def test_tip_error_is_of_the_right_size_at_the_loss_of_bistability(
     linear_stiffness: float,
 ) -> None:
     finger = reference_finger(1, linear_stiffness, force_linearity=FOLD - margin)
-    error, stated = true_and_stated_errors(finger, units_of("1"), Chain, extended_state)
+    error, stated = true_and_stated_errors(finger, units_of("1"), chain_potential, extended_state)
     assert error <= 4.0 * stated
 
 
@@ -134,7 +137,7 @@ def test_tip_error_covers_the_rounding_of_long_rigid_fingers(
 ) -> None:
     inverted = np.random.default_rng(13).random((n_units, 40)) < np.linspace(0.0, 1.0, 40)
     units = Units.of(reference_finger(n_units, stroke=stroke))
-    at_tip = tip(solve(units, Chain, inverted, 1e-12), with_compliance=False)
+    at_tip = tip(settle(units, chain_potential, inverted, 1e-12), with_compliance=False)
     for state in range(40):
         with mpmath.workdps(40):
             pattern = "".join(str(int(digit)) for digit in inverted[:, state])

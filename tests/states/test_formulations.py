@@ -5,12 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 
 TOLERANCE = 1e-12
@@ -24,10 +23,10 @@ def test_chain_and_lattice_agree_on_every_node_of_every_state(
     units = Units.of(reference_finger(n_units, linear_stiffness))
     inverted = inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units)
     nodes = []
-    for formulate in (Chain, Lattice):
-        batch = solve(units, formulate, inverted, TOLERANCE)
+    for formulate in (chain_potential, lattice_potential):
+        batch = settle(units, formulate, inverted, TOLERANCE)
         assert (certify(batch, units, TOLERANCE) == Status.STABLE).all()
-        nodes.append(np.stack(batch.formulation.stations(batch.equilibrium.coordinates)))
+        nodes.append(np.stack(batch.potential.coordinates.stations(batch.equilibrium.coordinates)))
     assert np.abs(nodes[0] - nodes[1]).max() < 1e-9  # mm
 
 
@@ -40,12 +39,12 @@ def test_designs_side_by_side_are_solved_as_each_alone(
         for name in fingers[0].arrays()
     }
     patterns = inverted_units(np.arange(8, dtype=np.uint64), 3)
-    together = solve(
-        Units.of(Finger(3, **arrays)).designs(np.repeat(np.arange(3), 8)),
-        Chain,
+    together = settle(
+        Units.of(Finger(3, **arrays)).take_lanes(np.repeat(np.arange(3), 8)),
+        chain_potential,
         np.tile(patterns, 3),
         TOLERANCE,
     )
-    alone = [solve(Units.of(finger), Chain, patterns, TOLERANCE) for finger in fingers]
+    alone = [settle(Units.of(finger), chain_potential, patterns, TOLERANCE) for finger in fingers]
     expected = np.concatenate([batch.equilibrium.coordinates for batch in alone], axis=1)
     np.testing.assert_allclose(together.equilibrium.coordinates, expected, rtol=1e-13, atol=1e-16)

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.arrays import Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -52,7 +52,7 @@ def test_states_do_not_depend_on_the_units_of_measure(
     statuses, poses, reached = [], [], []
     for f, unit in ((finger, 1.0), (scaled, 10.0**length)):
         units = Units.of(f)
-        batch = solve(units, Chain, all_patterns(3), 1e-12)
+        batch = settle(units, chain_potential, all_patterns(3), 1e-12)
         statuses.append(certify(batch, units, 1e-12))
         poses.append(tip(batch, with_compliance=False).pose / np.array([[unit], [unit], [1.0]]))
         reached.append(batch.reached)

@@ -124,18 +124,18 @@ def test_barriers_of_a_dome_that_inverts_before_it_touches() -> None:
     assert lowest == pytest.approx(min(own, reset), rel=1e-9)
 
 
-def test_pairs_of_halves_are_not_for_domes_that_push_only(reference_finger: Fingers) -> None:
-    finger = reference_finger(14, 1e4)
-    request = Request(columns=("tip_x_mm",))
-    assert explain(Scene(finger, ()), request).method is Method.PAIRS
-    tabulated = Scene(replace(finger, law=Tabulated(table())), ())
-    assert explain(tabulated, request).method is Method.PAIRS
-    pushing = Scene(replace(finger, law=PushOnly(PUBLISHED)), ())
-    assert explain(pushing, request).method is Method.DIRECT
+LAWS = [PUBLISHED, Tabulated(table()), PushOnly(PUBLISHED), PushOnly(Tabulated(table()))]
 
 
-def test_long_fingers_of_a_table_agree_with_a_direct_solve(reference_finger: Fingers) -> None:
-    finger = replace(reference_finger(13, 1e4), law=Tabulated(table()))
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
+def test_pairs_of_halves_are_for_every_law(reference_finger: Fingers, law: Law) -> None:
+    scene = Scene(replace(reference_finger(14, 1e4), law=law), ())
+    assert explain(scene, Request(columns=("tip_x_mm",))).method is Method.PAIRS
+
+
+@pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.description)
+def test_long_fingers_agree_with_a_direct_solve(reference_finger: Fingers, law: Law) -> None:
+    finger = replace(reference_finger(13, 1e4), law=law)
     paired = rows(finger, columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
     some = rows(finger, patterns=("1*01*1",), columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
     place = np.flatnonzero(np.isin(paired["pattern"], some["pattern"]))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.margins import NAMES, Margins, limits, margins
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
@@ -117,7 +117,7 @@ def test_the_moment_turns_back_below_the_limit_and_not_above(name: str) -> None:
 def test_the_solver_finds_the_state_up_to_the_limit(name: str, factor: float, status: str) -> None:
     limit = float(limit_of(limits_of(unit), name)[0])
     units = Units.of(unit(**{name: limit * (1.0 + factor)}))
-    batch = solve(units, Chain, np.ones((1, 1), bool), 1e-12)
+    batch = settle(units, chain_potential, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status[status]]
 
 
@@ -132,7 +132,7 @@ def test_no_well_is_lost_by_falling(name: str) -> None:
 
 
 def test_units_have_limits_of_their_own() -> None:
-    found, alone = limits_of(graded, 1), limits(graded(1).units(2, 3))
+    found, alone = limits_of(graded, 1), limits(graded(1).section(2, 3))
     for name in NAMES:
         assert limit_of(found, name)[2] == limit_of(alone, name)[0]
 

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
-from dpgcli.mechanics.terms import evaluate
-from dpgcli.states.certify import States, Status, certify
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import SolvedStates, Status, certify
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import Prediction, Summary, predict
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -24,7 +23,7 @@ Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]
 
 
-def all_pairs(split: Split) -> States:
+def all_pairs(split: Split) -> SolvedStates:
     blocks = list(paired_states(split))
     assert len(blocks) == 1
     return blocks[0]
@@ -33,7 +32,7 @@ def all_pairs(split: Split) -> States:
 def assert_like_direct(split: Split, inverted: Flags, tolerance: float) -> float:
     """All pairs that fit against direct solves; the share that fits."""
     pairs = all_pairs(split)
-    batch = solve(split.units, Chain, inverted, 1e-13)
+    batch = settle(split.units, chain_potential, inverted, 1e-13)
     status = certify(batch, split.units, 1e-12)
     direct = tip(batch, with_compliance=False)
     fits = pairs.status != Status.NOT_CONVERGED
@@ -118,8 +117,8 @@ def half_coordinates(split: Split, inverted: Flags, tolerance: float) -> tuple[A
     cut, context, finger = split.n_inner, split.context, split.units.finger
     parts = []
     for first, stop in ((0, cut + context), (cut - context, split.n_units)):
-        units = Units.of(finger.units(first, stop))
-        solved = solve(units, Chain, inverted[first:stop], tolerance)
+        units = Units.of(finger.section(first, stop))
+        solved = settle(units, chain_potential, inverted[first:stop], tolerance)
         parts.append(solved.equilibrium.coordinates)
     return parts[0], parts[1]
 
@@ -136,12 +135,13 @@ def test_the_residual_of_pairs_is_that_of_the_composite(
     """
     finger = graded_finger(8, 54, linear_stiffness)
     split = Split(Units.of(finger), 4, context, 1e-13)
-    pairs, chain = all_pairs(split), Chain(finger)
+    pairs, chain = all_pairs(split), chain_potential(finger)
     for code in np.random.default_rng(55).integers(0, 2**8, 12):
         inner, outer = half_coordinates(split, pairs.inverted[:, [code]], 1e-13)
         composite = np.concatenate((inner[:16], outer[4 * context :]))
-        true = np.abs(evaluate(chain, composite).gradient / chain.force_unit).max()
-        rounding = 1e-14 * float((chain.gradient_scale / chain.force_unit).max())
+        scales = chain.coordinates
+        true = np.abs(chain.evaluate(composite).gradient / scales.force_unit).max()
+        rounding = 1e-14 * float((scales.gradient_scale / scales.force_unit).max())
         assert true <= 1.01 * pairs.residual[code] + rounding
         assert pairs.residual[code] <= 2.0 * true + 3.0 * rounding
 
@@ -153,7 +153,9 @@ def test_the_tip_error_of_pairs_is_what_their_disagreement_does(
     """Pairs that fit too poorly to be rows: there the error is far above rounding."""
     split = Split(Units.of(graded_finger(8, 58, linear_stiffness)), 4, 1, 1e-13)
     pairs = all_pairs(split)
-    direct = tip(solve(split.units, Chain, all_patterns(8), 1e-13), with_compliance=False)
+    direct = tip(
+        settle(split.units, chain_potential, all_patterns(8), 1e-13), with_compliance=False
+    )
     distance = np.hypot(*(pairs.pose - direct.pose)[:2])
     apart = distance > 1e-9
     assert apart.sum() > 50
@@ -167,10 +169,10 @@ def test_curvature_of_pairs_agrees_with_eigenvalues(
 ) -> None:
     finger = graded_finger(8, 54, linear_stiffness)
     split = Split(Units.of(finger), 4, 1, 1e-2)
-    pairs, chain = all_pairs(split), Chain(finger)
+    pairs, chain = all_pairs(split), chain_potential(finger)
     for code in np.random.default_rng(59).integers(0, 2**8, 12):
         inner, outer = half_coordinates(split, pairs.inverted[:, [code]], 1e-2)
-        at = evaluate(chain, np.concatenate((inner[:16], outer[4:])))
+        at = chain.evaluate(np.concatenate((inner[:16], outer[4:])))
         eigenvalues = np.linalg.eigvalsh(dense(at.hessian))
         assert (pairs.status[code] == Status.STABLE) == (eigenvalues.min() > 0.0)
 

@@ -7,12 +7,10 @@ import pytest
 from scipy.optimize import minimize
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.guess import geometric_guess
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 
 
@@ -25,17 +23,17 @@ def test_scipy_reaches_the_same_states(
     tolerance: float,
 ) -> None:
     units = Units.of(graded_finger(3, 31, 1e3))
-    lattice, inverted = Lattice(units.finger), all_patterns(3)
-    guess = lattice.coordinates(geometric_guess(units.finger, inverted, units.first_order))
-    solved = solve(units, Chain, inverted, 1e-12)
-    nodes = np.stack(solved.formulation.stations(solved.equilibrium.coordinates), axis=1)
+    lattice, inverted = lattice_potential(units.finger), all_patterns(3)
+    guess = lattice.coordinates.of_shape(geometric_guess(units.finger, inverted, units.first_order))
+    solved = settle(units, chain_potential, inverted, 1e-12)
+    nodes = np.stack(solved.potential.coordinates.stations(solved.equilibrium.coordinates), axis=1)
 
     def value_and_slope(x: Array) -> tuple[float, Array]:
-        at = evaluate(lattice, x[:, None])
+        at = lattice.evaluate(x[:, None])
         return float(at.energy[0]), at.gradient[:, 0]
 
     def hessian(x: Array) -> Array:
-        return dense(evaluate(lattice, x[:, None]).hessian)
+        return dense(lattice.evaluate(x[:, None]).hessian)
 
     for k in range(8):
         options = {"gtol": 1e-7, "maxiter": 500}

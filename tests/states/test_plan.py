@@ -9,12 +9,11 @@ from numpy.testing import assert_allclose
 
 from dpgcli.arrays import Array
 from dpgcli.equilibrium import newton
+from dpgcli.equilibrium.potential import Potential
 from dpgcli.errors import UsageError
-from dpgcli.mechanics import chain as chain_module
-from dpgcli.mechanics import lattice as lattice_module
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Gripper, Scene
-from dpgcli.states import solve as solve_module
+from dpgcli.states import settle as settle_module
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.rungs import bar_flexibility
@@ -32,25 +31,20 @@ def lanes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counted.append(guess.shape[1])
         return newton.minimize(potential, guess, *options)
 
-    monkeypatch.setattr(solve_module, "minimize", counting)
+    monkeypatch.setattr(settle_module, "minimize", counting)
     return counted
 
 
 @pytest.fixture
 def built(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
-    """Which terms act on coordinates from now on."""
+    """Kinds of terms that are evaluated from now on, with their systems of coordinates."""
     acted: set[tuple[str, str]] = set()
-    for module in (chain_module, lattice_module):
-        for name in ("BistableSprings", "Hinges", "Bars"):
-            term = getattr(module, name)
 
-            def add_to(
-                self: Any, *arrays: Array, _original: Any = term.add_to, _key: Any = (module, name)
-            ) -> Array:
-                acted.add((_key[0].__name__.rsplit(".", 1)[1], _key[1]))
-                return _original(self, *arrays)
+    def evaluate(self: Any, coordinates: Array, _original: Any = Potential.evaluate) -> Any:
+        acted.update((type(self.coordinates).__name__, term.kind) for term in self.terms)
+        return _original(self, coordinates)
 
-            monkeypatch.setattr(term, "add_to", add_to)
+    monkeypatch.setattr(Potential, "evaluate", evaluate)
     return acted
 
 
@@ -90,10 +84,9 @@ def test_terms_are_those_of_the_plan(
     prediction = predict(Scene(reference_finger(3, linear_stiffness), ()))
     built.clear()  # planning asks what elastic bars would do
     prediction.arrays()
-    names = {"BistableSprings": "bistable", "Hinges": "hinge", "Bars": "bar"}
-    assert {names[name] for _, name in built} == set(prediction.plan.terms)
+    assert {kind for _, kind in built} == set(prediction.plan.terms)
     assert ("bar" in prediction.plan.terms) == np.isfinite(linear_stiffness)
-    assert {module for module, _ in built} == {"chain"}
+    assert {system for system, _ in built} == {"Chain"}
 
 
 def test_hingeless_fingers_plan_no_hinges(reference_finger: Fingers) -> None:

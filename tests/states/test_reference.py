@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.wells import inverted_wells
@@ -53,7 +52,7 @@ def test_a_rigid_unit_rests_where_the_closed_form_says(
 def _single_unit(finger: Finger, extension: Array) -> tuple[Array, Array]:
     """Energy and force on x of a symmetric rigid unit, through the chain's own terms."""
     half = np.arcsin(extension / (2.0 * 10.75))
-    at = evaluate(Chain(finger), np.stack((half, half)))
+    at = chain_potential(finger).evaluate(np.stack((half, half)))
     return at.energy, at.gradient.sum(axis=0) / (2.0 * 10.75 * np.cos(half))
 
 

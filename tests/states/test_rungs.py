@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.rungs import RUNGS, cheapest, error_bounds
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -51,14 +51,14 @@ def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
     inverted = np.random.default_rng(n_units).random((n_units, n_designs)) < 0.6
     units = Units.of(finger)
     bounds = error_bounds(units)
-    exact = solve(units, Chain, inverted, 1e-14)
+    exact = settle(units, chain_potential, inverted, 1e-14)
     truth = tip(exact, with_compliance=False)
     is_state = certify(exact, units, 1e-12) == Status.STABLE
     rigid = Units.of(finger.with_bars(np.inf))
     n_checked = []
     for rung, bound in zip(RUNGS, bounds, strict=True):
         own = rigid if rung.drops_bars else units
-        batch = solve(own, Chain, inverted, rung.tolerance)
+        batch = settle(own, chain_potential, inverted, rung.tolerance)
         says_stable = certify(batch, own, rung.tolerance) == Status.STABLE
         bounded = np.isfinite(bound)
         assert not (says_stable & ~is_state & bounded).any(), "stable only where it is"
@@ -74,9 +74,9 @@ def test_bounds_are_not_absurd(reference_finger: Fingers) -> None:
     """Of the study's finger: dropping the bars is known within a factor of three."""
     units = Units.of(reference_finger(5, 1e4))
     inverted = np.ones((5, 1), bool)
-    exact = tip(solve(units, Chain, inverted, 1e-12), with_compliance=False)
+    exact = tip(settle(units, chain_potential, inverted, 1e-12), with_compliance=False)
     rigid = Units.of(units.finger.with_bars(np.inf))
-    without = tip(solve(rigid, Chain, inverted, 1e-12), with_compliance=False)
+    without = tip(settle(rigid, chain_potential, inverted, 1e-12), with_compliance=False)
     moved = np.hypot(*(without.pose[:2] - exact.pose[:2]))[0]
     (bound,) = error_bounds(units)[0]
     assert moved < bound < 6.0 * moved

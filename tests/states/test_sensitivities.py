@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain, internal
+from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import ARRAYS, STUDY, Finger
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
-from dpgcli.states.certify import Batch
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Settled
 from dpgcli.states.sensitivities import sensitivities
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
@@ -25,8 +26,8 @@ TABLE = Tabulated(spline(tuple(TRAVEL), tuple(ENERGY)))
 LAWS = (PUBLISHED, TABLE, PushOnly(PUBLISHED), PushOnly(TABLE))
 
 
-def solved(finger: Finger) -> Batch:
-    return solve(Units.of(finger), Chain, PATTERNS, 1e-14)
+def solved(finger: Finger) -> Settled:
+    return settle(Units.of(finger), chain_potential, PATTERNS, 1e-14)
 
 
 def outputs(finger: Finger) -> dict[str, Array]:
@@ -75,7 +76,7 @@ def test_they_are_the_slopes_of_states_that_are_solved_again(
 def test_one_unit_in_closed_form(reference_finger: Fingers) -> None:
     """de/dphi = F H cos(phi/2) + k_theta phi = 0, differentiated by k_theta."""
     units = Units.of(reference_finger(1))
-    batch = solve(units, Chain, np.array([[True]]), 1e-14)
+    batch = settle(units, chain_potential, np.array([[True]]), 1e-14)
     turn = -float(tip(batch, with_compliance=False).pose[2, 0])
     height, hinge = STUDY["segment_height"], STUDY["hinge_stiffness"]
     spring = units.finger.springs(np.array([[2.0 * height * np.sin(0.5 * turn)]]))
@@ -113,6 +114,6 @@ def test_states_in_units_of_their_own_lanes(reference_finger: Fingers) -> None:
     step = [{"segment_height": np.ones((1, 1))}]
     together = sensitivities(solved(finger), step).pose
     for state in range(PATTERNS.shape[1]):
-        alone = solve(Units.of(finger), Chain, PATTERNS[:, [state]], 1e-14)
+        alone = settle(Units.of(finger), chain_potential, PATTERNS[:, [state]], 1e-14)
         found = sensitivities(alone, step).pose[..., 0]
         assert found == pytest.approx(together[..., state], rel=1e-12, abs=1e-15)

@@ -8,12 +8,12 @@ from scipy.optimize import minimize
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.benchmark.network import SpringNetwork
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.terms import Formulate, chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.guess import stroke_guess
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
@@ -87,7 +87,7 @@ def independent(finger: Finger, inverted: Flags) -> Array | None:
         slope = hold * off @ network._rates(strains).length[-n:]
         return energy + 0.5 * hold * float(off @ off), gradient + slope
 
-    start = Lattice(finger).coordinates(stroke_guess(finger, inverted, 1.0))[:, 0]
+    start = Lattice(finger).of_shape(stroke_guess(finger, inverted, 1.0))[:, 0]
     settled = minimize(held, start, jac=True, method="BFGS", options={"maxiter": 400}).x
     scale = (by_unit(finger, "bistable_stiffness") * stroke).max()
     found = minimize(
@@ -106,11 +106,11 @@ def independent(finger: Finger, inverted: Flags) -> Array | None:
 
 
 def solved(
-    finger: Finger, inverted: Flags, formulation: type[Chain | Lattice] = Chain
+    finger: Finger, inverted: Flags, formulation: Formulate = chain_potential
 ) -> tuple[Status, Array]:
     units = Units.of(finger)
-    batch = solve(units, formulation, inverted, 1e-12)
-    nodes = np.stack(batch.formulation.stations(batch.equilibrium.coordinates), axis=1)
+    batch = settle(units, formulation, inverted, 1e-12)
+    nodes = np.stack(batch.potential.coordinates.stations(batch.equilibrium.coordinates), axis=1)
     return Status(certify(batch, units, 1e-12)[0]), nodes.ravel()
 
 

@@ -2,21 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pytest
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import Response, Term
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.mechanics.chain import Chain
+from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.scene import Scene
-from dpgcli.mechanics.terms import Term, evaluate
+from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.tip import min_eigenvalues
 from dpgcli.states.units import Units
 
@@ -26,11 +26,11 @@ COMPLIANCES = ("xx_mm_per_N", "xy_mm_per_N", "yy_mm_per_N", "x_angle_rad_per_N")
 COMPLIANCES += ("y_angle_rad_per_N", "angle_rad_per_N_mm")
 
 
-def at_nodes(units: Units, inverted: Flags) -> tuple[Lattice, Array]:
+def at_nodes(units: Units, inverted: Flags) -> tuple[Potential[Lattice], Array]:
     """The lattice and its coordinates at the chain's solution of one pattern."""
-    solved = solve(units, Chain, inverted, 1e-13)
-    stations = solved.formulation.stations(solved.equilibrium.coordinates)
-    return Lattice(units.finger), np.stack(stations, axis=1).reshape(-1, 1)
+    solved = settle(units, chain_potential, inverted, 1e-13)
+    stations = solved.potential.coordinates.stations(solved.equilibrium.coordinates)
+    return lattice_potential(units.finger), np.stack(stations, axis=1).reshape(-1, 1)
 
 
 def compliances(finger: Finger, pattern: str) -> dict[str, Array]:
@@ -49,8 +49,8 @@ def test_the_smallest_eigenvalue_is_the_dense_one(
 ) -> None:
     units = Units.of(graded_finger(len(pattern), 61, linear_stiffness))
     lattice, nodes = at_nodes(units, units_of(pattern))
-    expected = np.linalg.eigvalsh(dense(evaluate(lattice, nodes).hessian))[0]
-    found = min_eigenvalues(solve(units, Chain, units_of(pattern), 1e-13))
+    expected = np.linalg.eigvalsh(dense(lattice.evaluate(nodes).hessian))[0]
+    found = min_eigenvalues(settle(units, chain_potential, units_of(pattern), 1e-13))
     assert found == pytest.approx(expected, rel=1e-14 * linear_stiffness / expected)
 
 
@@ -70,8 +70,8 @@ def test_tip_compliance_is_that_of_the_dense_lattice(
 ) -> None:
     finger = graded_finger(len(pattern), 62, 1e3)
     lattice, nodes = at_nodes(Units.of(finger), units_of(pattern))
-    jacobian = lattice.tip(nodes)[1][:, :, 0]
-    c = jacobian.T @ np.linalg.solve(dense(evaluate(lattice, nodes).hessian), jacobian)
+    jacobian = lattice.coordinates.tip(nodes)[1][:, :, 0]
+    c = jacobian.T @ np.linalg.solve(dense(lattice.evaluate(nodes).hessian), jacobian)
     rows = compliances(finger, pattern)
     expected = (c[0, 0], c[0, 1], c[1, 1], c[0, 2], c[1, 2], c[2, 2])
     for name, value in zip(COMPLIANCES, expected, strict=True):
@@ -83,27 +83,17 @@ def test_tip_compliance_is_that_of_the_dense_lattice(
 
 
 @dataclass(frozen=True)
-class TipForce:
-    """A dead load on the last limiting-layer node, N."""
+class DeadLoad:
+    """A force that stays the same, N: E = −F q."""
 
-    force: tuple[float, float]
-    kind: str = "load"
+    force: float
 
-    def add_to(self, coordinates: Array, gradient: Array, hessian: Array) -> Array:
-        for k in (0, 1):
-            gradient[k - 4] -= self.force[k]
-        return -self.force[0] * coordinates[-4] - self.force[1] * coordinates[-3]
+    def __call__(self, scalar: Array) -> Response:
+        force = np.full_like(scalar, -self.force)
+        return Response(force * scalar, force, np.zeros_like(scalar))
 
-
-@dataclass(frozen=True)
-class LoadedLattice(Lattice):
-    """The lattice with a dead load at its tip."""
-
-    force: tuple[float, float] = (0.0, 0.0)
-
-    @cached_property
-    def terms(self) -> tuple[Term, ...]:
-        return (*Lattice(self.finger).terms, TipForce(self.force))
+    def take_lanes(self, index: Indices) -> "DeadLoad":
+        return self
 
 
 @pytest.mark.parametrize("pattern", ["101", "0110"])
@@ -112,17 +102,16 @@ def test_tip_compliance_is_the_answer_to_a_small_load(
 ) -> None:
     """Central differences of loaded equilibria; third derivatives leave a few in a million."""
     finger = graded_finger(len(pattern), 63, 1e3)
-    _, nodes = at_nodes(Units.of(finger), units_of(pattern))
+    lattice, nodes = at_nodes(Units.of(finger), units_of(pattern))
     rows = compliances(finger, pattern)
     load = 1e-3
     for axis, names in enumerate((("xx", "xy"), ("xy", "yy"))):
-        force = (load, 0.0) if axis == 0 else (0.0, load)
-        tips = [
-            minimize(
-                LoadedLattice(finger, (sign * force[0], sign * force[1])), nodes, 1e-12
-            ).coordinates[-4:-2, 0]
-            for sign in (1.0, -1.0)
-        ]
+        position = lattice.coordinates.position(axis)
+        tips = []
+        for force in (load, -load):
+            terms = (*lattice.terms, Term("load", position, DeadLoad(force)))
+            loaded = Potential(lattice.coordinates, terms)
+            tips.append(minimize(loaded, nodes, 1e-12).coordinates[-4:-2, 0])
         answer = (tips[0] - tips[1]) / (2.0 * load)
         for value, name in zip(answer, names, strict=True):
             stated = rows[f"tip_compliance_{name}_mm_per_N"]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
-from dpgcli.states.solve import solve
+from dpgcli.states.guess import stroke_guess
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 
 Fingers = Callable[..., Finger]
@@ -23,7 +23,13 @@ def test_the_chain_finds_every_pattern_of_its_own(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float, linear_stiffness: float
 ) -> None:
     units = Units.of(reference_finger(5, linear_stiffness))
-    batch = solve(units, Chain, all_patterns(5), 1e-12, strokes=strokes)
+    batch = settle(
+        units,
+        chain_potential,
+        all_patterns(5),
+        1e-12,
+        start=stroke_guess(units.finger, all_patterns(5), strokes),
+    )
     assert (certify(batch, units, 1e-12) == Status.STABLE).all()
     assert (batch.reached == batch.inverted).all()
 
@@ -33,7 +39,13 @@ def test_the_lattice_finds_every_pattern_from_nearby(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float
 ) -> None:
     units = Units.of(reference_finger(5, 1e4))
-    batch = solve(units, Lattice, all_patterns(5), 1e-12, strokes=strokes)
+    batch = settle(
+        units,
+        lattice_potential,
+        all_patterns(5),
+        1e-12,
+        start=stroke_guess(units.finger, all_patterns(5), strokes),
+    )
     assert (certify(batch, units, 1e-12) == Status.STABLE).all()
 
 
@@ -42,8 +54,14 @@ def test_from_afar_the_lattice_says_which_pattern_it_fell_into(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float
 ) -> None:
     units = Units.of(reference_finger(5, 1e4))
-    own = solve(units, Lattice, all_patterns(5), 1e-12).equilibrium.coordinates
-    batch = solve(units, Lattice, all_patterns(5), 1e-12, strokes=strokes)
+    own = settle(units, lattice_potential, all_patterns(5), 1e-12).equilibrium.coordinates
+    batch = settle(
+        units,
+        lattice_potential,
+        all_patterns(5),
+        1e-12,
+        start=stroke_guess(units.finger, all_patterns(5), strokes),
+    )
     status = certify(batch, units, 1e-12)
     assert {Status.STABLE, Status.ANOTHER_PATTERN} == set(status)
     code = (batch.reached * 2 ** np.arange(4, -1, -1)[:, None]).sum(axis=0)
@@ -55,7 +73,13 @@ def test_below_the_barrier_every_pattern_relaxes_to_the_ground_state(
     reference_finger: Fingers, all_patterns: Patterns
 ) -> None:
     units = Units.of(reference_finger(5, 1e4))
-    batch = solve(units, Chain, all_patterns(5), 1e-12, strokes=0.5)
+    batch = settle(
+        units,
+        chain_potential,
+        all_patterns(5),
+        1e-12,
+        start=stroke_guess(units.finger, all_patterns(5), 0.5),
+    )
     status = certify(batch, units, 1e-12)
     assert status.tolist() == [Status.STABLE] + 31 * [Status.ANOTHER_PATTERN]
     assert not batch.reached.any()

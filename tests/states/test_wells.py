@@ -10,8 +10,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.guess import FirstOrder, first_order, geometric_guess
-from dpgcli.states.solve import solve
+from dpgcli.states.settle import settle
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
@@ -114,7 +115,7 @@ def test_units_are_solved_as_if_each_were_alone(graded_finger: Callable[..., Fin
     finger = graded_finger(6, 21, np.inf)
     together = inverted_wells(finger)
     for i in range(6):
-        alone = inverted_wells(finger.units(i, i + 1))
+        alone = inverted_wells(finger.section(i, i + 1))
         assert together.extension[i] == pytest.approx(alone.extension[0], rel=1e-15)
         assert together.barrier[i] == pytest.approx(alone.barrier[0], rel=1e-15)
 
@@ -135,8 +136,8 @@ def test_the_first_order_guess_errs_at_second_order(reference_finger: Reference)
     for linear_stiffness in (1e4, 1e5):
         units = Units.of(reference_finger(3, linear_stiffness))
         inverted = np.array([[True], [False], [True]])
-        solved = solve(units, Chain, inverted, 1e-13).equilibrium.coordinates
-        guess = Chain(units.finger).coordinates(
+        solved = settle(units, chain_potential, inverted, 1e-13).equilibrium.coordinates
+        guess = Chain(units.finger).of_shape(
             geometric_guess(units.finger, inverted, units.first_order)
         )
         errors.append(np.abs(solved - guess).max())

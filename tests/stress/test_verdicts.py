@@ -8,14 +8,13 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.terms import evaluate
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import MARGINAL_CURVATURE, Status, certify
 from dpgcli.states.columns import Kind
 from dpgcli.states.margins import limits
 from dpgcli.states.plan import FORMULATIONS
-from dpgcli.states.solve import search, solve
+from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import Units
 from dpgcli.stress.cases import Case, built_in_cases, study_finger
 from dpgcli.stress.families import FAMILIES, TURNED, Start, Variant, changed, rigid
@@ -156,9 +155,9 @@ def test_the_six_minima_of_one_unit_are_found_and_two_are_physical(formulation: 
 def test_from_anywhere_one_unit_ends_in_one_of_six_minima_and_two_are_certified() -> None:
     angles = np.linspace(-3.0, 3.0, 25)
     guess = np.stack(np.meshgrid(angles, angles)).reshape(2, -1)
-    chain, units = Chain(UNIT), Units.of(UNIT)
+    chain, units = chain_potential(UNIT), Units.of(UNIT)
     ground = np.zeros((1, guess.shape[1]), bool)
-    batches = [search(units, chain, pattern, guess, 1e-12) for pattern in (ground, ~ground)]
+    batches = [settle_from(units, chain, pattern, guess, 1e-12) for pattern in (ground, ~ground)]
     stable = [certify(batch, units, 1e-12) == Status.STABLE for batch in batches]
     found = batches[0].equilibrium
     is_minimum = (found.relative_residual <= 1e-12) & (found.curvature > MARGINAL_CURVATURE)
@@ -192,12 +191,13 @@ def test_scaled_lengths_leave_forces_alone() -> None:
 def test_rounding_the_coordinates_leaves_no_more_than_the_floor(name: str) -> None:
     finger = study_finger()
     answer = answered(case_of(finger, "111", name))
-    formulation: Formulation = FORMULATIONS[name](finger)
-    batch = solve(Units.of(finger), FORMULATIONS[name], np.ones((3, 1), bool), 1e-12)
+    potential = FORMULATIONS[name](finger)
+    batch = settle(Units.of(finger), FORMULATIONS[name], np.ones((3, 1), bool), 1e-12)
     here = batch.equilibrium.coordinates
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (len(here), 500))
     half_a_digit = here * (1.0 + 0.5 * np.finfo(float).eps * signs)
-    left = np.abs(evaluate(formulation, half_a_digit).gradient / formulation.force_unit).max(axis=0)
+    forces = potential.evaluate(half_a_digit).gradient / potential.coordinates.force_unit
+    left = np.abs(forces).max(axis=0)
     assert 0.02 * answer.residual_floor < left.max() <= 1.5 * answer.residual_floor
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.rows import Columns
@@ -57,7 +57,8 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
     finger, force = graded_finger(5, 3), length**2
     scaled = in_other_units(finger, length, force)
     (one,), (other,) = (
-        list(design_states([Scene(f, ())], Chain, 1e-12, GROUPS)) for f in (finger, scaled)
+        list(design_states([Scene(f, ())], chain_potential, 1e-12, GROUPS))
+        for f in (finger, scaled)
     )
     assert one.metrics is not None and other.metrics is not None
     powers = {"mm2": length**2, "mm": length, "N": force, "mJ": force * length}
@@ -149,11 +150,11 @@ def test_no_grid_is_too_large_for_its_cells(metrics: Callable[..., Columns]) -> 
 
 def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
     scenes = [Scene(graded_finger(3, seed), ()) for seed in range(7)]
-    (together,) = design_states(scenes, Chain, 1e-12, GROUPS)
+    (together,) = design_states(scenes, chain_potential, 1e-12, GROUPS)
     assert together.metrics is not None
     areas: list[Array] = []
     for place, scene in enumerate(scenes):
-        (alone,) = design_states([scene], Chain, 1e-12, GROUPS)
+        (alone,) = design_states([scene], chain_potential, 1e-12, GROUPS)
         assert alone.metrics is not None
         for name, values in alone.metrics.items():
             assert together.metrics[name][place] == values[0], name

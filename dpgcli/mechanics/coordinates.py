@@ -1,12 +1,13 @@
-"""What both formulations of a finger offer: a potential, and the shape behind its coordinates."""
+"""What both systems of coordinates of a finger offer: shapes, scales, and what terms measure."""
 
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags
+from dpgcli.equilibrium.contracts import Coordinates, Measure
+from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import Potential
 
 
 class Internal(NamedTuple):
@@ -76,15 +77,28 @@ class Stations(NamedTuple):
     top_y: Array
 
 
-class Formulation(Potential, Protocol):
-    """A finger's potential in some coordinates of shape (size, batch)."""
+class FingerCoordinates(Coordinates, Protocol):
+    """A system of coordinates of a finger, of shape (size, batch)."""
 
     @property
     def finger(self) -> Finger: ...
 
-    def designs(self, index: Indices) -> "Formulation": ...
+    @property
+    def opening(self) -> Measure:
+        """Extension x of every bistable spring, mm."""
 
-    def coordinates(self, shape: Internal) -> Array:
+    @property
+    def corners(self) -> tuple[Measure, Measure]:
+        """Angles of the near and of the far corners, rad, positive where the dome side opens."""
+
+    @property
+    def bars(self) -> tuple[Measure, ...]:
+        """Extensions of chords and of far struts, mm; none of rigid ones."""
+
+    def position(self, axis: int) -> Measure:
+        """The tip's x (axis 0) or y (axis 1), the last limiting-layer node, mm: one cell."""
+
+    def of_shape(self, shape: Internal) -> Array:
         """The coordinates of a shape, (size, batch)."""
 
     def openings(self, coordinates: Array) -> Array:
@@ -111,3 +125,6 @@ class Formulation(Potential, Protocol):
 
     def station_jacobian(self, coordinates: Array) -> Array:
         """Derivatives of all node positions by coordinates, shape (size, 4 n, batch)."""
+
+
+FingerPotential = Potential[FingerCoordinates]

@@ -1,0 +1,149 @@
+"""The potential: coordinates and the terms handed to it, assembled into gradient and Hessian."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from dpgcli.arrays import Array, Indices, total
+from dpgcli.equilibrium.contracts import Coordinates, Measured, Response, Row, Term
+
+Cells = tuple[tuple[tuple[Row, ...], int], ...]  # rows and number of cells of each measure
+System = TypeVar("System", bound=Coordinates, covariant=True)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """An energy with its derivatives: `energies` term by term, each of shape (batch,).
+
+    `gradient` has the shape (size, batch), `hessian` is a band of `equilibrium.banded`.
+    """
+
+    energies: tuple[Array, ...]
+    gradient: Array
+    hessian: Array
+
+    @property
+    def energy(self) -> Array:
+        first, *rest = self.energies
+        return sum(rest, start=first)
+
+
+@dataclass(frozen=True)
+class Potential(Generic[System]):
+    """A sum of terms over one system of coordinates.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> potential = chain_potential(uniform_finger(2, **STUDY))
+    >>> potential.kinds, potential.column_depths
+    (('bistable', 'hinge'), (1, 0, 1, 0))
+    >>> float(potential.evaluate(np.zeros((4, 1))).energy[0])  # mJ, of the straight finger
+    0.0
+    """
+
+    coordinates: System
+    terms: tuple[Term, ...]
+
+    @cached_property
+    def column_depths(self) -> tuple[int, ...]:
+        """How far down each column of the Hessian, and of its factorization, may be nonzero."""
+        cells = tuple((term.measure.rows, term.measure.n_cells) for term in self.terms)
+        return _column_depths(self.coordinates.size, cells)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of its terms, each once."""
+        return tuple(dict.fromkeys(term.kind for term in self.terms))
+
+    def is_separable(self, shared: slice) -> bool:
+        """Whether it is the sum of two potentials that share the coordinates in these rows only.
+
+        No term then couples a coordinate before these rows with one behind them.
+        """
+        return not any(
+            min(rows) < shared.start and max(rows) >= shared.stop
+            for term in self.terms
+            for rows in _rows_by_cell(term.measure.rows, term.measure.n_cells)
+        )
+
+    def take_lanes(self, index: Indices) -> "Potential[System]":
+        """The same potential for some lanes of the batch."""
+        taken = tuple(term.take_lanes(index) for term in self.terms)
+        return Potential(self.coordinates.take_lanes(index), taken)
+
+    def evaluate(self, coordinates: Array) -> Evaluation:
+        """Add up the terms at `coordinates`, shape (size, batch)."""
+        gradient = np.zeros_like(coordinates)
+        bandwidth = max(self.column_depths)
+        hessian = np.zeros((bandwidth + 1, *coordinates.shape), coordinates.dtype)
+        energies = []
+        for term in self.terms:
+            measured = term.measure(coordinates)
+            response = term.law(measured.value)
+            energies.append(total(response.energy))
+            _assemble(term.measure.rows, measured, response, gradient, hessian)
+        return Evaluation(tuple(energies), gradient, hessian)
+
+    def by_kind(self, energies: tuple[Array, ...]) -> dict[str, Array]:
+        """Energies of the terms, added up by their kinds."""
+        added: dict[str, Array] = {}
+        for term, energy in zip(self.terms, energies, strict=True):
+            added[term.kind] = added[term.kind] + energy if term.kind in added else energy
+        return added
+
+
+def _assemble(
+    rows: tuple[Row, ...], q: Measured, response: Response, gradient: Array, hessian: Array
+) -> None:
+    """Add F ∇q to the gradient and K ∇q ∇qᵀ + F ∇²q to the band of the Hessian."""
+    if not q.gradient:
+        _add(gradient, rows[0], response.force)
+        _add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
+        return
+    force = response.force
+    stiff = [response.stiffness * slope for slope in q.gradient]
+    across, turned = q.outer.vector if q.outer else (), []
+    if q.outer:
+        tension = force * q.outer.weight
+        turned = [tension * component for component in across]
+    entry, part = np.empty_like(force), np.empty_like(force)
+    for first, slope in enumerate(q.gradient):
+        _add(gradient, rows[first], np.multiply(force, slope, out=entry))
+        for second in range(first, len(rows)):
+            depth = rows[second].offset - rows[first].offset
+            if depth >= len(hessian):
+                continue  # between clamped nodes of a single unit
+            np.multiply(stiff[first], q.gradient[second], out=entry)
+            if turned:
+                entry += np.multiply(turned[first], across[second], out=part)
+            if (first, second) in q.entries:
+                entry += np.multiply(force, q.entries[first, second], out=part)
+            _add(hessian[depth], rows[first], entry)
+
+
+def _add(target: Array, row: Row, values: Array) -> None:
+    """Add one value per cell, (cell, batch), to a row each; a clamped cell has none."""
+    clamped = 1 if row.offset < 0 else 0
+    first = row.offset + clamped * row.stride
+    target[first :: row.stride][: len(values) - clamped] += values[clamped:]
+
+
+def _rows_by_cell(rows: tuple[Row, ...], n_cells: int) -> list[list[int]]:
+    placed = [[row.offset + row.stride * cell for row in rows] for cell in range(n_cells)]
+    return [[row for row in cell if row >= 0] for cell in placed]
+
+
+@cache  # the same few for every batch
+def _column_depths(size: int, cells: Cells) -> tuple[int, ...]:
+    """The maximum over terms, and what elimination fills in: column j reaches as far as it ties."""
+    depths = [0] * size
+    for rows, n_cells in cells:
+        for placed in _rows_by_cell(rows, n_cells):
+            for row in placed:
+                depths[row] = max(depths[row], max(placed) - row)
+    for column in range(size):
+        for below in range(1, depths[column] + 1):
+            depths[column + below] = max(depths[column + below], depths[column] - below)
+    return tuple(depths)

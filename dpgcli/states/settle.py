@@ -1,0 +1,111 @@
+"""From patterns to certified states: guess, minimize, certify."""
+
+from functools import partial
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.newton import minimize
+from dpgcli.mechanics.coordinates import FingerPotential, Internal
+from dpgcli.mechanics.terms import Formulate
+from dpgcli.states.certify import Settled, Status, certified, certify
+from dpgcli.states.guess import geometric_guess, stroke_guess
+from dpgcli.states.units import Units
+
+FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
+UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
+
+
+def settle(
+    units: Units,
+    formulate: Formulate,
+    inverted: Flags,
+    tolerance: float,
+    *,
+    start: Internal | None = None,
+    own: slice = slice(None),
+) -> Settled:
+    """Find the states of patterns, (unit, batch), and certify each.
+
+    `units` have one design, or one for each lane; `formulate` gives the potential of a finger,
+    loads and all. `tolerance` is the largest residual over the forces in play. The search begins
+    at the shape `start`, or else at a guess that puts each unit into its own well; what soft bars
+    let go astray from there is looked for once more, with domes held open first. `own` are the
+    units that must have reached their wells.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> units = Units.of(uniform_finger(2, **STUDY))
+    >>> settled = settle(units, chain_potential, np.array([[True, True], [False, True]]), 1e-12)
+    >>> [Status(code).text for code in settled.status]
+    ['stable', 'stable']
+    """
+    potential = formulate(units.finger.with_domes(inverted))
+    walk = partial(settle_from, units, potential, inverted, tolerance=tolerance, own=own)
+    if start is not None:
+        return walk(potential.coordinates.of_shape(start))
+    guess = geometric_guess(units.finger, inverted, units.first_order)
+    settled = walk(potential.coordinates.of_shape(guess))
+    soft = units.are_soft.any(axis=0)
+    if not soft.any():
+        return settled
+    missed = certify(settled, units, tolerance) != Status.STABLE
+    lanes = np.flatnonzero(missed & soft)
+    if not len(lanes):
+        return settled
+    return _searched_again(units, formulate, settled, tolerance, own, lanes)
+
+
+def settle_from(
+    units: Units,
+    potential: FingerPotential,
+    inverted: Flags,
+    start: Array,
+    tolerance: float,
+    own: slice = slice(None),
+) -> Settled:
+    """Walk from coordinates, (size, batch), to where the residual is small, and certify.
+
+    Near a fold the tolerance may not do: there the walk goes on to where rounding ends it.
+    """
+    there = minimize(potential, start, tolerance)
+    settled = certified(units, potential, inverted, there, tolerance, own)
+    is_close = there.relative_residual <= tolerance
+    lanes = np.flatnonzero(is_close & ~settled.is_balanced)
+    if not len(lanes):
+        return settled
+    here = np.take(there.coordinates, lanes, axis=1)
+    further = minimize(potential.take_lanes(lanes), here, FINEST_TOLERANCE)
+    there = there.with_lanes(lanes, further, np.arange(len(lanes)))
+    return certified(units, potential, inverted, there, tolerance, own)
+
+
+def _searched_again(
+    units: Units,
+    formulate: Formulate,
+    settled: Settled,
+    tolerance: float,
+    own: slice,
+    lanes: Indices,
+) -> Settled:
+    """Search some lanes with domes held open until bars and hinges have settled, then let go.
+
+    What is let go walks down from beyond its well, and meets the well before its barrier. A lane
+    is replaced if that finds its state.
+    """
+    few, inverted = units.take_lanes(lanes), np.take(settled.inverted, lanes, axis=1)
+    held = formulate(few.finger.with_domes_held(inverted))
+    guess = held.coordinates.of_shape(stroke_guess(few.finger, inverted, 1.0))
+    start = minimize(held, guess, tolerance).coordinates
+    potential = formulate(few.finger.with_domes(inverted))
+    again = settle_from(few, potential, inverted, start, tolerance)
+    found = np.flatnonzero(again.status == Status.STABLE)
+    if not len(found):
+        return settled
+    there = settled.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
+    return certified(units, settled.potential, settled.inverted, there, tolerance, own)
+
+
+def lanes_at_once(n_units: int) -> int:
+    """How many fingers to solve in one batch."""
+    return max(UNITS_AT_ONCE // n_units, 256)
