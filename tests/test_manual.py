@@ -39,7 +39,8 @@ from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
 from dpgcli.mechanics.scene import Origin
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Group, declared
+from dpgcli.states.columns import Group
+from dpgcli.states.quantities import declared
 from dpgcli.stress.families import FAMILIES, PATTERNS
 from dpgcli.stress.verdicts import Verdict
 from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus

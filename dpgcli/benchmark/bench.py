@@ -23,11 +23,10 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Columns, Group, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
-from dpgcli.states.rows import Columns
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip

@@ -7,9 +7,8 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Columns, Group, Kind
 from dpgcli.states.patterns import texts
-from dpgcli.states.rows import Columns
 
 POINTS_AT_ONCE = 2**12
 STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight finger

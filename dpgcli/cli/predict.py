@@ -31,8 +31,8 @@ from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
     from dpgcli.mechanics.scene import Scene
+    from dpgcli.states.columns import Columns
     from dpgcli.states.predict import Prediction, Summary
-    from dpgcli.states.rows import Columns
     from dpgcli.states.rungs import Rung
 
 

@@ -14,7 +14,7 @@ from dpgcli.states.columns import Column, Kind
 from dpgcli.text import printable
 
 if TYPE_CHECKING:
-    from dpgcli.states.rows import Columns
+    from dpgcli.states.columns import Columns
 
 ROWS_SHOWN = 64
 PRINCIPAL = (

@@ -21,7 +21,7 @@ from dpgcli.cli.streams import say
 if TYPE_CHECKING:
     from dpgcli.files.scene_file import Spec
     from dpgcli.mechanics.finger import Finger
-    from dpgcli.states.rows import Columns
+    from dpgcli.states.columns import Columns
     from dpgcli.stress.cases import Case
     from dpgcli.stress.table import FamilySummary
     from dpgcli.stress.verdicts import Outcome

@@ -23,8 +23,7 @@ from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_writer import record_batch, schema
-from dpgcli.states.columns import Column
-from dpgcli.states.rows import Columns
+from dpgcli.states.columns import Column, Columns
 from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")

@@ -21,11 +21,10 @@ from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Kind
+from dpgcli.states.columns import Column, Columns, Kind
 from dpgcli.states.costs import rows_at_once
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
-from dpgcli.states.rows import Columns
 
 SCHEMA_VERSION = 1
 DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten

@@ -73,23 +73,6 @@ class Settled:
         return self.potential.coordinates.finger
 
 
-@dataclass(frozen=True)
-class SolvedStates:
-    """Certified states, arrays of shape (…, state): what every method gives.
-
-    `status` holds `Status` codes. `pose` is tip x, y (mm) and angle (rad), `tip_error` in mm,
-    `energies` in mJ by kind, `residual` in N.
-    """
-
-    inverted: Flags
-    reached: Flags
-    status: NDArray[np.uint8]
-    pose: Array
-    tip_error: Array
-    energies: dict[str, Array]
-    residual: Array
-
-
 def certified(
     units: Units,
     potential: FingerPotential,

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, SolvedStates, Status
+from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, Status
 from dpgcli.states.crossing import Outline, diagonals, is_simple
 from dpgcli.states.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
+from dpgcli.states.solved import SolvedStates
 
 STATES_AT_ONCE = 2**16
 

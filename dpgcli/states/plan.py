@@ -1,6 +1,6 @@
 """What a scene needs, decided once: `explain` prints the plan, `predict` carries it out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -12,12 +12,13 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Group, declared, named
+from dpgcli.states.columns import Group
 from dpgcli.states.costs import peak_bytes, seconds
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
-from dpgcli.states.rows import Wanted
+from dpgcli.states.quantities import ALWAYS, Quantity, declared, named
+from dpgcli.states.rows import RowRequest
 from dpgcli.states.rungs import (
     DEFAULT_TOLERANCE,
     RUNGS,
@@ -27,13 +28,13 @@ from dpgcli.states.rungs import (
     check_exactness,
     error_bounds,
 )
+from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
 
 FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
 ON_REQUEST = (Group.NODES, Group.UNCERTAINTY)
-STIFF = ("stiffness", "tip_stiffness", "tip_compliance")  # columns that rigid bars falsify
 MOST_STATES_WITH = {
     Group.EIGENVALUE: 2**10,
     Group.STIFFNESS: 2**16,
@@ -95,7 +96,7 @@ class Plan:
     unknowns: int
     n_unit_solves: int
     n_finger_solves: int
-    columns: tuple[Column, ...]
+    columns: tuple[Quantity, ...]
     omissions: tuple[Omission, ...]
     residual_limit: float
     bar_flexibility: float
@@ -118,16 +119,20 @@ class Plan:
         return self.bar_flexibility if self.rung is not None and self.rung.drops_bars else 0.0
 
     @property
-    def wanted(self) -> Wanted:
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Those of its columns, and what every state is judged by."""
+        return (*ALWAYS, *(column for column in self.columns if column not in ALWAYS))
+
+    @property
+    def rows(self) -> RowRequest:
         """The plan as far as batches of states need it."""
-        return Wanted(
+        scene = self.scene
+        return RowRequest(
             FORMULATIONS[self.request.formulation],
             self.request.tolerance,
-            self.groups,
-            self.scene.gripper,
-            self.scene.layer_thickness or 0.0,
+            self.quantities,
+            Surroundings(scene.gripper, scene.layer_thickness or 0.0, scene.uncertainty),
             self.dropped_error,
-            self.scene.uncertainty,
         )
 
 
@@ -222,15 +227,21 @@ def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
     bounds = error_bounds(units)
     if request.target_error is None:
         return None, float(bounds[-1, 0]) if request.formulation == "chain" else np.inf
-    if any(name == "all" or name.startswith(STIFF) for name in request.columns):
+    if any(q.needs_bars for q in _asked_for(request)):
         bounds[0] = np.inf
     (index,) = cheapest(bounds, request.target_error)
     return RUNGS[index], float(bounds[index, 0])
 
 
+def _asked_for(request: Request) -> Iterator[Quantity]:
+    """What columns ask for by name or by group, as far as every finger has it."""
+    names = {*request.columns, *(Group if "all" in request.columns else ())}
+    return (q for q in declared(1, (), False) if q.name in names or q.group in names)
+
+
 def _columns(
-    available: tuple[Column, ...], names: Sequence[str], n_states: int, *, has_bars: bool
-) -> tuple[tuple[Column, ...], tuple[Omission, ...]]:
+    available: tuple[Quantity, ...], names: Sequence[str], n_states: int, *, has_bars: bool
+) -> tuple[tuple[Quantity, ...], tuple[Omission, ...]]:
     """Columns asked for; by default all but nodes and what is costly in a large map."""
     wanted: set[str] = {"pattern", "status", *names} - {"default", "all"}
     left_out: tuple[Omission, ...] = ()

@@ -1,7 +1,7 @@
 """Carry out a plan: every state asked for, certified, as blocks of columns."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter, process_time
 
 import numpy as np
@@ -9,10 +9,12 @@ import numpy as np
 from dpgcli.arrays import Codes, keep_freed_memory
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states.certify import Status
+from dpgcli.states.columns import Columns
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
-from dpgcli.states.rows import Columns, as_text, solved_rows, state_columns
+from dpgcli.states.quantities import rows
+from dpgcli.states.rows import as_text, solved_rows
 from dpgcli.states.settle import lanes_at_once
 
 
@@ -55,10 +57,10 @@ class Prediction:
         """Columns by name, a block of states at a time; counts in `summary` as it goes."""
         keep_freed_memory()
         names = [column.name for column in self.plan.columns]
-        rows = _blocks(self.plan, self.summary)
+        solved = _blocks(self.plan, self.summary)
         while True:
             wall, cpu = perf_counter(), process_time()
-            block = next(rows, None)
+            block = next(solved, None)
             self.summary.seconds += perf_counter() - wall
             self.summary.cpu_seconds += process_time() - cpu
             if block is None:
@@ -97,8 +99,8 @@ def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
         return
     summary.n_finger_solves += plan.split.n_solves
     for states in paired_states(plan.split):
-        columns = state_columns(states)
-        columns["tip_error_mm"] += plan.dropped_error
+        states = replace(states, tip_error=states.tip_error + plan.dropped_error)
+        columns = rows(states, plan.quantities)
         unfit = np.flatnonzero(states.status == Status.NOT_CONVERGED)
         if len(unfit):  # a pair that did not fit is solved as a whole
             solved = _solved(plan, codes_of(states.inverted[:, unfit]), summary)
@@ -120,4 +122,4 @@ def _batches(plan: Plan) -> Iterator[Codes]:
 def _solved(plan: Plan, codes: Codes, summary: Summary) -> Columns:
     """Rows of the states with these codes, each solved as a whole finger."""
     summary.n_finger_solves += len(codes)
-    return solved_rows(plan.units, inverted_units(codes, plan.n_units), plan.wanted)
+    return solved_rows(plan.units, inverted_units(codes, plan.n_units), plan.rows)

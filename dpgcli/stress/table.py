@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Columns, Group, Kind
 from dpgcli.states.patterns import texts
-from dpgcli.states.rows import Columns
 from dpgcli.stress.verdicts import Outcome, Verdict
 
 

@@ -15,8 +15,8 @@ from dpgcli.files.sections import unit_of
 from dpgcli.files.sweep_file.space import UNITS, flattened
 from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.columns import Column, Group, Kind, declared
-from dpgcli.states.rows import Columns
+from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.quantities import Quantity, declared
 from dpgcli.sweeps.designs import choices, design_states
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
@@ -82,8 +82,13 @@ class Evaluation:
     @property
     def state_columns(self) -> tuple[Column, ...]:
         """Columns of the table of states: the design, its values, what `predict` gives."""
-        rows = (c for c in declared(1, (), self.is_gripper) if c.group in self.groups)
-        return (DESIGN, *self.values.values(), CALIBRATION, *rows)
+        return (DESIGN, *self.values.values(), CALIBRATION, *self.quantities)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is told of each state."""
+        every = declared(1, (), self.is_gripper)
+        return tuple(quantity for quantity in every if quantity.group in self.groups)
 
     @property
     def design_columns(self) -> tuple[Column, ...]:
@@ -153,14 +158,14 @@ class Evaluation:
     def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "Iterator[_Solved]":
         group = [scenes[place] for place in places]
         if self.target_error is None:
-            for block in design_states(group, chain_potential, self.tolerance, self.groups):
+            for block in design_states(group, chain_potential, self.tolerance, self.quantities):
                 yield _Solved(np.array(places)[block.places], block.rows, block.metrics)
             return
         for choice in choices(group, self.target_error):
             rung = choice.rung
             chosen = [group[place] for place in choice.places]
             for block in design_states(
-                chosen, chain_potential, rung.tolerance, self.groups, drops_bars=rung.drops_bars
+                chosen, chain_potential, rung.tolerance, self.quantities, drops_bars=rung.drops_bars
             ):
                 if block.metrics is not None:
                     block.metrics["rung"] = np.full(len(block.places), rung.name)

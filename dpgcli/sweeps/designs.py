@@ -10,11 +10,13 @@ from dpgcli.arrays import Array, Codes, Indices
 from dpgcli.mechanics.finger import ARRAYS, Finger
 from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.mechanics.terms import Formulate
-from dpgcli.states.columns import Group
+from dpgcli.states.columns import Columns
 from dpgcli.states.patterns import chunks, inverted_units
-from dpgcli.states.rows import Columns, Wanted, solved_rows
+from dpgcli.states.quantities import Quantity
+from dpgcli.states.rows import RowRequest, solved_rows
 from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
 from dpgcli.states.settle import lanes_at_once
+from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
 from dpgcli.sweeps.metrics import Metrics
 
@@ -57,7 +59,7 @@ def design_states(
     scenes: Sequence[Scene],
     formulate: Formulate,
     tolerance: float,
-    groups: frozenset[Group],
+    quantities: tuple[Quantity, ...],
     *,
     drops_bars: bool = False,
 ) -> Iterator[Block]:
@@ -76,8 +78,11 @@ def design_states(
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
-        wanted = Wanted(formulate, tolerance, groups, *_placement(scenes, lanes), dropped[lanes])
-        return solved_rows(_designs(units, lanes), inverted, wanted)
+        around = Surroundings(*_placement(scenes, lanes))
+        request = RowRequest(
+            formulate, tolerance, quantities, around, dropped[lanes], has_bars=not drops_bars
+        )
+        return solved_rows(_designs(units, lanes), inverted, request)
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
@@ -86,7 +91,7 @@ def design_states(
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
-            rows = _joined(parts, drops_bars=drops_bars)
+            rows = _joined(parts)
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
             yield Block(designs, rows, metrics.columns() if is_last else None)
@@ -97,16 +102,9 @@ def _designs(units: Units, index: Indices) -> Units:
     return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 
 
-def _joined(parts: Sequence[Columns], *, drops_bars: bool) -> Columns:
-    """Rows below each other; without bars stiffness would be wrong."""
-    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    if drops_bars:
-        rows |= {name: np.full_like(v, np.nan) for name, v in rows.items() if _is_stiffness(name)}
-    return rows
-
-
-def _is_stiffness(name: str) -> bool:
-    return name.startswith(("tip_stiffness", "tip_compliance"))
+def _joined(parts: Sequence[Columns]) -> Columns:
+    """Rows below each other."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _stacked(fingers: Sequence[Finger]) -> Finger:

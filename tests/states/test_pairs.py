@@ -10,12 +10,13 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.certify import SolvedStates, Status, certify
+from dpgcli.states.certify import Status, certify
 from dpgcli.states.halves import Split
 from dpgcli.states.pairs import paired_states
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import Prediction, Summary, predict
 from dpgcli.states.settle import settle
+from dpgcli.states.solved import SolvedStates
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 

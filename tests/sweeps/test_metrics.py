@@ -10,14 +10,14 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Group
-from dpgcli.states.rows import Columns
+from dpgcli.states.columns import Columns, Group
+from dpgcli.states.quantities import declared
 from dpgcli.states.units import Units
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics
 
 Fingers = Callable[..., Finger]
-GROUPS = frozenset({Group.STATES, Group.STIFFNESS})
+QUANTITIES = tuple(q for q in declared(1, (), False) if q.group in {Group.STATES, Group.STIFFNESS})
 LENGTH = 27.0  # mm, of the reference finger of two units
 
 
@@ -57,7 +57,7 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
     finger, force = graded_finger(5, 3), length**2
     scaled = in_other_units(finger, length, force)
     (one,), (other,) = (
-        list(design_states([Scene(f, ())], chain_potential, 1e-12, GROUPS))
+        list(design_states([Scene(f, ())], chain_potential, 1e-12, QUANTITIES))
         for f in (finger, scaled)
     )
     assert one.metrics is not None and other.metrics is not None
@@ -150,11 +150,11 @@ def test_no_grid_is_too_large_for_its_cells(metrics: Callable[..., Columns]) -> 
 
 def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
     scenes = [Scene(graded_finger(3, seed), ()) for seed in range(7)]
-    (together,) = design_states(scenes, chain_potential, 1e-12, GROUPS)
+    (together,) = design_states(scenes, chain_potential, 1e-12, QUANTITIES)
     assert together.metrics is not None
     areas: list[Array] = []
     for place, scene in enumerate(scenes):
-        (alone,) = design_states([scene], chain_potential, 1e-12, GROUPS)
+        (alone,) = design_states([scene], chain_potential, 1e-12, QUANTITIES)
         assert alone.metrics is not None
         for name, values in alone.metrics.items():
             assert together.metrics[name][place] == values[0], name

@@ -1,0 +1,288 @@
+"""What can be said of states: each quantity with its name, unit, meaning and how it is computed.
+
+A quantity is written here and nowhere else: tables, `--columns`, metadata and the manual follow.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.errors import UsageError
+from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.patterns import texts
+from dpgcli.states.solved import SolvedFingers, SolvedStates
+
+Of = Callable[[SolvedFingers], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Quantity(Column):
+    """A column of states and the function that computes it.
+
+    `is_always` says that it is told of a pattern without a state, too: else it is NaN, or false,
+    there. Bars that are dropped would falsify what `needs_bars`.
+    """
+
+    of: Of = field(kw_only=True, compare=False)
+    is_always: bool = field(default=False, kw_only=True)
+    needs_bars: bool = field(default=False, kw_only=True)
+
+
+def rows(solved: SolvedStates, quantities: Sequence[Quantity]) -> Columns:
+    """The quantities of some states, by name.
+
+    States that were not solved as whole fingers have those of the groups states and energies only.
+    """
+    fingers = cast("SolvedFingers", solved)
+    columns: Columns = {}
+    for quantity in quantities:
+        values = quantity.of(fingers)
+        if not quantity.is_always:
+            is_state = solved.is_state
+            is_flag = values.dtype == bool
+            values = values & is_state if is_flag else np.where(is_state, values, np.nan)
+        columns[quantity.name] = values
+    return columns
+
+
+def declared(
+    n_units: int, energy_kinds: Sequence[str], is_gripper: bool, *, is_fitted: bool = False
+) -> tuple[Quantity, ...]:
+    """All quantities that a scene can have, in the order of every table.
+
+    >>> [c.name for c in declared(3, ("bistable", "hinge"), False)][:4]
+    ['pattern', 'status', 'tip_x_mm', 'tip_y_mm']
+    """
+    return (
+        *_POSES,
+        _EIGENVALUE,
+        *_NUMERICS,
+        *_STIFFNESS,
+        *(_energy(kind) for kind in _ENERGY_KINDS if kind in energy_kinds),
+        *(_opening(unit) for unit in range(n_units)),
+        *(_GRIPPER if is_gripper else ()),
+        *(_UNCERTAINTY if is_fitted else ()),
+        *(_nodes(n_units, "upper_", "lower_") if is_gripper else _nodes(n_units, "")),
+    )
+
+
+def named(quantities: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantity, ...]:
+    """The declared quantities that are named, each by its name or its group's.
+
+    Raises UsageError for names that are neither, with what there is.
+    """
+    known = {q.name for q in quantities} | {q.group for q in quantities}
+    if unknown := [name for name in names if name not in known]:
+        groups = ", ".join(dict.fromkeys(q.group for q in quantities))
+        single = ", ".join(q.name for q in quantities if q.group is not Group.NODES)
+        raise UsageError(
+            f"--columns: {', '.join(unknown)} unknown for this scene; "
+            f"groups: default, all, {groups}; columns: {single}"
+        )
+    return tuple(q for q in quantities if q.name in names or q.group in names)
+
+
+_POSES = (
+    Quantity(
+        "pattern",
+        "",
+        "activation pattern, unit 1 first, 1 = inverted",
+        kind=Kind.PATTERN,
+        of=lambda s: texts(s.inverted),
+        is_always=True,
+    ),
+    Quantity(
+        "status",
+        "",
+        "stable where certified, else why not",
+        kind=Kind.STATUS,
+        of=lambda s: s.status,
+        is_always=True,
+    ),
+    Quantity(
+        "tip_x_mm", "mm", "x of the tip, the last limiting-layer node", of=lambda s: s.pose[0]
+    ),
+    Quantity("tip_y_mm", "mm", "y of the tip; negative is the inner side", of=lambda s: s.pose[1]),
+    Quantity(
+        "tip_angle_rad",
+        "rad",
+        "rotation of the last strut; negative = curled",
+        of=lambda s: s.pose[2],
+    ),
+    Quantity("energy_mJ", "mJ", "potential energy of the state", of=lambda s: s.energy),
+)
+_EIGENVALUE = Quantity(
+    "min_eigenvalue_N_per_mm",
+    "N/mm",
+    "smallest eigenvalue of the Hessian in node coordinates",
+    Group.EIGENVALUE,
+    of=lambda s: s.eigenvalues,
+)
+_NUMERICS = (
+    Quantity(
+        "residual_N",
+        "N",
+        "largest unbalanced force; moments over the lever H",
+        of=lambda s: s.residual,
+        is_always=True,
+    ),
+    Quantity(
+        "tip_error_mm",
+        "mm",
+        "estimated numerical error of the tip position",
+        of=lambda s: s.tip_error,
+    ),
+    Quantity(
+        "reached_pattern",
+        "",
+        "the pattern whose wells the units are in",
+        kind=Kind.PATTERN,
+        of=lambda s: texts(s.reached),
+        is_always=True,
+    ),
+)
+ALWAYS = (*_POSES, *_NUMERICS)  # what every table of states needs to be judged by
+
+
+def _stiffness(name: str, unit: str, description: str, of: Of) -> Quantity:
+    return Quantity(name, unit, description, Group.STIFFNESS, of=of, needs_bars=True)
+
+
+def _compliance(place: int, name: str, unit: str, description: str) -> Quantity:
+    name = f"tip_compliance_{name}"
+    return _stiffness(name, unit, description, lambda s: s.compliance[place])
+
+
+_STIFFNESS = (
+    _stiffness(
+        "tip_stiffness_min_N_per_mm",
+        "N/mm",
+        "tip force per travel, softest way",
+        lambda s: s.stiffness[0],
+    ),
+    _stiffness(
+        "tip_stiffness_max_N_per_mm", "N/mm", "the same, stiffest way", lambda s: s.stiffness[1]
+    ),
+    _compliance(0, "xx_mm_per_N", "mm/N", "tip x by a force along x"),
+    _compliance(1, "xy_mm_per_N", "mm/N", "tip y by a force along x"),
+    _compliance(2, "yy_mm_per_N", "mm/N", "tip y by a force along y"),
+    _compliance(3, "x_angle_rad_per_N", "rad/N", "tip angle by a force along x"),
+    _compliance(4, "y_angle_rad_per_N", "rad/N", "tip angle by a force along y"),
+    _compliance(5, "angle_rad_per_N_mm", "rad/(N mm)", "tip angle by a moment at the tip"),
+)
+_ENERGY_KINDS = {"bistable": "bistable springs", "hinge": "hinges", "bar": "bars"}
+
+
+def _energy(kind: str) -> Quantity:
+    return Quantity(
+        f"{kind}_energy_mJ",
+        "mJ",
+        f"energy of the {_ENERGY_KINDS[kind]}",
+        Group.ENERGIES,
+        of=lambda s: s.energies[kind],
+    )
+
+
+def _opening(unit: int) -> Quantity:
+    return Quantity(
+        f"opening_{unit + 1}_mm",
+        "mm",
+        f"extension x of unit {unit + 1}'s spring",
+        Group.OPENINGS,
+        of=lambda s: s.openings[unit],
+    )
+
+
+def _gripper(name: str, unit: str, description: str, of: Of, kind: Kind = Kind.NUMBER) -> Quantity:
+    return Quantity(name, unit, description, Group.GRIPPER, kind, of=of)
+
+
+_GRIPPER = (
+    _gripper(
+        "aperture_mm",
+        "mm",
+        "gap of the inner faces at the tips; < 0: crossed",
+        lambda s: s.grip.aperture,
+    ),
+    _gripper(
+        "fingers_overlap",
+        "",
+        "the predicted fingers overlap",
+        lambda s: s.grip.overlaps,
+        Kind.FLAG,
+    ),
+    _gripper(
+        "upper_tip_x_mm",
+        "mm",
+        "x of the upper finger's tip in the gripper",
+        lambda s: s.grip.upper.base_x[-1],
+    ),
+    _gripper(
+        "upper_tip_y_mm",
+        "mm",
+        "y of the upper finger's tip in the gripper",
+        lambda s: s.grip.upper.base_y[-1],
+    ),
+    _gripper(
+        "lower_tip_x_mm",
+        "mm",
+        "x of the lower finger's tip in the gripper",
+        lambda s: s.grip.upper.base_x[-1],
+    ),
+    _gripper(
+        "lower_tip_y_mm",
+        "mm",
+        "y of the lower finger's tip in the gripper",
+        lambda s: -s.grip.upper.base_y[-1],
+    ),
+)
+
+
+def _uncertainty(place: int, name: str, unit: str, what: str) -> Quantity:
+    return Quantity(
+        f"tip_{name}",
+        unit,
+        f"standard uncertainty of the tip's {what} by the errors of fitted values, to first order",
+        Group.UNCERTAINTY,
+        of=lambda s: s.uncertainty[place],
+    )
+
+
+_UNCERTAINTY = (
+    _uncertainty(0, "x_uncertainty_mm", "mm", "x"),
+    _uncertainty(1, "y_uncertainty_mm", "mm", "y"),
+    _uncertainty(2, "angle_uncertainty_rad", "rad", "angle"),
+)
+_FINGERS = {"": "", "upper_": "the upper finger's ", "lower_": "the lower finger's "}
+_LAYERS = {"B": "limiting-layer node", "T": "dome-axis node"}
+
+
+def _nodes(n_units: int, *fingers: str) -> tuple[Quantity, ...]:
+    """Of one finger, or of the two of a gripper."""
+    return tuple(
+        _node(finger, layer, station, axis)
+        for finger in fingers
+        for station in range(n_units + 1)
+        for layer in _LAYERS
+        for axis in "xy"
+    )
+
+
+def _node(finger: str, layer: str, station: int, axis: str) -> Quantity:
+    coordinate = f"{'base' if layer == 'B' else 'top'}_{axis}"
+    sign = -1.0 if finger == "lower_" and axis == "y" else 1.0  # the mirror image
+
+    def position(solved: SolvedFingers) -> NDArray[Any]:
+        nodes = solved.grip.upper if finger else solved.nodes
+        return np.asarray(sign * getattr(nodes, coordinate)[station])
+
+    return Quantity(
+        f"{finger}{layer}{station}_{axis}_mm",
+        "mm",
+        f"{axis} of {_FINGERS[finger]}{_LAYERS[layer]} {station}",
+        Group.NODES,
+        of=position,
+    )

@@ -1,0 +1,150 @@
+"""Solved states, by whatever method, and what can be asked of those solved as whole fingers."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Flags, total
+from dpgcli.mechanics.coordinates import Stations
+from dpgcli.mechanics.scene import Gripper, Uncertainty
+from dpgcli.states.certify import Settled, Status
+from dpgcli.states.gripper import Grip, grip
+from dpgcli.states.sensitivities import sensitivities
+from dpgcli.states.tip import Tip, min_eigenvalues, tip
+
+
+@dataclass(frozen=True)
+class SolvedStates:
+    """Certified states, arrays of shape (…, state): what every method gives.
+
+    `status` holds `Status` codes. `pose` is tip x, y (mm) and angle (rad), `tip_error` in mm,
+    `energies` in mJ by kind, `residual` in N.
+    """
+
+    inverted: Flags
+    reached: Flags
+    status: NDArray[np.uint8]
+    pose: Array
+    tip_error: Array
+    energies: dict[str, Array]
+    residual: Array
+
+    @cached_property
+    def is_state(self) -> Flags:
+        """Where there is an equilibrium of the row's own pattern to speak of."""
+        return np.asarray((self.status == Status.STABLE) | (self.status == Status.MARGINAL))
+
+    @property
+    def energy(self) -> Array:
+        """Potential energy, mJ."""
+        first, *rest = self.energies.values()
+        return sum(rest, start=first)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What is around a finger, numbers or arrays by state.
+
+    Its gripper, if any, the thickness of its limiting layer (mm), and what fitted values may be
+    off by.
+    """
+
+    gripper: Gripper | None = None
+    layer_thickness: float | Array = 0.0
+    uncertainty: Uncertainty | None = None
+
+
+ALONE = Surroundings()
+
+
+@dataclass(frozen=True)
+class SolvedFingers(SolvedStates):
+    """States that were solved as whole fingers; everything further is computed when asked for."""
+
+    settled: Settled
+    tip: Tip
+    around: Surroundings
+
+    @classmethod
+    def of(
+        cls,
+        settled: Settled,
+        around: Surroundings,
+        dropped_error: float | Array,
+        *,
+        with_compliance: bool,
+    ) -> "SolvedFingers":
+        """The states of a batch; `dropped_error` is added to the error of each tip, mm."""
+        at_tip = tip(settled, with_compliance=with_compliance)
+        return cls(
+            settled.inverted,
+            settled.reached,
+            settled.status,
+            at_tip.pose,
+            at_tip.error + dropped_error,
+            settled.equilibrium.energies,
+            settled.equilibrium.residual,
+            settled,
+            at_tip,
+            around,
+        )
+
+    @cached_property
+    def eigenvalues(self) -> Array:
+        """Smallest eigenvalues in node coordinates, N/mm."""
+        return min_eigenvalues(self.settled)
+
+    @cached_property
+    def openings(self) -> Array:
+        """Extensions of the bistable springs, mm, (unit, state)."""
+        coordinates = self.settled.potential.coordinates
+        return coordinates.openings(self.settled.equilibrium.coordinates)
+
+    @cached_property
+    def nodes(self) -> Stations:
+        """Positions of all nodes, the clamped ones first, mm, each (unit + 1, state)."""
+        coordinates = self.settled.potential.coordinates
+        stations = coordinates.stations(self.settled.equilibrium.coordinates)
+        origin = np.zeros_like(stations.base_x[:1])
+        clamped = (origin, origin, origin, origin + coordinates.finger.segment_height)
+        pairs = zip(clamped, stations, strict=True)
+        return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
+
+    @cached_property
+    def grip(self) -> Grip:
+        """The finger as the upper one of its gripper."""
+        if self.around.gripper is None:
+            raise ValueError("the fingers belong to no gripper")
+        return grip(self.around.gripper, self.around.layer_thickness, self.nodes)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """The tip's compliance by `tip.COMPLIANCE_PAIRS`, in mm/N, rad/N and rad/(N mm)."""
+        if self.tip.compliance is None:
+            raise ValueError("the tip was solved without its compliance")
+        return self.tip.compliance
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """The softest and the stiffest stiffness of the tip's position, N/mm."""
+        if self.tip.stiffness is None:
+            raise ValueError("the tip was solved without its compliance")
+        return self.tip.stiffness
+
+    @cached_property
+    def uncertainty(self) -> Array:
+        """Standard uncertainty of the pose: σ² = s C sᵀ, C the covariance of fitted values.
+
+        s are the tip's derivatives by these; mm and rad.
+        """
+        known = self.around.uncertainty
+        if known is None:
+            raise ValueError("no value of the fingers was fitted")
+        slopes = sensitivities(self.settled, known.directions).pose
+        terms = [
+            covariance * slopes[:, k] * slopes[:, m]
+            for (k, m), covariance in np.ndenumerate(known.covariance)
+        ]
+        return np.sqrt(np.maximum(total(np.stack(terms)), 0.0))
