@@ -1,7 +1,7 @@
 """What a plan will cost: rough, good to a factor of two either way."""
 
 from dpgcli.states.columns import Group
-from dpgcli.states.halves import Split
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.settle import lanes_at_once
 
 # Measured on one core of a 2020s server, in seconds.

@@ -14,8 +14,8 @@ from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.costs import peak_bytes, seconds
-from dpgcli.states.halves import Split
-from dpgcli.states.pairs import paired_states
+from dpgcli.states.pairs.compose import paired_states
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.quantities import ALWAYS, Quantity, declared, named
 from dpgcli.states.rows import RowRequest

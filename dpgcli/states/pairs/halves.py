@@ -38,28 +38,28 @@ from dpgcli.states.units import Units
 class Joint:
     """How a half holds the shared strut, arrays of shape (entry,), mm and N.
 
-    `extension` s of the strut in the half's own solution, `pull` the half's force on it
-    (∂E/∂s), `stiffness` the derivative of that force and `shift` the motion of the finger's
+    `extension` s of the strut in the half's own solution, `force` the half's force on it
+    (∂E/∂s), `stiffness` the derivative of that force and `tip_motion` the motion of the finger's
     tip (mm per mm), both with the half following.
     """
 
     extension: Array
-    pull: Array
+    force: Array
     stiffness: Array
-    shift: Array
+    tip_motion: Array
 
 
 @dataclass(frozen=True)
-class Held:
-    """What a unit change of s does to an outer half that does not follow, (entry,), N/mm.
+class ClampedHalf:
+    """Forces per change of s on an outer half that does not follow, (entry,), N/mm.
 
-    `pull` on the strut, `force` the largest on the half's first cell, and `relative_force`
-    the largest over the forces in play, 1/mm.
+    `strut_stiffness` on the strut, `cell_stiffness` the largest on the half's first cell, and
+    `relative_stiffness` the largest over the forces in play, 1/mm.
     """
 
-    pull: Array
-    force: Array
-    relative_force: Array
+    strut_stiffness: Array
+    cell_stiffness: Array
+    relative_stiffness: Array
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Half:
     relative_residual: Array
     tip_error: Array
     joint: Joint | None = None
-    held: Held | None = None
+    clamped: ClampedHalf | None = None
     around: Outline | None = None
 
 
@@ -156,16 +156,16 @@ class Split:
         chain = Chain(finger.section(self.context, finger.n_units))
         coordinates = settled.equilibrium.coordinates
         pose, jacobian = chain.tip(coordinates[-chain.size :])
-        energies, joint, held = settled.equilibrium.energies, None, None
+        energies, joint, clamped = settled.equilibrium.energies, None, None
         if not chain.finger.is_rigid:
             context = chain_potential(finger.section(0, self.context))
             at_context = context.evaluate(coordinates[: context.coordinates.size])
             of_context = context.by_kind(at_context.energies)
             energies = {kind: e - of_context.get(kind, 0.0) for kind, e in energies.items()}
-            held = _held(settled, at_context)
+            clamped = _clamped(settled, at_context)
             joint = _outer_joint(settled, context, at_context, jacobian)
         own = slice(self.context, None)
-        half = self._half(settled, own, pose, energies, 0.0, joint, held)
+        half = self._half(settled, own, pose, energies, 0.0, joint, clamped)
         return self._with_outline(half, chain, coordinates[-chain.size :])
 
     def _with_outline(self, half: Half, chain: Chain, own: Array) -> Half:
@@ -183,7 +183,7 @@ class Split:
         energies: dict[str, Array],
         lever: float,
         joint: Joint | None,
-        held: Held | None = None,
+        clamped: ClampedHalf | None = None,
     ) -> Half:
         at_tip = tip(settled, with_compliance=False)
         return Half(
@@ -195,7 +195,7 @@ class Split:
             settled.equilibrium.relative_residual,
             at_tip.error + lever * at_tip.angle_error,
             joint,
-            held,
+            clamped,
         )
 
 
@@ -207,8 +207,8 @@ def _inner_joint(
     following = np.zeros_like(own)
     following[-1] = 1.0
     moved = total(jacobian * backward(factorization, following)[:, None])
-    shift = np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * beyond
-    return Joint(own[-1], at_own.gradient[-1], factorization.pivots[-1], shift)
+    tip_motion = np.hypot(moved[0], moved[1]) + np.abs(moved[2]) * beyond
+    return Joint(own[-1], at_own.gradient[-1], factorization.pivots[-1], tip_motion)
 
 
 @in_lanes
@@ -236,14 +236,14 @@ def _outer_joint(
     )
 
 
-def _held(settled: Settled, at_context: Evaluation) -> Held:
+def _clamped(settled: Settled, at_context: Evaluation) -> ClampedHalf:
     """The strut's column of the Hessian, without what the context adds on the diagonal."""
     strut = len(at_context.gradient) - 1
     column = settled.potential.evaluate(settled.equilibrium.coordinates).hessian[:, strut]
     chain = settled.potential.coordinates
     on_strut = column[0] - at_context.hessian[0, strut]
     near = slice(strut + 1, strut + len(column))
-    return Held(
+    return ClampedHalf(
         on_strut,
         _largest(column[1:], chain.force_unit[near]),
         _largest(column[1:], chain.gradient_scale[near]),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, Status
 from dpgcli.states.crossing import Outline, diagonals, is_simple
-from dpgcli.states.halves import Half, Split
+from dpgcli.states.pairs.halves import Half, Split
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.solved import SolvedStates
 
@@ -143,24 +143,26 @@ def _fit(split: Split, inner: Half, outer: Half, block: _Block) -> _Fit:
         block.inner(inner.relative_residual), block.outer(outer.relative_residual)
     )
     error = block.inner(inner.tip_error) + block.outer(outer.tip_error)
-    if inner.joint is None or outer.joint is None or outer.held is None:
+    if inner.joint is None or outer.joint is None or outer.clamped is None:
         return _Fit(residual, relative, error, np.ones((1, 1, 1), bool))
     apart = block.inner(inner.joint.extension) - block.outer(outer.joint.extension)
-    pull = block.inner(inner.joint.pull) + block.outer(outer.joint.pull)
-    at_strut = np.abs(pull + block.outer(outer.held.pull) * apart)
+    force = block.inner(inner.joint.force) + block.outer(outer.joint.force)
+    at_strut = np.abs(force + block.outer(outer.clamped.strut_stiffness) * apart)
     inner_stiffness, outer_stiffness = (
         block.inner(inner.joint.stiffness),
         block.outer(outer.joint.stiffness),
     )
     stiffness = inner_stiffness + outer_stiffness
-    step = -(pull + outer_stiffness * apart) / stiffness
+    step = -(force + outer_stiffness * apart) / stiffness
     gap = np.abs(apart)
     scale = split.strut_force
     return _Fit(
-        np.maximum(residual + block.outer(outer.held.force) * gap, at_strut),
-        np.maximum(relative + block.outer(outer.held.relative_force) * gap, at_strut / scale),
+        np.maximum(residual + block.outer(outer.clamped.cell_stiffness) * gap, at_strut),
+        np.maximum(
+            relative + block.outer(outer.clamped.relative_stiffness) * gap, at_strut / scale
+        ),
         error
-        + block.inner(inner.joint.shift) * np.abs(step)
-        + block.outer(outer.joint.shift) * np.abs(apart + step),
+        + block.inner(inner.joint.tip_motion) * np.abs(step)
+        + block.outer(outer.joint.tip_motion) * np.abs(apart + step),
         stiffness > MARGINAL_CURVATURE * np.abs(inner_stiffness),
     )
