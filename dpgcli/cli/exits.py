@@ -3,6 +3,7 @@
 import functools
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable
 from enum import IntEnum
@@ -22,10 +23,10 @@ from dpgcli.errors import (
     UsageError,
     WorkplaceError,
 )
+from dpgcli.signals import STOP_SIGNALS
 
 P = ParamSpec("P")
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
 
@@ -132,8 +133,11 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 def _send_again(number: int) -> None:
     signal.signal(number, _stop)
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
-    signal.setitimer(signal.ITIMER_REAL, SOON)
+    if hasattr(signal, "SIGALRM"):
+        signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
+        signal.setitimer(signal.ITIMER_REAL, SOON)
+    else:  # Windows
+        threading.Timer(SOON, signal.raise_signal, (number,)).start()
 
 
 def _unraisable(lost: "sys.UnraisableHookArgs") -> None:

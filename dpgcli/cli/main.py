@@ -27,6 +27,8 @@ from dpgcli.cli.exits import command, run_and_exit
 # Small matrices gain nothing from threads; set before NumPy is loaded.
 for _library in ("OPENBLAS", "MKL", "OMP"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# Pydantic would look for plugins among everything that is installed.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 app = typer.Typer(
     name="dpg",

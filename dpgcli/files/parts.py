@@ -1,15 +1,14 @@
 """Results of chunks on disk, so that an interrupted sweep can go on.
 
-A part holds the states and the designs of a range of designs as two Arrow streams, and at its end
-where the second begins. Its name is its range and the SHA-256 of its bytes: a part that does not
-match its name does not count.
+A part is a Parquet file of a range of designs, with a row for each block of work: the list of its
+states and the list of its designs. Its name is its range and the SHA-256 of its bytes: a part that
+does not match its name does not count.
 """
 
 import hashlib
 import json
 import os
 import re
-import struct
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -17,7 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
@@ -27,7 +28,8 @@ from dpgcli.states.columns import Column, Columns
 from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
-LENGTH = struct.Struct("<Q")
+LISTS = ("states", "designs")
+LAYOUT = {"compression": "lz4", "use_dictionary": False, "write_statistics": False}
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT = "dpg.fingerprint"
@@ -45,29 +47,26 @@ def write_part(
     design_columns: tuple[Column, ...],
     blocks: Iterable[tuple[Columns, Columns]],
 ) -> int:
-    """Write a part as its blocks of states and of designs come; the number of its states.
-
-    At its end stands where the designs begin: known only when all states are written.
-    """
-    designs = []
+    """Write a part as its blocks of states and of designs come; the number of its states."""
+    both = (state_columns, design_columns)
+    described = pa.schema(
+        {name: pa.list_(pa.struct(list(schema(c)))) for name, c in zip(LISTS, both, strict=True)}
+    )
     n_states = 0
-    with _stream(sink, state_columns) as stream:
-        for of_states, of_designs in blocks:
-            batch = record_batch(state_columns, of_states)
-            n_states += batch.num_rows
-            stream.write_batch(batch)
-            designs.append(record_batch(design_columns, of_designs))
-    middle = sink.tell()
-    with _stream(sink, design_columns) as stream:
-        for batch in designs:
-            stream.write_batch(batch)
-    sink.write(LENGTH.pack(middle))
+    with pq.ParquetWriter(sink, described, **LAYOUT) as writer:
+        for block in blocks:
+            states, designs = (record_batch(*table) for table in zip(both, block, strict=True))
+            row = [_as_list(states), _as_list(designs)]
+            writer.write_batch(pa.RecordBatch.from_arrays(row, schema=described))
+            n_states += states.num_rows
     return n_states
 
 
-def _stream(sink: IO[bytes], columns: tuple[Column, ...]) -> Any:
-    options = pa.ipc.IpcWriteOptions(compression="zstd")
-    return pa.ipc.new_stream(sink, schema(columns), options=options)
+def _as_list(batch: Any) -> Any:
+    """Rows as one list of them."""
+    rows = batch.to_struct_array()
+    ends = pa.py_buffer(np.array([0, len(rows)], np.int32))
+    return pa.Array.from_buffers(pa.list_(rows.type), 1, [None, ends], children=[rows])
 
 
 class Part(NamedTuple):
@@ -78,20 +77,15 @@ class Part(NamedTuple):
     path: Path
 
     def batches(self, which: int) -> Iterator[Any]:
-        """Record batches of its states (0) or designs (1)."""
-        yield from self._stream(which)
+        """Record batches of its states (0) or designs (1), a block each."""
+        with self.path.open("rb") as stream:
+            for row in pq.ParquetFile(stream).iter_batches(1, columns=[LISTS[which]]):
+                yield pa.RecordBatch.from_struct_array(row.column(0).flatten())
 
     def schema(self, which: int) -> Any:
         """Columns of its states (0) or designs (1)."""
-        return self._stream(which).schema
-
-    def _stream(self, which: int) -> Any:
-        file = pa.OSFile(os.fspath(self.path))
-        if which == 1:
-            file.seek(file.size() - LENGTH.size)
-            (middle,) = LENGTH.unpack(file.read(LENGTH.size))
-            file.seek(middle)
-        return pa.ipc.open_stream(file)
+        with self.path.open("rb") as stream:
+            return pa.schema(pq.read_schema(stream).field(LISTS[which]).type.value_type)
 
     @property
     def is_damaged(self) -> bool:

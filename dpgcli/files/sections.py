@@ -86,7 +86,9 @@ BarStiffness = Annotated[
 class Section(BaseModel):
     """A mapping whose keys are all known."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        strict=True, frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True
+    )
 
 
 class UnitGeometry(Section):

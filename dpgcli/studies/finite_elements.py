@@ -157,16 +157,23 @@ def _ended(job: str, folder: Path, log: IO[bytes], limits: Limits, log_name: Pat
             limit = f"{limits.time_limit:g} s (--time-limit)"
             raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
         finally:
-            os.killpg(group, signal.SIGKILL)
+            if group is None:
+                process.kill()
+            else:
+                os.killpg(group, signal.SIGKILL)
             process.wait()
 
 
 @contextmanager
-def _doomed_group() -> Iterator[int]:
+def _doomed_group() -> Iterator[int | None]:
     """A group of processes, all of which end with this block, and if this process is killed.
 
-    A shell in it waits for the end of a pipe that this process alone can write to.
+    A shell in it waits for the end of a pipe that this process alone can write to. None on
+    Windows, which has no groups that could be killed.
     """
+    if not hasattr(os, "killpg"):
+        yield None
+        return
     with subprocess.Popen(
         ["/bin/sh", "-c", "read line; kill -KILL 0"],
         stdin=subprocess.PIPE,

@@ -154,8 +154,8 @@ class Study:
 
     def check_room(self) -> None:
         """Refuse what memory, or the disk, cannot hold; raises UsageError."""
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-        if self.extent.bytes_in_memory > memory:
+        memory = _memory()
+        if memory is not None and self.extent.bytes_in_memory > memory:
             raise UsageError(
                 f"{self.sweep.space.size:,} designs take {size_text(self.extent.bytes_in_memory)} "
                 f"of memory in their summary, and this machine has {size_text(memory)}: "
@@ -292,6 +292,13 @@ def _stores(folder: Path) -> list[PartStore]:
     """Folders whose names are beginnings of fingerprints, and that nobody else uses."""
     found = map(PartStore, sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/")))
     return [store for store in found if store.is_own]
+
+
+def _memory() -> int | None:
+    """Bytes of this machine's memory, where the system says."""
+    if not hasattr(os, "sysconf"):  # Windows
+        return None
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def _existing(folder: Path) -> Path:

@@ -20,7 +20,7 @@ except SystemExit as end:
 report.write_text(" ".join({name.partition(".")[0] for name in sys.modules}))
 """
 AT_START = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "pydantic", "numba"}
-PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba"}
+PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba", "rich", "shapely", "filelock"}
 
 
 Loaded = Callable[..., set[str]]
