@@ -14,6 +14,7 @@ FLOORS = {
     "temporary": 0,
     "text": 0,
     "mechanics": 1,
+    "design": 2,
     "equilibrium": 2,
     "states": 3,
     "calibration": 4,
@@ -60,7 +61,7 @@ def test_the_solver_knows_no_finger() -> None:
     assert known <= {"dpgcli.arrays", "dpgcli.mechanics.terms", "dpgcli.equilibrium.banded"}
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states", "calibration"])
+@pytest.mark.parametrize("folder", ["mechanics", "design", "equilibrium", "states", "calibration"])
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
     for path in (PACKAGE / folder).rglob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))

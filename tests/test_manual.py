@@ -35,9 +35,9 @@ from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
+from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
-from dpgcli.mechanics.scene import Origin
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group, declared
 from dpgcli.stress.families import FAMILIES, PATTERNS

@@ -19,9 +19,9 @@ from dpgcli.benchmark.methods import Found, Way, other_ways, ways
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
 from dpgcli.states.certify import certify
 from dpgcli.states.columns import Column, Group, Kind

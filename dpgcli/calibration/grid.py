@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
@@ -19,23 +19,11 @@ from scipy.spatial import Delaunay, QhullError
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit, Parameter, fit_linear
+from dpgcli.design.calibrations import Estimate
 from dpgcli.errors import FitError
 
 SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its corners
 CONSTANT = "ln(value at reference)"
-
-
-class Estimate(NamedTuple):
-    """Values, their relative standard errors, and whether they lie inside the hull; (design,).
-
-    Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an
-    interpolation the root mean square of the leave-one-out errors, the same everywhere. NaN where
-    there are too few points to know.
-    """
-
-    value: Array
-    relative_error: Array
-    is_inside: Flags
 
 
 @dataclass(frozen=True)
@@ -98,6 +86,10 @@ class Law:
 
     def at(self, key: str, geometry: Array) -> Estimate:
         """A quantity at geometries (design, key), in the order of `points.over`.
+
+        Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an
+        interpolation the root mean square of the leave-one-out errors, the same everywhere. NaN
+        where there are too few points to know.
 
         >>> heights = np.array([[1.0], [2.0], [4.0]])
         >>> points = Points(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})

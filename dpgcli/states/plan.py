@@ -6,12 +6,12 @@ from enum import StrEnum
 
 import numpy as np
 
+from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, declared, named
 from dpgcli.states.costs import peak_bytes, seconds

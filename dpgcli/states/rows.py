@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
+from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation, Stations
-from dpgcli.mechanics.scene import Gripper, Uncertainty
 from dpgcli.states.certify import Batch, States, Status, certify
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.gripper import grip

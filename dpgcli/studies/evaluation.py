@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import keep_freed_memory
+from dpgcli.design.scene import Origin, Scene
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.scene_file import variant
 from dpgcli.files.sections import unit_of
 from dpgcli.files.sweep_file.space import UNITS, flattened
 from dpgcli.mechanics.chain import Chain
-from dpgcli.mechanics.scene import Origin, Scene
 from dpgcli.states.columns import Column, Group, Kind, declared
 from dpgcli.states.rows import Columns
 from dpgcli.sweeps.designs import choices, design_states

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dpgcli.design.dimensions import MAX_UNITS
 from dpgcli.errors import UsageError
-from dpgcli.files.scene_file.models import MAX_UNITS
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import UNITS
 from dpgcli.states.costs import UNIT_STATE_SECONDS

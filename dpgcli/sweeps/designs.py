@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Codes, Indices
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.finger import ARRAYS, Finger
 from dpgcli.mechanics.formulation import Formulation
-from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.columns import Group
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.rows import Columns, Wanted, solved_rows

@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.certify import Status, batch_at, certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

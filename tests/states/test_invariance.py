@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.arrays import Flags
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.certify import certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import evaluate
 from dpgcli.states.certify import States, Status, certify
 from dpgcli.states.halves import Split

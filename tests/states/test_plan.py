@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.equilibrium import newton
 from dpgcli.errors import UsageError
 from dpgcli.mechanics import chain as chain_module
 from dpgcli.mechanics import lattice as lattice_module
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states import solve as solve_module
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict

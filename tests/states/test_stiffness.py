@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import Term, evaluate
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

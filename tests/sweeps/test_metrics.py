@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.rows import Columns

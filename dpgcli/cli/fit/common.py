@@ -84,8 +84,8 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
 
 def positive(option: str, value: float | None) -> float | None:
     """An option's number, if there is one, above zero."""
+    from dpgcli.design.dimensions import LARGEST, SMALLEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST, SMALLEST
 
     if value is not None and not SMALLEST <= value <= LARGEST:
         raise UsageError(

@@ -9,13 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dpgcli.design.scene import Scene
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
 from dpgcli.files.scene_file.references import recalibrated, with_calibrations
 from dpgcli.files.scene_file.scenes import scene_of
 from dpgcli.files.scene_file.settings import changed, with_settings
 from dpgcli.files.yaml_file import Document, read_document
-from dpgcli.mechanics.scene import Scene
 
 __all__ = [
     "Spec",

@@ -12,7 +12,7 @@ import numpy as np
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of
-from dpgcli.files.places import KeyPath, shown
+from dpgcli.files.places import shown
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.sweep_file.models import (
     MANY_KEYS,
@@ -27,6 +27,7 @@ from dpgcli.files.sweep_file.models import (
 from dpgcli.files.yaml_file import Document
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.space import Axis, Range, linear, listed, logarithmic, sampled
+from dpgcli.text import KeyPath
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from dpgcli.mechanics.finger import Finger
 
 
 class Origin(StrEnum):
-    """How a lattice value came about."""
+    """How a lattice value came about, from the most to the least trusted."""
 
     GIVEN = "given"
     DERIVED = "derived"
@@ -17,6 +17,9 @@ class Origin(StrEnum):
     INTERPOLATED = "interpolated"
     SCALED = "scaled"
     EXTRAPOLATED = "extrapolated"
+
+
+ORIGINS = tuple(Origin)
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Uncertainty:
 class Gripper:
     """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad).
 
-    Numbers, or arrays by state where each state has a gripper of its own.
+    Numbers, or arrays by design or state where each has a gripper of its own.
     """
 
     base_spacing: float | Array
@@ -61,11 +64,12 @@ class Gripper:
 class Scene:
     """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known.
 
-    `uncertainty` is that of fitted values, if any has an error.
+    Of a batch of fingers gripper and thickness are arrays by design. `uncertainty` is that of
+    fitted values, if any has an error.
     """
 
     finger: Finger
     sources: tuple[Source, ...]
     gripper: Gripper | None = None
-    layer_thickness: float | None = None
+    layer_thickness: float | Array | None = None
     uncertainty: Uncertainty | None = None
