@@ -42,7 +42,7 @@ from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group, declared
 from dpgcli.stress.families import FAMILIES, PATTERNS
 from dpgcli.stress.verdicts import Verdict
-from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 
 ROOT = Path(__file__).parents[1]

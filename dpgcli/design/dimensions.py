@@ -28,6 +28,13 @@ BOUNDS = {  # where they are not those of a length
     "hinge_stiffness_N_mm_per_rad": (0.0, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
 }
+SUFFIXES = {  # units in the names of keys
+    "_N_mm_per_rad": "N mm/rad",
+    "_N_per_mm": "N/mm",
+    "_mm": "mm",
+    "_MPa": "MPa",
+    "_deg": "°",
+}
 Sizes = Mapping[str, Array]
 
 
@@ -212,3 +219,12 @@ def agree(given: Array, derived: Array) -> Flags:
     first, second = np.real(given), np.real(derived)
     largest = np.maximum(np.abs(first), np.abs(second))
     return np.asarray(np.abs(first - second) <= AGREEMENT * largest)
+
+
+def unit_of(key: str) -> str:
+    """The unit in a key's name, none where it has none.
+
+    >>> unit_of("finger.lattice.segment_height_mm")
+    'mm'
+    """
+    return next((unit for suffix, unit in SUFFIXES.items() if key.endswith(suffix)), "")

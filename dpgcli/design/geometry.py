@@ -154,14 +154,14 @@ def dome_origin(
     """
     height, thickness = np.real(dome_height), np.real(dome_thickness)
     (lowest, highest), (thinnest, thickest) = HULL["dome_height"], HULL["dome_thickness"]
-    is_known = (lowest <= height) & (height <= highest)
-    is_known &= (thinnest <= thickness) & (thickness <= thickest)
+    is_high = (lowest <= height) & (height <= highest)
+    is_thick = (thinnest <= thickness) & (thickness <= thickest)
     origin = _scaled_unless(
         (height == REFERENCE.dome_height)
         & (thickness == REFERENCE.dome_thickness)
         & (np.real(elastic_modulus) == REFERENCE.elastic_modulus)
     )
-    return np.where(is_known, origin, ORIGINS.index(Origin.EXTRAPOLATED))
+    return np.where(is_high & is_thick, origin, ORIGINS.index(Origin.EXTRAPOLATED))
 
 
 def hinge_origin(

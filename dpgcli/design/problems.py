@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Flags
+from dpgcli.errors import Problem
 from dpgcli.text import KeyPath, dotted
 
 
@@ -19,9 +20,10 @@ class Issue(NamedTuple):
     found: str
     hint: str = ""
 
-    def __str__(self) -> str:
-        hint = f" ({self.hint})" if self.hint else ""
-        return f"{dotted(self.path)}: expected {self.expected}, found {self.found}{hint}"
+    @property
+    def statement(self) -> str:
+        """What is wrong, in one line."""
+        return Problem("", None, None, dotted(self.path), *self[1:]).statement
 
 
 @dataclass

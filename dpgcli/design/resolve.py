@@ -20,7 +20,7 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
-from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source, Uncertainty
+from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source
 from dpgcli.design.uncertainty import Share, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -83,11 +83,14 @@ class Resolution:
     def scene(self) -> Scene:
         """What a single design describes, if nothing is wrong with it."""
         batch = self.batch(np.zeros(1, np.int64))
-        gripper, layer = batch.gripper, self._layer
-        if gripper is not None:
-            gripper = Gripper(*(of_design(np.asarray(v), 0) for v in vars(gripper).values()))
-        thickness = None if layer is None else of_design(layer, 0)
-        return Scene(batch.finger, tuple(self._sources()), gripper, thickness, self._uncertainty)
+        gripper, layer = batch.gripper, batch.layer_thickness
+        return Scene(
+            batch.finger,
+            tuple(self._sources()),
+            gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
+            None if layer is None else np.asarray(layer).item(),
+            uncertainty_of(self.design.calibrations, self._shares()),
+        )
 
     def batch(self, designs: Indices) -> Scene:
         """What some of the designs describe, none of them wrong, with arrays by design.
@@ -96,20 +99,23 @@ class Resolution:
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
-        gripper, layer = None, self._layer
-        if given := self.design.gripper:
-            angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
-            gripper = Gripper(
-                *(
-                    _picked(v, designs) + np.zeros(len(designs))
-                    for v in (given["base_spacing_mm"], angle)
-                )
-            )
-        return Scene(finger, (), gripper, None if layer is None else _picked(layer, designs))
+        layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
+        thickness = None if layer is None else _picked(layer, designs)
+        return Scene(finger, (), self._gripper(designs), thickness)
 
-    @property
-    def _layer(self) -> Array | None:
-        return self.design.finger.geometry.get("limiting_layer_thickness_mm")
+    def alike(self, designs: Indices) -> list[Indices]:
+        """Some of the designs, none of them wrong, apart by whether their bars are rigid."""
+        if not len(designs):
+            return []
+        is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
+        return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+
+    def _gripper(self, designs: Indices) -> Gripper | None:
+        given = self.design.gripper
+        if not given:
+            return None
+        angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
+        return Gripper(_picked(given["base_spacing_mm"], designs), _picked(angle, designs))
 
     def _sources(self) -> Iterator[Source]:
         """One source for each key and each set of units that got the same value the same way."""
@@ -122,10 +128,6 @@ class Resolution:
                 same[source] = (*same.get(source, ()), *units)
             for source, units in sorted(same.items(), key=lambda item: min(item[1])):
                 yield replace(source, units=_ranges(units))
-
-    @property
-    def _uncertainty(self) -> Uncertainty | None:
-        return uncertainty_of(self.design.calibrations, self._shares())
 
     def _shares(self) -> Iterator[Share]:
         """Standard errors of what comes from calibration files, unit by unit."""
@@ -222,8 +224,10 @@ def _by_unit(n_units: int, pairs: Sequence[tuple[Group, Array]]) -> Array:
 
 
 def _picked(values: Array, designs: Indices) -> Array:
-    """Values of some designs along the last axis; what there is one of for all stays one."""
-    return values if values.shape[-1] == 1 else np.take(values, designs, axis=-1)
+    """Values of some designs along the last axis."""
+    if values.shape[-1] == 1:
+        return np.repeat(values, len(designs), axis=-1)
+    return np.take(values, designs, axis=-1)
 
 
 def _error(value: Value) -> Array:

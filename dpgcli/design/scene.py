@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from dpgcli.arrays import Array
+import numpy as np
+
+from dpgcli.arrays import Array, Indices
 from dpgcli.mechanics.finger import Finger
 
 
@@ -73,3 +75,11 @@ class Scene:
     gripper: Gripper | None = None
     layer_thickness: float | Array | None = None
     uncertainty: Uncertainty | None = None
+
+    def designs(self, index: Indices) -> "Scene":
+        """Some designs of a batch; sources and uncertainty are left out."""
+        gripper, thickness = self.gripper, self.layer_thickness
+        if gripper is not None:
+            gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
+        layer = None if thickness is None else np.take(thickness, index)
+        return Scene(self.finger.designs(index), (), gripper, layer)

@@ -20,13 +20,6 @@ EXPECTED = {  # where it is not a length
     "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",
     "elastic_modulus_MPa": "a modulus > 0 in MPa",
 }
-UNITS = {
-    "_N_mm_per_rad": "N mm/rad",
-    "_N_per_mm": "N/mm",
-    "_mm": "mm",
-    "_MPa": "MPa",
-    "_deg": "°",
-}
 
 
 def wrong_width(sizes: Mapping[str, float]) -> Issue | None:
@@ -39,15 +32,6 @@ def wrong_width(sizes: Mapping[str, float]) -> Issue | None:
 def expected_of(key: str) -> str:
     """What a key of the geometry or the lattice expects, in words."""
     return EXPECTED.get(key, "a length > 0 in mm")
-
-
-def unit_of(key: str) -> str:
-    """The unit in a key's name, none where it has none.
-
-    >>> unit_of("finger.lattice.segment_height_mm")
-    'mm'
-    """
-    return next((unit for suffix, unit in UNITS.items() if key.endswith(suffix)), "")
 
 
 def _spelled_out(value: object) -> object:

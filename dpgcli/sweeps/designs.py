@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Codes, Indices
 from dpgcli.design.scene import Gripper, Scene
-from dpgcli.mechanics.finger import ARRAYS, Finger
+from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.formulation import Formulation
 from dpgcli.states.columns import Group
 from dpgcli.states.patterns import chunks, inverted_units
@@ -30,12 +30,9 @@ class Choice:
     bounds: Array
 
 
-def choices(scenes: Sequence[Scene], target_error: float) -> Iterator[Choice]:
-    """The cheapest rung of each design that is bounded by the target error (mm), by rung.
-
-    The scenes agree in the number of units and in having rigid bars.
-    """
-    bounds = error_bounds(Units.of(_stacked([scene.finger for scene in scenes])))
+def choices(finger: Finger, target_error: float) -> Iterator[Choice]:
+    """The cheapest rung of each design that is bounded by the target error (mm), by rung."""
+    bounds = error_bounds(Units.of(finger))
     chosen = cheapest(bounds, target_error)
     for index in np.unique(chosen):
         places = np.flatnonzero(chosen == index)
@@ -54,21 +51,22 @@ class Block(NamedTuple):
 
 
 def design_states(
-    scenes: Sequence[Scene],
+    scene: Scene,
     formulate: Callable[[Finger], Formulation],
     tolerance: float,
     groups: frozenset[Group],
     *,
     drops_bars: bool = False,
 ) -> Iterator[Block]:
-    """All states of some designs, design by design, in blocks.
+    """All states of a batch of designs, design by design, in blocks.
 
     A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
-    depends on its number of units alone. The scenes agree in that, in having rigid bars and in
-    being grippers. If it drops the bars, the error of the tips includes what that costs.
+    depends on its number of units alone. If it drops the bars, the error of the tips includes what
+    that costs.
     """
-    units = Units.of(_stacked([scene.finger for scene in scenes]))
-    dropped = np.zeros(len(scenes))
+    units = Units.of(scene.finger)
+    n_designs = units.finger.n_designs
+    dropped = np.zeros(n_designs)
     if drops_bars:
         dropped = bar_flexibility(units)
         units = Units.of(units.finger.with_bars(np.inf))
@@ -76,12 +74,13 @@ def design_states(
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
-        wanted = Wanted(formulate, tolerance, groups, *_placement(scenes, lanes), dropped[lanes])
+        placed = _placement(scene, n_designs, lanes)
+        wanted = Wanted(formulate, tolerance, groups, *placed, dropped[lanes])
         return solved_rows(_designs(units, lanes), inverted, wanted)
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
-    for designs in _design_batches(len(scenes), n_units):
+    for designs in _design_batches(n_designs, n_units):
         metrics = Metrics(_designs(units, designs), len(designs))
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
@@ -109,30 +108,22 @@ def _is_stiffness(name: str) -> bool:
     return name.startswith(("tip_stiffness", "tip_compliance"))
 
 
-def _stacked(fingers: Sequence[Finger]) -> Finger:
-    """Fingers as the designs of one batch."""
-    columns = {name: _side_by_side([getattr(f, name) for f in fingers]) for name in ARRAYS}
-    return fingers[0].changed(**columns)
-
-
-def _side_by_side(parts: list[Array]) -> Array:
-    rows = max(len(part) for part in parts)
-    repeated = (part if len(part) == rows else np.repeat(part, rows, axis=0) for part in parts)
-    return np.concatenate(list(repeated), axis=1)
-
-
 def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
     size = max(1, lanes_at_once(n_units) >> n_units)
     for first in range(0, n_designs, size):
         yield np.arange(first, min(first + size, n_designs))
 
 
-def _placement(scenes: Sequence[Scene], lanes: Indices) -> tuple[Gripper | None, float | Array]:
+def _placement(
+    scene: Scene, n_designs: int, lanes: Indices
+) -> tuple[Gripper | None, float | Array]:
     """The gripper and the layer's thickness of each lane's design."""
-    grippers = [scene.gripper for scene in scenes if scene.gripper is not None]
-    thickness = np.array([scene.layer_thickness or 0.0 for scene in scenes])[lanes]
-    if not grippers:
+
+    def of_lanes(values: float | Array) -> Array:
+        return np.broadcast_to(values, n_designs)[lanes]
+
+    thickness = 0.0 if scene.layer_thickness is None else of_lanes(scene.layer_thickness)
+    if scene.gripper is None:
         return None, thickness
-    spacing = np.array([gripper.base_spacing for gripper in grippers])[lanes]
-    angle = np.array([gripper.mounting_angle for gripper in grippers])[lanes]
-    return Gripper(spacing, angle), thickness
+    spacing, angle = scene.gripper.base_spacing, scene.gripper.mounting_angle
+    return Gripper(of_lanes(spacing), of_lanes(angle)), thickness

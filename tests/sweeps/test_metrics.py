@@ -57,7 +57,7 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
     finger, force = graded_finger(5, 3), length**2
     scaled = in_other_units(finger, length, force)
     (one,), (other,) = (
-        list(design_states([Scene(f, ())], Chain, 1e-12, GROUPS)) for f in (finger, scaled)
+        list(design_states(Scene(f, ()), Chain, 1e-12, GROUPS)) for f in (finger, scaled)
     )
     assert one.metrics is not None and other.metrics is not None
     powers = {"mm2": length**2, "mm": length, "N": force, "mJ": force * length}
@@ -148,12 +148,14 @@ def test_no_grid_is_too_large_for_its_cells(metrics: Callable[..., Columns]) -> 
 
 
 def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
-    scenes = [Scene(graded_finger(3, seed), ()) for seed in range(7)]
-    (together,) = design_states(scenes, Chain, 1e-12, GROUPS)
+    fingers = [graded_finger(3, seed) for seed in range(7)]
+    parts = [finger.arrays() for finger in fingers]
+    arrays = {name: np.concatenate([p[name] for p in parts], axis=1) for name in parts[0]}
+    (together,) = design_states(Scene(Finger(3, **arrays), ()), Chain, 1e-12, GROUPS)
     assert together.metrics is not None
     areas: list[Array] = []
-    for place, scene in enumerate(scenes):
-        (alone,) = design_states([scene], Chain, 1e-12, GROUPS)
+    for place, finger in enumerate(fingers):
+        (alone,) = design_states(Scene(finger, ()), Chain, 1e-12, GROUPS)
         assert alone.metrics is not None
         for name, values in alone.metrics.items():
             assert together.metrics[name][place] == values[0], name

@@ -121,7 +121,7 @@ def print_fit(fit: "Fit", printed_as: Format) -> None:
     """One row for each parameter on standard output."""
     import numpy as np
 
-    from dpgcli.files.sections import unit_of
+    from dpgcli.design.dimensions import unit_of
 
     states = zip(fit.parameters, fit.at_bound, strict=True)
     rows: dict[str, Any] = {

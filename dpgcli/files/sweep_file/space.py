@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of
 from dpgcli.files.places import shown
@@ -32,7 +33,7 @@ from dpgcli.text import KeyPath
 if TYPE_CHECKING:
     import pandas as pd
 
-UNITS = "finger.units"
+
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs"
