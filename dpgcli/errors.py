@@ -19,9 +19,13 @@ class Problem:
 
     def __str__(self) -> str:
         place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
+        return printable(f"{place}: {self.statement}")  # in one line, whatever names hold
+
+    @property
+    def statement(self) -> str:
+        """What is wrong, the place left out."""
         hint = f" ({self.hint})" if self.hint else ""
-        said = f"{place}: {self.key}: expected {self.expected}, found {self.found}{hint}"
-        return printable(said)  # in one line, whatever names and values hold
+        return f"{self.key}: expected {self.expected}, found {self.found}{hint}"
 
 
 class SpecError(Exception):

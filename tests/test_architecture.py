@@ -16,6 +16,7 @@ FLOORS = {
     "text": 0,
     "equilibrium": 1,
     "mechanics": 2,
+    "design": 2,
     "states": 3,
     "calibration": 4,
     "reference": 4,
@@ -61,7 +62,7 @@ def test_the_solver_knows_no_finger() -> None:
     assert {name.split(".")[1] for name in known} <= {"arrays", "equilibrium"}
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states", "calibration"])
+@pytest.mark.parametrize("folder", ["mechanics", "design", "equilibrium", "states", "calibration"])
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
     for path in (PACKAGE / folder).rglob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -35,15 +35,15 @@ from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
+from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
-from dpgcli.mechanics.scene import Origin
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
 from dpgcli.stress.families import FAMILIES, PATTERNS
 from dpgcli.stress.verdicts import Verdict
-from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 
 ROOT = Path(__file__).parents[1]

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.predict import predict
 

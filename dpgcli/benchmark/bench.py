@@ -19,8 +19,8 @@ from dpgcli.benchmark.methods import Found, Way, other_ways, ways
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
 from dpgcli.states.columns import Column, Columns, Group, Kind

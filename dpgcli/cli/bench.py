@@ -135,7 +135,7 @@ def _recorded(path: Path, said: str) -> "Sequence[Row]":
     """The rows of a record of the same finger."""
     from dpgcli.errors import UsageError
     from dpgcli.files.table_reader import read_record
-    from dpgcli.studies.differences import differences
+    from dpgcli.sweeps.differences import differences
 
     facts = read_record(path)
     changed = differences({"spec": str(facts.get("spec"))}, {"spec": said})

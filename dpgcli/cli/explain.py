@@ -21,7 +21,7 @@ from dpgcli.cli.options import (
 from dpgcli.cli.streams import put
 
 if TYPE_CHECKING:
-    from dpgcli.mechanics.scene import Source
+    from dpgcli.design.scene import Source
     from dpgcli.states.plan import Plan
 
 

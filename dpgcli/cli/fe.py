@@ -117,8 +117,8 @@ def hinge(
 
 def _check_positive(lengths: dict[str, float | None]) -> None:
     """Options that are neither zero nor negative, nor no number, nor beyond reason."""
+    from dpgcli.design.dimensions import LARGEST, SMALLEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST, SMALLEST
 
     for option, value in lengths.items():
         if value is not None and not SMALLEST <= value <= LARGEST:

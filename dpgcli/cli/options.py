@@ -139,8 +139,8 @@ def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
 
 
 def _point(option: str, text: str) -> tuple[float, float]:
+    from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST
 
     try:
         x, y = map(float, text.split(","))

@@ -30,7 +30,7 @@ from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
-    from dpgcli.mechanics.scene import Scene
+    from dpgcli.design.scene import Scene
     from dpgcli.states.columns import Columns
     from dpgcli.states.predict import Prediction, Summary
     from dpgcli.states.rungs import Rung

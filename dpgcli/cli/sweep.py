@@ -169,7 +169,7 @@ def _study(
 
 def _say_before(study: "Study") -> None:
     """What a long sweep takes."""
-    from dpgcli.studies.extent import size_text
+    from dpgcli.sweeps.extent import size_text
 
     extent = study.extent
     if extent.seconds > LONG:

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.design.dimensions import LARGEST
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of, decoded
 from dpgcli.files.places import Place, in_order, located, shown
-from dpgcli.files.sections import LARGEST
 
 MAX_BYTES = 64 * 1024 * 1024
 COMMENT = re.compile(r"#+\s|#$")

@@ -9,13 +9,14 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
+from dpgcli.design.dimensions import SMALLEST, unit_of
+from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration.models import Values
 from dpgcli.files.csv_file import Sheet, read_sheet
 from dpgcli.files.places import in_order
-from dpgcli.files.sections import SMALLEST, Geometry, expected_of, unit_of
+from dpgcli.files.sections import Geometry, expected_of
 from dpgcli.files.yaml_file import MAX_NODES
-from dpgcli.mechanics.geometry import snap_pressure
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}

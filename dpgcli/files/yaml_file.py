@@ -16,16 +16,8 @@ from ruamel.yaml.reader import ReaderError
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
-from dpgcli.files.places import (
-    MAX_SHOWN,
-    KeyPath,
-    Place,
-    dotted,
-    in_order,
-    located,
-    shortened,
-    shown,
-)
+from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.text import MAX_SHOWN, KeyPath, dotted, shortened
 
 MAX_NODES = 10_000
 MAX_DEPTH = 20

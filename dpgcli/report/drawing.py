@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.places import shortened
+from dpgcli.text import shortened
 
 LONGEST_TITLE = 100
 AUTHOR = "drawn by dpg"

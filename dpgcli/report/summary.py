@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.scene import Origin
+from dpgcli.design.scene import Origin
 from dpgcli.sweeps.gate import swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero

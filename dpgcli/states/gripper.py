@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Gripper
 from dpgcli.mechanics.coordinates import Stations
-from dpgcli.mechanics.scene import Gripper
 
 
 class Grip(NamedTuple):

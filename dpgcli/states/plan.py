@@ -6,10 +6,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group

@@ -7,7 +7,7 @@ from time import perf_counter, process_time
 import numpy as np
 
 from dpgcli.arrays import Codes, keep_freed_memory
-from dpgcli.mechanics.scene import Scene
+from dpgcli.design.scene import Scene
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Columns
 from dpgcli.states.pairs.compose import paired_states

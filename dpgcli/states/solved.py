@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
+from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import Stations
-from dpgcli.mechanics.scene import Gripper, Uncertainty
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import Grip, grip
 from dpgcli.states.sensitivities import sensitivities

@@ -5,24 +5,25 @@ import shlex
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 
 from dpgcli.errors import UsageError
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
-from dpgcli.files.scene_file import scene_of, spelled
+from dpgcli.files.scene_file import reason_against, scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
+from dpgcli.files.sweep_file.space import flattened
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.studies.differences import differences
-from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
-from dpgcli.studies.extent import Extent, size_text
-from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
+from dpgcli.sweeps.differences import differences
+from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Chunk, Runner, Workplace, chunked
+from dpgcli.sweeps.extent import Extent, size_text
+from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
@@ -71,19 +72,21 @@ class Study:
     tolerance: float = DEFAULT_TOLERANCE
     target_error: float | None = None
 
-    @property
+    @cached_property
     def evaluation(self) -> Evaluation:
         """The function of each chunk."""
+        data = self.sweep.base_data
         return Evaluation(
-            self.sweep.base_data,
+            self.sweep.base.design,
+            {k: v for k, v in flattened(data).items() if type(v) in (int, float)},
+            partial(reason_against, data),
             value_columns(self.sweep.space),
             self.sweep.constraints,
             self.tolerance,
-            self.sweep.base.gripper is not None,
             self.target_error,
         )
 
-    @property
+    @cached_property
     def metadata(self) -> dict[str, str]:
         """All that the results depend on, and its SHA-256 as the fingerprint."""
         said = {
@@ -103,7 +106,7 @@ class Study:
             return {"dpg.tolerance": repr(self.tolerance)}
         return {"dpg.target_error_mm": repr(self.target_error)}
 
-    @property
+    @cached_property
     def store(self) -> PartStore:
         """Where the parts of just this sweep are kept."""
         return PartStore(self.folder / PARTS / self.metadata[FINGERPRINT][:16])
@@ -116,7 +119,8 @@ class Study:
     @cached_property
     def extent(self) -> Extent:
         """What the sweep takes."""
-        return Extent(self.sweep, lambda values: self.evaluation.allowed(values))
+        allowed = self.evaluation.allowed if self.sweep.constraints else None
+        return Extent(self.sweep.space, self.sweep.base.finger.units, allowed)
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""

@@ -12,10 +12,10 @@ from dpgcli.benchmark.ablation import KEEPABLE, check_kept, kept_ways
 from dpgcli.benchmark.bench import Bench, chosen_patterns, errors, repeated, varied
 from dpgcli.benchmark.methods import Found
 from dpgcli.calibration.known import KnownStates
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.errors import UsageError
 from dpgcli.files.table_writer import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.plan import Request, explain
 

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certified, certify
 from dpgcli.states.plan import Request

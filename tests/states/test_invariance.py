@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.arrays import Flags
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import certify
 from dpgcli.states.plan import Request

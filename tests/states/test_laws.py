@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.wells import barriers, inverted_wells

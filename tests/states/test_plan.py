@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.equilibrium import newton
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states import settle as settle_module
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain

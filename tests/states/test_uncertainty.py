@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper, Scene, Uncertainty
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Gripper, Scene, Uncertainty
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

@@ -11,9 +11,9 @@ import pytest
 
 from dpgcli.errors import UsageError
 from dpgcli.studies import sweep as studies
-from dpgcli.studies.extent import BYTES_PER_STATE
 from dpgcli.studies.sweep import Progress, Shard, Study, assemble, stores
 from dpgcli.sweeps.executors import Workplace, processes, serial
+from dpgcli.sweeps.extent import BYTES_PER_STATE
 
 AXES = (
     "{key: finger.geometry.dome_height_mm, linear: {from: 2.5, to: 7, count: 19}}",

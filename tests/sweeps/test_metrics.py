@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Columns, Group
@@ -57,7 +57,7 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
     finger, force = graded_finger(5, 3), length**2
     scaled = in_other_units(finger, length, force)
     (one,), (other,) = (
-        list(design_states([Scene(f, ())], chain_potential, 1e-12, QUANTITIES))
+        list(design_states(Scene(f, ()), chain_potential, 1e-12, QUANTITIES))
         for f in (finger, scaled)
     )
     assert one.metrics is not None and other.metrics is not None
@@ -149,12 +149,14 @@ def test_no_grid_is_too_large_for_its_cells(metrics: Callable[..., Columns]) -> 
 
 
 def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
-    scenes = [Scene(graded_finger(3, seed), ()) for seed in range(7)]
-    (together,) = design_states(scenes, chain_potential, 1e-12, QUANTITIES)
+    fingers = [graded_finger(3, seed) for seed in range(7)]
+    parts = [finger.arrays() for finger in fingers]
+    arrays = {name: np.concatenate([p[name] for p in parts], axis=1) for name in parts[0]}
+    (together,) = design_states(Scene(Finger(3, **arrays), ()), chain_potential, 1e-12, QUANTITIES)
     assert together.metrics is not None
     areas: list[Array] = []
-    for place, scene in enumerate(scenes):
-        (alone,) = design_states([scene], chain_potential, 1e-12, QUANTITIES)
+    for place, finger in enumerate(fingers):
+        (alone,) = design_states(Scene(finger, ()), chain_potential, 1e-12, QUANTITIES)
         assert alone.metrics is not None
         for name, values in alone.metrics.items():
             assert together.metrics[name][place] == values[0], name

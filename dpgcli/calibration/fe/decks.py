@@ -10,7 +10,7 @@ from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.dome import Dome, DomeMesh
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
-from dpgcli.mechanics.geometry import WALL_THICKNESS
+from dpgcli.design.geometry import WALL_THICKNESS
 
 UNITS = "Units: mm, N, MPa, s; mass in t."
 DENSITY = 1.2e-9

@@ -7,7 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.elements import END_FACE, gauss, quad_shapes
-from dpgcli.mechanics.geometry import WALL_THICKNESS
+from dpgcli.design.geometry import WALL_THICKNESS
 
 
 @dataclass(frozen=True)

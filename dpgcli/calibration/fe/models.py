@@ -24,7 +24,7 @@ from dpgcli.calibration.fe.decks import (
 )
 from dpgcli.calibration.fe.dome import Dome, dome_mesh
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
-from dpgcli.mechanics.geometry import snap_pressure
+from dpgcli.design.geometry import snap_pressure
 
 DOME_CELLS = {"coarse": (20, 3, 1), "medium": (28, 4, 2), "fine": (56, 8, 4)}
 """Cells along the cap, along the annulus and through the wall."""

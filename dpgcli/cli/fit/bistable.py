@@ -162,8 +162,8 @@ def _fixed(fix: list[str], free: list[str] | None) -> dict[str, float]:
     """Values that are held, by key."""
     from difflib import get_close_matches
 
+    from dpgcli.design.dimensions import LARGEST, SMALLEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST, SMALLEST
 
     fixed: dict[str, float] = {}
     for text in fix:

@@ -84,8 +84,8 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
 
 def positive(option: str, value: float | None) -> float | None:
     """An option's number, if there is one, above zero."""
+    from dpgcli.design.dimensions import LARGEST, SMALLEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST, SMALLEST
 
     if value is not None and not SMALLEST <= value <= LARGEST:
         raise UsageError(
@@ -121,7 +121,7 @@ def print_fit(fit: "Fit", printed_as: Format) -> None:
     """One row for each parameter on standard output."""
     import numpy as np
 
-    from dpgcli.files.sections import unit_of
+    from dpgcli.design.dimensions import unit_of
 
     states = zip(fit.parameters, fit.at_bound, strict=True)
     rows: dict[str, Any] = {

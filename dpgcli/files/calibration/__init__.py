@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from dpgcli import __version__
+from dpgcli.design.dimensions import AGREEMENT
 from dpgcli.errors import FitError, Problem, SpecError
 from dpgcli.files.calibration.models import (
     Calibration,
@@ -27,9 +28,8 @@ from dpgcli.files.calibration.models import (
     Values,
 )
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.places import KeyPath, Place, in_order, located, shown
+from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import (
-    AGREEMENT,
     Geometry,
     Section,
     UnitGeometry,
@@ -37,6 +37,7 @@ from dpgcli.files.sections import (
     wrong_width,
 )
 from dpgcli.files.yaml_file import Document, parse_value, read_document
+from dpgcli.text import KeyPath, dotted
 
 __all__ = [
     "VERSION",
@@ -123,8 +124,8 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
         located_errors = ({**e, "loc": ("geometry", *e["loc"])} for e in error.errors())
         problems += [_problem(document, e) for e in located_errors]
     else:
-        if wrong := wrong_width(found.model_dump(exclude_none=True)):
-            problems.append(located(place, f"geometry.{wrong[0]}", *wrong[1:]))
+        if wrong := wrong_width(found.given()):
+            problems.append(located(place, dotted(wrong.path[1:]), *wrong[1:]))
     if problems:
         raise SpecError(in_order(problems))
     return found

@@ -9,6 +9,7 @@ from dpgcli.calibration.bistable import BistableFit
 from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
+from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import FitError
 from dpgcli.files.calibration.models import (
     Curve,
@@ -18,7 +19,6 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
-from dpgcli.files.sections import LARGEST, SMALLEST
 
 
 def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) -> dict[str, object]:

@@ -4,16 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.places import (
-    KeyPath,
-    Place,
-    dotted,
-    in_order,
-    located,
-    shortened,
-    shown,
-)
+from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.yaml_file import MAX_DEPTH, Document, parse_value
+from dpgcli.text import KeyPath, dotted, shortened
 
 SETTING = Place("--set")
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import quoted_if
-from dpgcli.files.places import KeyPath, in_order, located, shown
+from dpgcli.files.places import in_order, located, shown
 from dpgcli.files.scene_file import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.scene_file.problems import checked
 from dpgcli.files.scene_file.settings import SETTING
@@ -28,6 +28,7 @@ from dpgcli.files.sweep_file.space import SpaceReader
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
+from dpgcli.text import KeyPath
 
 __all__ = ["Sweep", "read_sweep"]
 

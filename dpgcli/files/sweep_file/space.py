@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of
-from dpgcli.files.places import KeyPath, shown
+from dpgcli.files.places import shown
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.sweep_file.models import (
     MANY_KEYS,
@@ -27,11 +28,12 @@ from dpgcli.files.sweep_file.models import (
 from dpgcli.files.yaml_file import Document
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.space import Axis, Range, linear, listed, logarithmic, sampled
+from dpgcli.text import KeyPath
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNITS = "finger.units"
+
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs"

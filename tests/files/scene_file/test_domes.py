@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dpgcli.design.scene import Origin
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, read_spec, scene_of
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
-from dpgcli.mechanics.scene import Origin
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dpgcli.design import geometry
+from dpgcli.design.scene import Origin
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, json_schema, read_scene, read_spec, scene_of
-from dpgcli.mechanics import geometry
-from dpgcli.mechanics.scene import Origin
 
 FINGER = """\
 finger:

@@ -9,8 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dpgcli.errors import SpecError
-from dpgcli.files.places import Place, shortened, shown
+from dpgcli.files.places import Place, shown
 from dpgcli.files.yaml_file import MAX_BYTES, parse_document, parse_value, read_document
+from dpgcli.text import shortened
 
 
 def problems_of(text):

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dpgcli.design.scene import Gripper, Origin, Source
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, json_schema, read_spec, scene_of, starter
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import SECTIONS, checked
 from dpgcli.files.yaml_file import Document
-from dpgcli.mechanics.scene import Gripper, Origin, Source
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 GRADED = CONFIGS / "graded_five_unit.yaml"

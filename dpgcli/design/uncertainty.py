@@ -1,4 +1,4 @@
-"""What the errors of calibration files mean for the values of a finger."""
+"""What the errors of calibrations mean for the values of a finger."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.files.calibration.models import Calibration
+from dpgcli.design.calibrations import Calibration
+from dpgcli.design.scene import Uncertainty
 from dpgcli.mechanics.finger import KEYS
-from dpgcli.mechanics.scene import Uncertainty
 
 
 class Share(NamedTuple):
-    """Standard errors by unit, (1 or unit, 1), of a file's values; 0 in other units."""
+    """Standard errors, (1 or unit, design), of a calibration's values; 0 in other units."""
 
     file: int
     key: str
@@ -36,12 +36,5 @@ def uncertainty_of(
             if first.file == second.file:
                 calibration = calibrations[first.file]
                 assert isinstance(calibration, Calibration), "shares come from files"
-                correlation[row, column] = _correlation(calibration, first.key, second.key)
+                correlation[row, column] = calibration.correlation_of(first.key, second.key)
     return Uncertainty(tuple({KEYS[s.key]: s.errors} for s in every), correlation)
-
-
-def _correlation(calibration: Calibration, first: str, second: str) -> float:
-    keys = list(calibration.uncertain)
-    if first == second or calibration.correlation is None or not {first, second} <= set(keys):
-        return float(first == second)
-    return calibration.correlation[keys.index(first)][keys.index(second)]

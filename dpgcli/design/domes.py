@@ -1,18 +1,19 @@
-"""Which law the domes of a spec follow, and the curve behind it."""
+"""Which law the domes of a design follow, and the curve behind it."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from dpgcli.files.calibration.models import Calibration, Curve
-from dpgcli.files.scene_file.rules import (
+from dpgcli.arrays import Array
+from dpgcli.design.calibrations import Calibration, DomeCurve
+from dpgcli.design.problems import Issue
+from dpgcli.design.rules import (
     BISTABLE_STIFFNESS,
     DERIVATIONS,
     FORCE_LINEARITY,
     STROKE,
     Derivation,
-    Issue,
-    sizes_of,
 )
 from dpgcli.mechanics.curve import FEWEST_POINTS, bridged, spline
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
@@ -31,40 +32,40 @@ class Domes:
     else 0.
     """
 
-    law: Law
-    derivations: tuple[Derivation, ...]
+    law: Law = PUBLISHED
+    derivations: tuple[Derivation, ...] = DERIVATIONS
     calibration: Calibration | None = None
     travel: float = 0.0
     height: float | None = None
 
-    def carries(self, key: str, calibration: object) -> bool:
-        """Whether an error of a file's value is one of the finger.
+    def carries(self, key: str, calibration: str | Calibration) -> bool:
+        """Whether a fitted value's standard error reaches the finger.
 
-        What normalizes the file's own curve cancels: the curve is as it is.
+        The k_b and stroke of the file that gives the curve only normalize it: their errors cancel.
         """
         return calibration is not self.calibration or key not in NORMALS
 
-    def travel_at(self, height: float | None) -> float:
+    def travel_at(self, height: Array | None) -> Array:
         """Travel of an inverted dome of another height, which it grows with (finite elements)."""
         if self.height is None or height is None:
-            return self.travel
+            return np.array([self.travel])
         return self.travel * height / self.height
 
 
 def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Domes | Issue:
-    """The law that a spec names, with the first curve among its calibrations."""
+    """The law of a name, with the first curve among the calibrations."""
     if law in (None, "published"):
-        return Domes(PUBLISHED, DERIVATIONS)
+        return Domes()
     curves = (c for c in calibrations if isinstance(c, Calibration) and c.curve is not None)
     calibration = next(curves, None)
     if law == "push_only" and calibration is None:
-        return Domes(PushOnly(PUBLISHED), DERIVATIONS)
+        return Domes(PushOnly(PUBLISHED))
     if calibration is None or calibration.curve is None:
         return Issue(WHERE, "a calibration with a curve beside law: tabulated", "none", HINT)
-    if len(calibration.curve.travel_mm) < FEWEST_POINTS:
-        found = f"{len(calibration.curve.travel_mm)} in {calibration.file}"
+    if len(calibration.curve.travel) < FEWEST_POINTS:
+        found = f"{len(calibration.curve.travel)} in {calibration.file}"
         return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
-    stiffness, stroke = (calibration.fitted(d.key) for d in (BISTABLE_STIFFNESS, STROKE))
+    stiffness, stroke = (calibration.values.get(key) for key in NORMALS)
     if stiffness is None or stroke is None:
         expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
         return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
@@ -78,26 +79,25 @@ def _no_well(calibration: Calibration) -> Issue:
 
 
 def _tabulated(
-    calibration: Calibration, curve: Curve, stiffness: float, stroke: float
+    calibration: Calibration, curve: DomeCurve, stiffness: float, stroke: float
 ) -> Domes | Issue:
-    factor = curve.opening_per_travel
-    shape = spline(*_points(curve, stroke / factor, stiffness * stroke**2))
+    shape = spline(*_points(curve, stroke / curve.opening_per_travel, stiffness * stroke**2))
     if not np.isfinite(shape.rests[1]):
         return _no_well(calibration)
     rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
     return Domes(Tabulated(shape), rules, calibration)
 
 
-def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes | Issue:
+def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Domes | Issue:
     travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
     if not np.isfinite(travel):
         return _no_well(calibration)
-    height = sizes_of(calibration.geometry).get("dome_height_mm")
     shape = spline(*_points(curve, travel, stiffness * travel**2))
+    height = calibration.geometry.get("dome_height_mm")
     domes = Domes(PushOnly(Tabulated(shape)), (), calibration, travel, height)
     stroke = replace(
         STROKE,
-        value=lambda height, separation: domes.travel_at(height) - height - separation,
+        value=partial(_stroke_in_contact, domes),
         rule="travel of the inverted dome - dome height - unit separation (contact)",
         not_from=calibration,
     )
@@ -105,10 +105,14 @@ def _pushing(calibration: Calibration, curve: Curve, stiffness: float) -> Domes 
     return replace(domes, derivations=tuple(rules))
 
 
-def _points(curve: Curve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
+def _stroke_in_contact(domes: Domes, height: Array, separation: Array) -> Array:
+    return domes.travel_at(height) - height - separation
+
+
+def _points(curve: DomeCurve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
     """Travels and energies over a travel and an energy, from rest on, gaps bridged."""
-    travels, energies = np.array(curve.travel_mm), np.array(curve.energy_mJ)
+    travels, energies = np.array(curve.travel), np.array(curve.energy)
     if travels[0] > 0.0:
         travels, energies = (np.concatenate(([0.0], values)) for values in (travels, energies))
-    travels, energies = bridged(travels, energies, curve.unsampled_mm)
+    travels, energies = bridged(travels, energies, curve.gaps)
     return tuple((travels / travel).tolist()), tuple((energies / energy).tolist())

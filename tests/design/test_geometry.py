@@ -2,8 +2,8 @@
 
 import pytest
 
-from dpgcli.mechanics import geometry
-from dpgcli.mechanics.scene import Origin
+from dpgcli.design import geometry
+from dpgcli.design.scene import ORIGINS, Origin
 
 
 def test_the_reference_geometry_gives_the_published_lattice_exactly():
@@ -61,12 +61,12 @@ def test_the_strip_formula_is_within_one_percent_of_the_published_hinge():
     ],
 )
 def test_dome_origin_tells_the_reference_from_the_grid_and_from_beyond(dome, origin):
-    assert geometry.dome_origin(*dome) is origin
+    assert ORIGINS[geometry.dome_origin(*dome)] is origin
 
 
 @pytest.mark.parametrize("changed", range(4))
 def test_hinge_origin_is_calibrated_at_the_reference_only(changed):
     reference = [26.0, 10.0, 1.5, 3.0]
-    assert geometry.hinge_origin(*reference) is Origin.CALIBRATED
+    assert ORIGINS[geometry.hinge_origin(*reference)] is Origin.CALIBRATED
     reference[changed] *= 1.1
-    assert geometry.hinge_origin(*reference) is Origin.SCALED
+    assert ORIGINS[geometry.hinge_origin(*reference)] is Origin.SCALED

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dpgcli.design.dimensions import MAX_UNITS, UNITS
 from dpgcli.errors import UsageError
-from dpgcli.files.scene_file.models import MAX_UNITS
-from dpgcli.files.sweep_file import Sweep
-from dpgcli.files.sweep_file.space import UNITS
 from dpgcli.states.costs import UNIT_STATE_SECONDS
 from dpgcli.states.patterns import MOST_SELECTED
 from dpgcli.sweeps.executors import chunked
+from dpgcli.sweeps.space import Space
 
 DESIGN_SECONDS = 3e-4  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
@@ -30,25 +29,27 @@ ASKED_AT_ONCE = 2**14
 class Extent:
     """What a sweep takes; constraints count where there are long fingers that they may exclude.
 
-    `allowed` says which designs meet the constraints, from their values by key.
+    `base_units` is the number of units where the space leaves it alone. `allowed` says, if there
+    are constraints, which designs meet them, from their values by key.
     """
 
-    sweep: Sweep
-    allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]]
+    space: Space
+    base_units: int
+    allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]] | None = None
 
     @cached_property
     def most_units(self) -> int:
         """Units of the longest finger."""
         longest = max(self._units, default=1)
-        size = self.sweep.space.size
-        if longest < LONG or not self.sweep.constraints or size > MOST_ASKED:
+        size = self.space.size
+        if longest < LONG or self.allowed is None or size > MOST_ASKED:
             return longest
-        return max(self._allowed_units(), default=1)
+        return max(self._allowed_units(self.allowed), default=1)
 
     @property
     def n_states(self) -> int:
         """States of all designs up to the longest, had no constraint anything against them."""
-        size, longest = self.sweep.space.size, self.most_units
+        size, longest = self.space.size, self.most_units
         states = sum(count << n for n, count in self._units.items() if n <= longest)
         return states * size // len(self._axis)
 
@@ -63,7 +64,7 @@ class Extent:
 
         Workers hold one block of states each, a third of that.
         """
-        space = self.sweep.space
+        space = self.space
         numbers = sum(len(axis) * len(axis.values) for axis in space.axes)
         of_designs = space.size * (DESIGN_BYTES + VALUE_BYTES * len(space.keys))
         return PROCESS_BYTES + 8 * numbers + of_designs
@@ -72,14 +73,14 @@ class Extent:
     def seconds(self) -> float:
         """Of one core; rough, good to a factor of two either way."""
         of_states = self.n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
-        return self.sweep.space.size * DESIGN_SECONDS + of_states
+        return self.space.size * DESIGN_SECONDS + of_states
 
     def check(self, chunk_size: int, *, is_sent: bool) -> None:
         """Refuse what no machine should begin; raises UsageError.
 
         `is_sent` says that workers send what they have done, each design in one piece.
         """
-        size, n_chunks = self.sweep.space.size, self.sweep.space.size // chunk_size
+        size, n_chunks = self.space.size, self.space.size // chunk_size
         if n_chunks > MOST_CHUNKS:
             raise UsageError(
                 f"{size:,} designs in {n_chunks:,} chunks of work: expected at most "
@@ -96,20 +97,22 @@ class Extent:
     @property
     def _axis(self) -> NDArray[Any]:
         """The numbers of units at the points of their axis, or that of the base."""
-        swept = (axis.values[UNITS] for axis in self.sweep.space.axes if UNITS in axis.values)
-        return next(swept, np.array([self.sweep.base.finger.units]))
+        swept = (axis.values[UNITS] for axis in self.space.axes if UNITS in axis.values)
+        return next(swept, np.array([self.base_units]))
 
     @cached_property
     def _units(self) -> dict[int, int]:
         return _counted(self._axis)
 
-    def _allowed_units(self) -> Iterator[int]:
+    def _allowed_units(
+        self, are_allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]]
+    ) -> Iterator[int]:
         """Numbers of units that some design has which no constraint excludes."""
-        space = self.sweep.space
+        space = self.space
         for chunk in chunked([(0, space.size)], ASKED_AT_ONCE):
             values = space.designs(chunk.start, chunk.stop)
-            allowed = self.allowed(values)
-            units = values.get(UNITS, np.full(len(allowed), self.sweep.base.finger.units))
+            allowed = are_allowed(values)
+            units = values.get(UNITS, np.full(len(allowed), self.base_units))
             yield from _counted(units[allowed])
 
 

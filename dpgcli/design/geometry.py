@@ -4,12 +4,20 @@ Three kinds of rule, told apart because they deserve different trust: *published
 stated by the study of the reference finger, *inferred* ones are ours and reproduce its published
 numbers, and *finite-element* ones are power laws fitted to a grid of 3-D dome simulations.
 Lengths in mm, moduli in MPa = N/mm^2, stiffness in N/mm or N mm/rad.
+
+Dimensions are numbers or arrays that broadcast. The rules take complex ones too, so that a complex
+step differentiates them.
 """
 
-import math
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from dpgcli.mechanics.scene import Origin
+import numpy as np
+
+from dpgcli.arrays import Array, Indices
+from dpgcli.design.scene import ORIGINS, Origin
+
+Size = TypeVar("Size", float, Array)  # or complex ones
 
 WALL_THICKNESS = 1.0
 """Thickness in mm of each of the two side walls of a unit cell (inferred)."""
@@ -42,7 +50,7 @@ class Reference:
 REFERENCE = Reference()
 
 
-def stroke(dome_height: float, unit_separation: float) -> float:
+def stroke(dome_height: Size, unit_separation: Size) -> Size:
     """Opening d = h - s of the inverted dome, in mm. Published.
 
     >>> stroke(6.5, 3.0)
@@ -51,7 +59,7 @@ def stroke(dome_height: float, unit_separation: float) -> float:
     return dome_height - unit_separation
 
 
-def chamber_width(unit_cell: float) -> float:
+def chamber_width(unit_cell: Size) -> Size:
     """Inner width W_c = UC - 2 mm of the chamber: the cell less its two walls. Inferred.
 
     >>> chamber_width(22.0)
@@ -60,7 +68,7 @@ def chamber_width(unit_cell: float) -> float:
     return unit_cell - 2 * WALL_THICKNESS
 
 
-def segment_height(chamber_width: float, limiting_layer_thickness: float) -> float:
+def segment_height(chamber_width: Size, limiting_layer_thickness: Size) -> Size:
     """Height H = W_c/2 + t_L/2 in mm, from the middle of the layer to the dome axis. Inferred.
 
     >>> segment_height(20.0, 1.5)
@@ -69,7 +77,7 @@ def segment_height(chamber_width: float, limiting_layer_thickness: float) -> flo
     return chamber_width / 2 + limiting_layer_thickness / 2
 
 
-def segment_length(chamber_length: float, dome_thickness: float, unit_separation: float) -> float:
+def segment_length(chamber_length: Size, dome_thickness: Size, unit_separation: Size) -> Size:
     """Length L = L_c + 2 t + s of one segment, in mm: chamber, two walls, gap. Inferred.
 
     >>> segment_length(9.0, 0.75, 3.0)
@@ -78,7 +86,7 @@ def segment_length(chamber_length: float, dome_thickness: float, unit_separation
     return chamber_length + 2 * dome_thickness + unit_separation
 
 
-def bistable_stiffness(dome_height: float, dome_thickness: float, elastic_modulus: float) -> float:
+def bistable_stiffness(dome_height: Size, dome_thickness: Size, elastic_modulus: Size) -> Size:
     """Stiffness k_b in N/mm, proportional to E t^2.8 h^-0.25 from 12.84 at the reference.
 
     The reference number is published. The exponents are from finite elements: the energy of the
@@ -87,15 +95,13 @@ def bistable_stiffness(dome_height: float, dome_thickness: float, elastic_modulu
     >>> bistable_stiffness(6.5, 0.75, 26.0)
     12.84
     """
-    return (
-        REFERENCE.bistable_stiffness
-        * (elastic_modulus / REFERENCE.elastic_modulus)
-        * math.pow(dome_thickness / REFERENCE.dome_thickness, 2.8)
-        * math.pow(dome_height / REFERENCE.dome_height, -0.25)
-    )
+    by_thickness: Size = (dome_thickness / REFERENCE.dome_thickness) ** 2.8
+    by_height: Size = (dome_height / REFERENCE.dome_height) ** -0.25
+    by_modulus = elastic_modulus / REFERENCE.elastic_modulus
+    return REFERENCE.bistable_stiffness * by_modulus * by_thickness * by_height
 
 
-def snap_pressure(dome_height: float, dome_thickness: float, elastic_modulus: float) -> float:
+def snap_pressure(dome_height: Size, dome_thickness: Size, elastic_modulus: Size) -> Size:
     """Pressure in MPa that inverts a dome, proportional to E t^2.5 h^1.2 from 0.1495.
 
     Number and exponents are from finite elements, of domes with a base of 16 mm on an annulus
@@ -104,20 +110,18 @@ def snap_pressure(dome_height: float, dome_thickness: float, elastic_modulus: fl
     >>> snap_pressure(6.5, 0.75, 26.0)
     0.1495
     """
-    return (
-        REFERENCE.snap_pressure
-        * (elastic_modulus / REFERENCE.elastic_modulus)
-        * math.pow(dome_thickness / REFERENCE.dome_thickness, 2.5)
-        * math.pow(dome_height / REFERENCE.dome_height, 1.2)
-    )
+    by_thickness: Size = (dome_thickness / REFERENCE.dome_thickness) ** 2.5
+    by_height: Size = (dome_height / REFERENCE.dome_height) ** 1.2
+    by_modulus = elastic_modulus / REFERENCE.elastic_modulus
+    return REFERENCE.snap_pressure * by_modulus * by_thickness * by_height
 
 
 def hinge_stiffness(
-    elastic_modulus: float,
-    channel_width: float,
-    limiting_layer_thickness: float,
-    unit_separation: float,
-) -> float:
+    elastic_modulus: Size,
+    channel_width: Size,
+    limiting_layer_thickness: Size,
+    unit_separation: Size,
+) -> Size:
     """Stiffness k_theta in N mm/rad of one hinge, proportional to E W_ch t_L^3 / s from 24.2.
 
     The reference number is published. The scaling is inferred: a strip of the limiting layer bent
@@ -137,40 +141,51 @@ def hinge_stiffness(
 
 
 def dome_origin(
-    dome_height: float, dome_thickness: float, elastic_modulus: float = REFERENCE.elastic_modulus
-) -> Origin:
+    dome_height: Array,
+    dome_thickness: Array,
+    elastic_modulus: Array | float = REFERENCE.elastic_modulus,
+) -> Indices:
     """How far to trust the springs of a dome: at the reference, within the grid, or beyond it.
 
-    >>> dome_origin(6.5, 0.75).value, dome_origin(7.5, 0.75).value, dome_origin(8.0, 0.75).value
-    ('calibrated', 'scaled', 'extrapolated')
+    Places in `ORIGINS`, one for each design.
+
+    >>> [ORIGINS[place].value for place in dome_origin(np.array([6.5, 7.5, 8.0]), np.array(0.75))]
+    ['calibrated', 'scaled', 'extrapolated']
     """
-    lowest_height, highest_height = HULL["dome_height"]
-    thinnest, thickest = HULL["dome_thickness"]
-    if not (
-        lowest_height <= dome_height <= highest_height and thinnest <= dome_thickness <= thickest
-    ):
-        return Origin.EXTRAPOLATED
-    dome = (dome_height, dome_thickness, elastic_modulus)
-    reference = (REFERENCE.dome_height, REFERENCE.dome_thickness, REFERENCE.elastic_modulus)
-    return Origin.CALIBRATED if dome == reference else Origin.SCALED
+    height, thickness = np.real(dome_height), np.real(dome_thickness)
+    (lowest, highest), (thinnest, thickest) = HULL["dome_height"], HULL["dome_thickness"]
+    is_high = (lowest <= height) & (height <= highest)
+    is_thick = (thinnest <= thickness) & (thickness <= thickest)
+    origin = _scaled_unless(
+        (height == REFERENCE.dome_height)
+        & (thickness == REFERENCE.dome_thickness)
+        & (np.real(elastic_modulus) == REFERENCE.elastic_modulus)
+    )
+    return np.where(is_high & is_thick, origin, ORIGINS.index(Origin.EXTRAPOLATED))
 
 
 def hinge_origin(
-    elastic_modulus: float,
-    channel_width: float,
-    limiting_layer_thickness: float,
-    unit_separation: float,
-) -> Origin:
+    elastic_modulus: Array,
+    channel_width: Array,
+    limiting_layer_thickness: Array,
+    unit_separation: Array,
+) -> Indices:
     """Calibrated at the reference hinge, scaled anywhere else (no grid bounds the scaling).
 
-    >>> hinge_origin(26.0, 10.0, 1.5, 3.0).value, hinge_origin(26.0, 10.0, 1.5, 4.0).value
-    ('calibrated', 'scaled')
+    Places in `ORIGINS`, one for each design.
+
+    >>> separations = np.array([3.0, 4.0])
+    >>> [ORIGINS[place].value for place in hinge_origin(26.0, 10.0, 1.5, separations)]
+    ['calibrated', 'scaled']
     """
-    hinge = (elastic_modulus, channel_width, limiting_layer_thickness, unit_separation)
-    reference = (
-        REFERENCE.elastic_modulus,
-        REFERENCE.channel_width,
-        REFERENCE.limiting_layer_thickness,
-        REFERENCE.unit_separation,
+    return _scaled_unless(
+        (np.real(elastic_modulus) == REFERENCE.elastic_modulus)
+        & (np.real(channel_width) == REFERENCE.channel_width)
+        & (np.real(limiting_layer_thickness) == REFERENCE.limiting_layer_thickness)
+        & (np.real(unit_separation) == REFERENCE.unit_separation)
     )
-    return Origin.CALIBRATED if hinge == reference else Origin.SCALED
+
+
+def _scaled_unless(is_reference: Any) -> Indices:
+    calibrated, scaled = map(ORIGINS.index, (Origin.CALIBRATED, Origin.SCALED))
+    return np.where(is_reference, calibrated, scaled)

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from dpgcli.arrays import Array
+import numpy as np
+
+from dpgcli.arrays import Array, Indices
 from dpgcli.mechanics.finger import Finger
 
 
 class Origin(StrEnum):
-    """How a lattice value came about."""
+    """How a lattice value came about, from the most to the least trusted."""
 
     GIVEN = "given"
     DERIVED = "derived"
@@ -17,6 +19,9 @@ class Origin(StrEnum):
     INTERPOLATED = "interpolated"
     SCALED = "scaled"
     EXTRAPOLATED = "extrapolated"
+
+
+ORIGINS = tuple(Origin)
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Uncertainty:
 class Gripper:
     """Two mirrored fingers: distance of their B_0 (mm) and outward tilt of each (rad).
 
-    Numbers, or arrays by state where each state has a gripper of its own.
+    Numbers, or arrays by design or state where each has a gripper of its own.
     """
 
     base_spacing: float | Array
@@ -61,11 +66,20 @@ class Gripper:
 class Scene:
     """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known.
 
-    `uncertainty` is that of fitted values, if any has an error.
+    Of a batch of fingers gripper and thickness are arrays by design. `uncertainty` is that of
+    fitted values, if any has an error.
     """
 
     finger: Finger
     sources: tuple[Source, ...]
     gripper: Gripper | None = None
-    layer_thickness: float | None = None
+    layer_thickness: float | Array | None = None
     uncertainty: Uncertainty | None = None
+
+    def take_lanes(self, index: Indices) -> "Scene":
+        """Some designs of a batch; sources and uncertainty are left out."""
+        gripper, thickness = self.gripper, self.layer_thickness
+        if gripper is not None:
+            gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
+        layer = None if thickness is None else np.take(thickness, index)
+        return Scene(self.finger.take_lanes(index), (), gripper, layer)

@@ -1,19 +1,17 @@
 """Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import keep_freed_memory
-from dpgcli.errors import Problem, SpecError
-from dpgcli.files.scene_file import variant
-from dpgcli.files.sections import unit_of
-from dpgcli.files.sweep_file.space import UNITS, flattened
-from dpgcli.mechanics.scene import Origin, Scene
+from dpgcli.arrays import Flags, Indices, keep_freed_memory
+from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
+from dpgcli.design.resolve import resolve
+from dpgcli.design.scene import ORIGINS, Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.columns import Column, Columns, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
@@ -23,14 +21,6 @@ from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 from dpgcli.sweeps.space import Space
 
 Numbers = NDArray[Any]
-
-GRAVEST_FIRST = (
-    Origin.EXTRAPOLATED,
-    Origin.SCALED,
-    Origin.INTERPOLATED,
-    Origin.CALIBRATED,
-    Origin.GIVEN,
-)
 
 
 class DesignStatus(StrEnum):
@@ -61,22 +51,25 @@ class Tables(NamedTuple):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Evaluates designs around a base spec, given the values of its keys that change.
+    """Evaluates designs around a base, given the values of its keys that change.
 
-    `values` are the columns of those keys, by key. With a `target_error` (mm) each design takes
-    the cheapest rung that is bounded by it.
+    `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
+    a design that has a value which its key cannot have, from its values. `values` are the columns
+    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest rung
+    that is bounded by it.
     """
 
-    base_data: Mapping[str, Any]
+    base: Design
+    known: Mapping[str, float]
+    reason_against: Callable[[Mapping[str, float]], str]
     values: Mapping[str, Column]
     constraints: tuple[Expression, ...]
     tolerance: float
-    is_gripper: bool
     target_error: float | None = None
 
     @property
     def groups(self) -> frozenset[Group]:
-        gripper = {Group.GRIPPER} if self.is_gripper else set()
+        gripper = {Group.GRIPPER} if self.base.gripper else set()
         return frozenset({Group.STATES, Group.STIFFNESS, *gripper})
 
     @property
@@ -87,7 +80,7 @@ class Evaluation:
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """What is told of each state."""
-        every = declared(1, (), self.is_gripper)
+        every = declared(1, (), bool(self.base.gripper))
         return tuple(quantity for quantity in every if quantity.group in self.groups)
 
     @property
@@ -104,22 +97,12 @@ class Evaluation:
         """
         keep_freed_memory()
         n_designs = len(next(iter(values.values())))
-        scenes: dict[int, Scene] = {}
-        reasons: dict[int, str] = {}
         allowed = self.allowed(values)
-        for place in np.flatnonzero(allowed).tolist():
-            changes = {key: _said(key, column[place].item()) for key, column in values.items()}
-            try:
-                scenes[place] = variant(self.base_data, changes)
-            except SpecError as error:
-                reasons[place] = "; ".join(map(_reason, error.problems))
-        described = {
-            **self._described(start, values),
-            "calibration": np.array([_calibration(scenes.get(p)) for p in range(n_designs)], "S"),
-        }
-        solved = (part for places in _alike(scenes) for part in self._solved(places, scenes))
+        batches, origins, reasons = self._resolved(values, allowed)
+        names = np.array([b"", *(origin.encode() for origin in ORIGINS)])
+        described = {**self._described(start, values), "calibration": names[origins + 1]}
         waiting: list[_Solved] = []
-        for part in solved:
+        for part in (part for batch in batches for part in self._solved(*batch)):
             if part.metrics is None and n_designs == 1:
                 yield Tables(self._state_rows(described, [part]), self._no_designs)
             else:
@@ -129,11 +112,57 @@ class Evaluation:
             self._design_rows(described, waiting, allowed, reasons),
         )
 
+    def _resolved(
+        self, values: Mapping[str, Numbers], allowed: Flags
+    ) -> "tuple[list[tuple[Indices, Scene]], Indices, dict[int, str]]":
+        """Designs that share a batch, by their places, with what they describe.
+
+        And by place the gravest origin among a design's values, in `ORIGINS`, −1 for those that are
+        wrong, and what is wrong with them.
+        """
+        batches: list[tuple[Indices, Scene]] = []
+        origins = np.full(len(allowed), -1)
+        possible = allowed & self._are_possible(values)
+        reasons = {
+            place: self.reason_against({k: _said(k, v[place].item()) for k, v in values.items()})
+            for place in np.flatnonzero(allowed & ~possible).tolist()
+        }
+        for places, design in self._designs(values, np.flatnonzero(possible)):
+            found = resolve(design)
+            for index in np.flatnonzero(found.are_wrong).tolist():
+                issues = found.problems.of(index)
+                reasons[int(places[index])] = "; ".join(issue.statement for issue in issues)
+            right = np.flatnonzero(~found.are_wrong)
+            origins[places[right]] = found.gravest_origins[right]
+            batches += [(places[alike], found.batch(alike)) for alike in found.alike(right)]
+        return batches, origins, reasons
+
+    def _designs(
+        self, values: Mapping[str, Numbers], places: Indices
+    ) -> Iterator[tuple[Indices, Design]]:
+        """The designs at some places, by their number of units."""
+        columns = {key: column[places] for key, column in values.items()}
+        units = columns.pop(UNITS, np.full(len(places), self.base.units))
+        for n_units in np.unique(units).tolist():
+            here = np.flatnonzero(units == n_units)
+            own = {key: column[here] for key, column in columns.items()}
+            yield places[here], replace(self.base, units=int(n_units)).with_values(own)
+
+    def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
+        """Which designs have only values that their keys can have."""
+        own = (key.removeprefix("gripper.") for key in values if key.startswith("gripper."))
+        gripper = {*self.base.gripper, *own}
+        is_placed = not gripper or "base_spacing_mm" in gripper
+        possible = np.full(len(next(iter(values.values()))), is_placed)
+        for key, column in values.items():
+            possible &= are_possible(key.rsplit(".", 1)[-1], column)
+        return possible
+
     def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
         """The rows of one design that cannot be evaluated at all."""
         described = {**self._described(design, values), "calibration": np.array([b""])}
         rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
-        rows["status"] = np.array([DesignStatus.FAILED.value])
+        rows["status"] = np.array([DesignStatus.FAILED.encode()])
         return Tables(self._state_rows(described, []), rows)
 
     @property
@@ -147,7 +176,7 @@ class Evaluation:
     def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
         n_designs = len(next(iter(values.values())))
-        known: dict[str, Any] = flattened(dict(self.base_data)) | dict(values)
+        known: dict[str, Any] = {**self.known, **values}
         short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
         allowed = np.ones(n_designs, bool)
         for rule in self.constraints:
@@ -155,23 +184,24 @@ class Evaluation:
             allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
         return allowed
 
-    def _solved(self, places: list[int], scenes: Mapping[int, Scene]) -> "Iterator[_Solved]":
-        group = [scenes[place] for place in places]
+    def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
         if self.target_error is None:
-            for block in design_states(group, chain_potential, self.tolerance, self.quantities):
-                yield _Solved(np.array(places)[block.places], block.rows, block.metrics)
+            for block in design_states(scene, chain_potential, self.tolerance, self.quantities):
+                yield _Solved(places[block.places], block.rows, block.metrics)
             return
-        for choice in choices(group, self.target_error):
+        for choice in choices(scene.finger, self.target_error):
             rung = choice.rung
-            chosen = [group[place] for place in choice.places]
             for block in design_states(
-                chosen, chain_potential, rung.tolerance, self.quantities, drops_bars=rung.drops_bars
+                scene.take_lanes(choice.places),
+                chain_potential,
+                rung.tolerance,
+                self.quantities,
+                drops_bars=rung.drops_bars,
             ):
                 if block.metrics is not None:
-                    block.metrics["rung"] = np.full(len(block.places), rung.name)
+                    block.metrics["rung"] = np.full(len(block.places), rung.name, "S24")
                     block.metrics["error_bound_mm"] = choice.bounds[block.places]
-                here = np.array(places)[choice.places][block.places]
-                yield _Solved(here, block.rows, block.metrics)
+                yield _Solved(places[choice.places][block.places], block.rows, block.metrics)
 
     def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
         """Rows of all groups, brought back into the order of the designs."""
@@ -198,7 +228,7 @@ class Evaluation:
         reasons: Mapping[int, str],
     ) -> Columns:
         n_designs = len(described["design"])
-        status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("U16")
+        status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("S16")
         rows = dict(described)
         finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
         for column in self.design_columns[len(described) + 2 :]:
@@ -210,7 +240,10 @@ class Evaluation:
             complete = metrics["n_stable"] == metrics["n_states"]
             status[places] = np.where(complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE)
         rows["status"] = status
-        rows["reason"] = np.array([reasons.get(place, "") for place in range(n_designs)])
+        texts = [text.encode() for text in reasons.values()]
+        reason = np.zeros(n_designs, f"S{max(map(len, texts), default=1)}")
+        reason[list(reasons)] = texts
+        rows["reason"] = reason
         return {column.name: rows[column.name] for column in self.design_columns}
 
 
@@ -223,7 +256,7 @@ RUNG_COLUMNS = (
     Column("rung", "", "way chosen for the target error", Group.STATES, Kind.TEXT),
     Column("error_bound_mm", "mm", "bound on the tips' error before the work", Group.STATES),
 )
-EMPTY = {Kind.COUNT: 0, Kind.TEXT: ""}
+EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
 REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TEXT)
 
 
@@ -254,37 +287,16 @@ def value_columns(space: Space) -> dict[str, Column]:
     }
 
 
-def _alike(scenes: Mapping[int, Scene]) -> list[list[int]]:
-    """Places of scenes that can share a batch."""
-    groups: dict[tuple[int, bool], list[int]] = {}
-    for place, scene in scenes.items():
-        kind = (scene.finger.n_units, scene.finger.is_rigid)
-        groups.setdefault(kind, []).append(place)
-    return list(groups.values())
-
-
-def _calibration(scene: Scene | None) -> str:
-    if scene is None:
-        return ""
-    origins = {source.origin for source in scene.sources}
-    return next(str(origin) for origin in GRAVEST_FIRST if origin in origins)
-
-
 def _said(key: str, value: float) -> float:
     """A value as a spec has it: numbers of units are whole, in a list with fractions, too."""
     return int(value) if key == UNITS and float(value).is_integer() else value
-
-
-def _reason(problem: Problem) -> str:
-    hint = f" ({problem.hint})" if problem.hint else ""
-    return f"{problem.key}: expected {problem.expected}, found {problem.found}{hint}"
 
 
 def _dtype(kind: Kind) -> str:
     types = {
         Kind.PATTERN: "S1",
         Kind.STATUS: "u1",
-        Kind.TEXT: "U24",
+        Kind.TEXT: "S24",
         Kind.COUNT: "i8",
         Kind.FLAG: "?",
     }
