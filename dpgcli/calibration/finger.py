@@ -19,7 +19,7 @@ from dpgcli.calibration.comparison import Comparison, compare
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
-from dpgcli.errors import FitError
+from dpgcli.errors import Field, FitError
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
@@ -51,11 +51,13 @@ class FingerFit:
         for key in self.free:
             if key not in values or not self._has(key):
                 known = ", ".join(filter(self._has, values))
-                raise FitError(f"--free {key}: expected one of {known}")
+                raise FitError(Field("free"), f" {key}: expected one of {known}")
             if values[key].size > 1:
-                raise FitError(f"--free {key}: units differ in it, expected one value for all")
+                raise FitError(
+                    Field("free"), f" {key}: units differ in it, expected one value for all"
+                )
             if not np.isfinite(values[key]).all():
-                raise FitError(f"--free {key}: is infinite, start from a finite value")
+                raise FitError(Field("free"), f" {key}: is infinite, start from a finite value")
 
     def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.

@@ -19,6 +19,7 @@ from dpgcli.cli.options import (
     TipOffset,
     check_installed,
     check_plot,
+    check_table_name,
     frame_of,
     millimeters,
 )
@@ -93,7 +94,7 @@ def bench(
     """Measure error against run time, beside what else there is."""
     from dpgcli.benchmark.bench import Bench
     from dpgcli.files.known_states import states_of
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs
     from dpgcli.files.scene_file import canonical_json, checked, read_scene, scene_of
     from dpgcli.files.table_writer import write_states
     from dpgcli.report.precision import cheapest_way, draw_precision

@@ -128,6 +128,17 @@ def check_plot(path: Path) -> None:
     check_installed("--plot", "matplotlib")
 
 
+def check_table_name(path: Path | None) -> None:
+    """Refuse a name that promises another format than Parquet; raises UsageError."""
+    from dpgcli.errors import UsageError
+
+    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
+        raise UsageError(
+            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
+            "or --plot for figures"
+        )
+
+
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
     """Where the lattice lies in given data."""
     from dpgcli.calibration.known import Frame

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.options import Quiet, Settings, check_installed
+from dpgcli.cli.options import Quiet, Settings, check_installed, check_table_name
 from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import say
@@ -51,7 +51,7 @@ def stress(
     quiet: Quiet = False,
 ) -> None:
     """Hold stiff and extreme cases against extended precision."""
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs
     from dpgcli.files.scene_file import scene_of
 
     check_installed("dpg stress", "mpmath")

@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.calibration.models import Values
 from dpgcli.files.csv_file import Sheet, read_sheet
 from dpgcli.files.places import in_order
@@ -216,13 +216,14 @@ def _is_numeric(sheet: Sheet, name: str) -> bool:
 def _chosen(sheet: Sheet, where: str) -> Sheet:
     name, equals, text = where.partition("=")
     if not equals:
-        raise SpecError((sheet.problem(None, "--where", "COLUMN=TEXT", repr(where)),))
+        raise SpecError((sheet.problem(None, Field("where"), "COLUMN=TEXT", repr(where)),))
     sheet.check_names([name.strip()])
     cells = sheet.cells(name.strip())
     kept = [row for row, cell in enumerate(cells) if cell == text.strip()]
     if not kept:
         there = "; ".join(dict.fromkeys(cells))
-        raise SpecError((sheet.problem(None, "--where", f"a text of {name}", repr(text), there),))
+        expected = f"a text of {name}"
+        raise SpecError((sheet.problem(None, Field("where"), expected, repr(text), there),))
     return sheet.chosen(kept)
 
 
@@ -259,8 +260,9 @@ def _scales(
             hint = GUESSES[kind][largest > high]
             needed = BEHIND.get(kind, ())
             if missing := [key for key in needed if key not in (geometry or {})]:
-                hint += f" if it is right, say how large the dome is: --geometry {missing[0]}=..."
-                hint += "".join(f" --geometry {key}=..." for key in missing[1:])
+                hint = Message(hint, " if it is right, say how large the dome is:")
+                for key in missing:
+                    hint = Message(hint, " ", Field("geometry"), f" {key}=...")
             expected = f"a largest value of {low:.3g} to {high:.3g}"
             yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
 

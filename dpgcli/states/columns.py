@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 
 
 class Kind(StrEnum):
@@ -80,8 +80,9 @@ def named(columns: Sequence[Column], names: Sequence[str]) -> tuple[Column, ...]
         groups = ", ".join(dict.fromkeys(c.group for c in columns))
         single = ", ".join(c.name for c in columns if c.group is not Group.NODES)
         raise UsageError(
-            f"--columns: {', '.join(unknown)} unknown for this scene; "
-            f"groups: default, all, {groups}; columns: {single}"
+            Field("columns"),
+            f": {', '.join(unknown)} unknown for this scene; "
+            f"groups: default, all, {groups}; columns: {single}",
         )
     return tuple(c for c in columns if c.name in names or c.group in names)
 

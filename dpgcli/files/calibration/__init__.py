@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from dpgcli import __version__
-from dpgcli.errors import FitError, Problem, SpecError
+from dpgcli.errors import Field, FitError, Problem, SpecError
 from dpgcli.files.calibration.models import (
     Calibration,
     Curve,
@@ -106,7 +106,7 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
     Raises SpecError with every problem.
     """
     data: dict[str, Any] = {} if base is None else base.model_dump(exclude_none=True)
-    place = Place("--geometry")
+    place = Place(Field("geometry"))
     problems: list[Problem] = []
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))
