@@ -37,11 +37,11 @@ from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
+from dpgcli.hard_cases.families import FAMILIES, PATTERNS
+from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.mechanics.scene import Origin
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group, declared
-from dpgcli.stress.families import FAMILIES, PATTERNS
-from dpgcli.stress.verdicts import Verdict
 from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 

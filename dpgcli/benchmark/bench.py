@@ -19,6 +19,8 @@ from dpgcli.benchmark.methods import Found, Way, other_ways, ways
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.hard_cases.cases import check_law
+from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.scene import Scene
@@ -33,8 +35,6 @@ from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.solve import solve
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
-from dpgcli.stress.cases import check_law
-from dpgcli.stress.families import repeated
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers

@@ -97,7 +97,7 @@ def bench(
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.files.scene_file import canonical_json, checked, read_scene, scene_of
     from dpgcli.files.table_writer import write_states
-    from dpgcli.report.precision import cheapest_way, draw_precision
+    from dpgcli.reports.precision import cheapest_way, draw_precision
 
     check_installed("dpg bench", "mpmath")
     if plot is not None:
@@ -176,7 +176,7 @@ def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
 
 
 def _print_tables(rows: "Sequence[Row]") -> None:
-    from dpgcli.report.precision import text_figure
+    from dpgcli.reports.precision import text_figure
 
     for group, title in GROUPS.items():
         own = [row for row in rows if row["group"] == group]

@@ -36,7 +36,7 @@ def check(
     """Check that every design of a table meets requirements."""
     from dpgcli.files.output import check_appendable
     from dpgcli.files.table_reader import read_designs
-    from dpgcli.report.page import verdicts_markdown
+    from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements, number_columns, requirement
 
     designs, _ = read_designs(table)

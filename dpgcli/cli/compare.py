@@ -74,7 +74,7 @@ def compare(
     for _ in printer_of(printed_as)(columns(table), [table]):
         pass
     if plot is not None:
-        from dpgcli.report.comparison import draw_comparison
+        from dpgcli.reports.comparison import draw_comparison
 
         draw_comparison(known, found, calibrated, data.name, plot)
     if not quiet:

@@ -193,7 +193,7 @@ def _check_drawable(n_states: int) -> None:
 
 
 def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:
-    from dpgcli.report.figures import draw_states
+    from dpgcli.reports.figures import draw_states
     from dpgcli.states.plan import Request
     from dpgcli.states.predict import predict as predict_states
 

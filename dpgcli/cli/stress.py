@@ -20,11 +20,11 @@ from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
     from dpgcli.files.scene_file import Spec
+    from dpgcli.hard_cases.cases import Case
+    from dpgcli.hard_cases.table import FamilySummary
+    from dpgcli.hard_cases.verdicts import Outcome
     from dpgcli.mechanics.finger import Finger
     from dpgcli.states.rows import Columns
-    from dpgcli.stress.cases import Case
-    from dpgcli.stress.table import FamilySummary
-    from dpgcli.stress.verdicts import Outcome
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
 MARGINS = (
@@ -86,7 +86,7 @@ def _spec(spec: Path | None, settings: Sequence[str]) -> tuple["Spec | None", tu
 
 def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
     from dpgcli.errors import NothingSelectedError
-    from dpgcli.stress.cases import all_cases, check_families
+    from dpgcli.hard_cases.cases import all_cases, check_families
 
     check_families(only)
     cases = all_cases(finger, only)
@@ -97,7 +97,7 @@ def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
 
 def _progress(cases: Sequence["Case"], quiet: bool) -> Iterator["Outcome"]:
     """Outcomes as they come, with progress."""
-    from dpgcli.stress import verdicts
+    from dpgcli.hard_cases import verdicts
 
     line = ProgressLine(len(cases), "cases", quiet=quiet)
     for done, outcome in enumerate(verdicts.stress(cases), start=1):
@@ -110,7 +110,7 @@ def _printed(
     printed_as: Format, coming: Iterator["Outcome"], finger: "Finger | None"
 ) -> list["Outcome"]:
     """All outcomes: printed one by one as they come, or in tables at the end."""
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
+    from dpgcli.hard_cases.table import STRESS_COLUMNS, rows
 
     outcomes: list[Outcome] = []
 
@@ -130,7 +130,7 @@ def _printed(
 
 def _print_tables(outcomes: list["Outcome"], finger: "Finger | None") -> None:
     """Families by whose finger it is, cases that matter in full, and the finger's margins."""
-    from dpgcli.stress.table import summarized
+    from dpgcli.hard_cases.table import summarized
 
     summaries = summarized(outcomes)
     titles = {"spec": "The spec's finger", "built-in": "The study's finger"}
@@ -173,9 +173,9 @@ def _family(summary: "FamilySummary") -> dict[str, str]:
 
 def _in_full(outcomes: list["Outcome"]) -> list[dict[str, str]]:
     """All that is known of some cases."""
+    from dpgcli.hard_cases.table import STRESS_COLUMNS, rows
     from dpgcli.states.columns import Kind
     from dpgcli.states.rows import as_text
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
 
     values = rows(outcomes)
     texts = {
@@ -228,7 +228,7 @@ def _write(output: Path, outcomes: list["Outcome"], spec: "Spec | None") -> None
         versions,
         write_table,
     )
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
+    from dpgcli.hard_cases.table import STRESS_COLUMNS, rows
 
     metadata = {"dpg.schema_version": str(SCHEMA_VERSION), "dpg.versions": versions()}
     if spec is not None:

@@ -18,9 +18,9 @@ from dpgcli.sweeps.executors import Workplace
 NO_NUMBERS = (
     "benchmark",
     "cli",
+    "hard_cases",
     "reference",
-    "report",
-    "stress",
+    "reports",
 )  # parts of the package that no number passes through
 
 

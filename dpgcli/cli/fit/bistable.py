@@ -254,7 +254,7 @@ def _draw(found: "BistableFit", choice: "Choice", name: str, path: Path) -> None
     import numpy as np
 
     from dpgcli.calibration.bistable import UNITS, law
-    from dpgcli.report.fits import FitFigure, draw_fit
+    from dpgcli.reports.fits import FitFigure, draw_fit
 
     unit = UNITS[choice.quantity]
     along = np.linspace(min(0.0, float(found.travel.min())), float(found.travel.max()), 400)

@@ -143,6 +143,6 @@ def _summary(study: "FingerFit", found: "Fit") -> list[str]:
 
 
 def _draw(study: "FingerFit", found: "Fit", data: Path, plot: Path) -> None:
-    from dpgcli.report.comparison import draw_comparison
+    from dpgcli.reports.comparison import draw_comparison
 
     draw_comparison(study.known, study.compared(None), study.compared(found), data.name, plot)

@@ -100,7 +100,7 @@ def _mixed(data: "Moments") -> list[str]:
 def _draw(found: "HingeFit", data: "Moments", name: str, path: Path) -> None:
     import numpy as np
 
-    from dpgcli.report.fits import FitFigure, draw_fit
+    from dpgcli.reports.fits import FitFigure, draw_fit
 
     ends = np.array([min(0.0, data.rotation.min()), max(0.0, data.rotation.max())])
     figure = FitFigure(

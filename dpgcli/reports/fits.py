@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dpgcli.arrays import Array
-from dpgcli.report.drawing import figure_to, titled
+from dpgcli.reports.drawing import figure_to, titled
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.comparison import Comparison
 from dpgcli.calibration.known import KnownStates
-from dpgcli.report.drawing import drawn_to, titled
+from dpgcli.reports.drawing import drawn_to, titled
 from dpgcli.states.patterns import texts
 
 

@@ -12,10 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Flags
 from dpgcli.errors import Field, UsageError
-from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.laws import Published
-from dpgcli.states.plan import FORMULATIONS
-from dpgcli.stress.families import (
+from dpgcli.hard_cases.families import (
     FAMILIES,
     PATTERNS,
     Family,
@@ -23,6 +20,9 @@ from dpgcli.stress.families import (
     Variant,
     few_patterns,
 )
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.mechanics.laws import Published
+from dpgcli.states.plan import FORMULATIONS
 
 BUILT_IN, GIVEN = "built-in", "spec"
 

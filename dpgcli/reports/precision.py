@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dpgcli.report.drawing import drawn_to, titled
+from dpgcli.reports.drawing import drawn_to, titled
 
 Row = dict[str, Any]
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dpgcli.hard_cases.verdicts import Outcome, Verdict
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.rows import Columns
-from dpgcli.stress.verdicts import Outcome, Verdict
 
 
 def _column(name: str, unit: str, description: str, kind: Kind = Kind.NUMBER) -> Column:
