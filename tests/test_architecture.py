@@ -23,6 +23,7 @@ FLOORS = {
     "sweeps": 5,
     "files": 6,
     "reports": 6,
+    "api": 7,
     "studies": 7,
     "cli": 8,
     "__main__": 9,

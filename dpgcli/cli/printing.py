@@ -121,6 +121,12 @@ def printer_of(printed_as: Format, *, principal: bool = False) -> Printer:
     return printers.get(printed_as) or table_printer(principal=principal)
 
 
+def print_rows(columns: tuple[Column, ...], rows: "Columns", printed_as: Format) -> None:
+    """Print one block of rows."""
+    for _ in printer_of(printed_as)(columns, [rows]):
+        pass
+
+
 def _rows(
     columns: tuple[Column, ...], block: "Columns", limit: int | None = None
 ) -> list[list[Any]]:

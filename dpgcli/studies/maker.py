@@ -16,6 +16,7 @@ from dpgcli.errors import WorkplaceError
 from dpgcli.sweeps.executors import Workplace
 
 NO_NUMBERS = (
+    "api",
     "benchmark",
     "cli",
     "hard_cases",

@@ -116,6 +116,12 @@ def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
     return np.flatnonzero(~met & _in_question(designs))
 
 
+def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[Verdict, ...]:
+    """Hold every design against requirements in words; see `check_requirements`."""
+    columns = number_columns(designs)
+    return check_requirements(designs, [requirement(text, columns) for text in texts])
+
+
 def check_requirements(
     designs: pd.DataFrame, requirements: Sequence[Expression]
 ) -> tuple[Verdict, ...]:

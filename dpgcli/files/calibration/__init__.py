@@ -49,6 +49,7 @@ __all__ = [
     "ScalingLaw",
     "Values",
     "calibration_in",
+    "calibration_of",
     "geometry_of",
     "made_by",
     "read_calibration",
@@ -65,6 +66,12 @@ def made_by() -> str:
     import scipy
 
     return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}"
+
+
+def calibration_of(sections: Mapping[str, Any]) -> Calibration:
+    """A calibration with these sections, made by this program."""
+    head = {"calibration_version": VERSION, "made_by": made_by()}
+    return Calibration.model_validate({**head, **sections})
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
