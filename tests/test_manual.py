@@ -38,11 +38,11 @@ from dpgcli.cli.main import app
 from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
+from dpgcli.hard_cases.families import FAMILIES, PATTERNS
+from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.stress.families import FAMILIES, PATTERNS
-from dpgcli.stress.verdicts import Verdict
 from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.design.scene import Scene
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.predict import predict
 
@@ -40,17 +40,18 @@ def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Pla
     Raises UsageError for a name that is none of `KEEPABLE`, or that the scene does not leave out.
     """
     if name not in KEEPABLE:
-        raise UsageError(f"--keep {name}: expected {', '.join(KEEPABLE)}")
+        raise UsageError(Field("keep"), f" {name}: expected {', '.join(KEEPABLE)}")
     plan = explain(scene, replace(STATES_ONLY, target_error=target_error))
     if plan.n_states > MOST_KEPT:
         raise UsageError(
-            f"--keep: all {plan.n_states:,} states would be held twice, {MOST_KEPT:,} may be: "
-            "take fewer units"
+            Field("keep"),
+            f": all {plan.n_states:,} states would be held twice, {MOST_KEPT:,} may be: "
+            "take fewer units",
         )
     kept = KEEPABLE[name](plan)
     if kept is None:
         others = ", ".join(other for other in KEEPABLE if KEEPABLE[other](plan) is not None)
-        raise UsageError(f"--keep {name}: this scene leaves out {others}")
+        raise UsageError(Field("keep"), f" {name}: this scene leaves out {others}")
     return plan, kept
 
 

@@ -8,6 +8,8 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
     "stroke_mm",
 )
 
+LEVER = "segment_height_mm"  # what is fitted to known states by default
+
 
 class Loss(StrEnum):
     """How a residual counts: linear is plain least squares, the others limit outliers."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 
 POINTS_AT_ONCE = 2**12

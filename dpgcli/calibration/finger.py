@@ -19,7 +19,7 @@ from dpgcli.calibration.comparison import Comparison, compare
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
-from dpgcli.errors import FitError
+from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
@@ -27,6 +27,14 @@ from dpgcli.states.sensitivities import STEP, sensitivities
 
 EDGE = 1e-3  # of a value: a fit that ends closer than this to where states end is none
 WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
+STILL_OFF = 0.3  # of the deflection
+STILL_OFF_WARNING = Message(
+    "tips are still off by more than 30 % of the deflection: look at ",
+    Field("first_station"),
+    ", ",
+    Field("tip_offset"),
+    ", units, and the sign of y (inverted units curl towards -y)",
+)
 BARS = (1.0, 1e11)  # times the stiffest bistable spring: bounds of the bars' stiffness
 
 
@@ -51,11 +59,13 @@ class FingerFit:
         for key in self.free:
             if key not in values or not self._has(key):
                 known = ", ".join(filter(self._has, values))
-                raise FitError(f"--free {key}: expected one of {known}")
+                raise FitError(Field("free"), f" {key}: expected one of {known}")
             if values[key].size > 1:
-                raise FitError(f"--free {key}: units differ in it, expected one value for all")
+                raise FitError(
+                    Field("free"), f" {key}: units differ in it, expected one value for all"
+                )
             if not np.isfinite(values[key]).all():
-                raise FitError(f"--free {key}: is infinite, start from a finite value")
+                raise FitError(Field("free"), f" {key}: is infinite, start from a finite value")
 
     def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.
@@ -88,6 +98,14 @@ class FingerFit:
                         f"states cease to exist ({', '.join(lost)}): the search can go no "
                         "further, and its standard error may mean nothing"
                     )
+
+    def judgments(self, found: Fit) -> Iterator[str]:
+        """What a user should know about a fit and its data."""
+        yield from found.warnings
+        if np.nanmax(self.compared(found).relative, initial=0.0) > STILL_OFF:
+            yield STILL_OFF_WARNING
+        if self.known.unused:
+            yield f"columns not used: {', '.join(self.known.unused)}"
 
     def compared(self, found: Fit | None) -> Comparison:
         """The states beside the known ones: as the finger is, or as it was fitted."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.errors import FitError
+from dpgcli.errors import Field, FitError, Message
 
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
@@ -206,9 +206,10 @@ def quasi_static(record: Record) -> Pieces:
 def dirt(record: Record, *, is_cut: bool) -> Iterator[str]:
     """What is wrong with a record, in words; `is_cut` where only slow pieces are used."""
     if not is_cut and rings(record):
-        yield (
-            f"ringing: the travel reverses {_reversals(record)} times while it is fast; "
-            "--branches quasi-static leaves that out"
+        yield Message(
+            f"ringing: the travel reverses {_reversals(record)} times while it is fast; ",
+            Field("branches"),
+            " quasi-static leaves that out",
         )
     if record.energy is None:
         return
@@ -270,9 +271,11 @@ def _departure(energy: Array, done: Array) -> Iterator[str]:
     away = np.abs(energy - energy[0] - done)
     worst = int(away.argmax())
     if away[worst] > 0.05 * np.ptp(energy):
-        yield (
+        yield Message(
             f"the energy is not the work done: {energy[worst]:.4g} mJ where the work is "
-            f"{energy[0] + done[worst]:.4g} mJ; --quantity work integrates it"
+            f"{energy[0] + done[worst]:.4g} mJ; ",
+            Field("quantity"),
+            " work integrates it",
         )
 
 

@@ -12,6 +12,7 @@ from typing import NoReturn, ParamSpec
 
 import typer
 
+from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.errors import (
     FitError,
@@ -59,15 +60,16 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
-            say(str(error))  # each problem starts with its place
+            for problem in map(problem_with_options, error.problems):
+                say(str(problem))  # which starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
         except NoWorkerError as error:
-            fail(ExitCode.FAILED_CASES, str(error))
+            fail(ExitCode.FAILED_CASES, error.message)
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
-            fail(ExitCode.USAGE, str(error))
+            fail(ExitCode.USAGE, error.message)
         except NothingSelectedError as error:
-            fail(ExitCode.NOTHING_SELECTED, str(error))
+            fail(ExitCode.NOTHING_SELECTED, error.message)
         except KeyboardInterrupt as stop:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
@@ -80,7 +82,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
 def fail(code: ExitCode, message: str) -> NoReturn:
     """Say why on standard error and end."""
-    for line in message.split("\n") if message else ():
+    for line in with_options(message).split("\n") if message else ():
         say(f"dpg: {line}")
     raise typer.Exit(code)
 

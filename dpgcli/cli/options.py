@@ -109,23 +109,25 @@ def _groups(**wanted: bool) -> list[str]:
     return [group for group, is_wanted in wanted.items() if is_wanted]
 
 
-def check_installed(what: str, package: str) -> None:
-    """Raise UsageError if what is asked for needs a package that is not there."""
-    from importlib.util import find_spec
-
-    from dpgcli.errors import UsageError
-
-    if find_spec(package) is None:
-        raise UsageError(f"{what} needs {package}: pip install {package}")
-
-
 def check_plot(path: Path) -> None:
     """Before any work: a suffix that can be drawn, and what draws it."""
+    from dpgcli.api.inputs import check_installed
     from dpgcli.errors import UsageError
 
     if path.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
     check_installed("--plot", "matplotlib")
+
+
+def check_table_name(path: Path | None) -> None:
+    """Refuse a name that promises another format than Parquet; raises UsageError."""
+    from dpgcli.errors import UsageError
+
+    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
+        raise UsageError(
+            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
+            "or --plot for figures"
+        )
 
 
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":

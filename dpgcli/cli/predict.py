@@ -23,6 +23,7 @@ from dpgcli.cli.options import (
     Tolerance,
     WithUncertainty,
     check_plot,
+    check_table_name,
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
@@ -30,8 +31,8 @@ from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
+    from dpgcli.arrays import Columns
     from dpgcli.design.scene import Scene
-    from dpgcli.states.columns import Columns
     from dpgcli.states.predict import Prediction, Summary
     from dpgcli.states.rungs import Rung
 
@@ -106,7 +107,7 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs
 
     run_file = None if output is None else _run_file(output)
     outputs = ((output, Mark.TABLE), (plot, Mark.FIGURE), (run_file, Mark.FACTS))
@@ -192,7 +193,7 @@ def _check_drawable(n_states: int) -> None:
 
 
 def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:
-    from dpgcli.report.figures import draw_states
+    from dpgcli.reports.figures import draw_states
     from dpgcli.states.plan import Request
     from dpgcli.states.predict import predict as predict_states
 

@@ -13,7 +13,7 @@ from dpgcli.states.columns import Column, Kind
 from dpgcli.text import printable
 
 if TYPE_CHECKING:
-    from dpgcli.states.columns import Columns
+    from dpgcli.arrays import Columns
 
 ROWS_SHOWN = 64
 PRINCIPAL = (
@@ -118,6 +118,12 @@ def printer_of(printed_as: Format, *, principal: bool = False) -> Printer:
     """How to print rows; of a table's many columns the principal ones, if asked for."""
     printers = {Format.CSV: print_csv, Format.JSON: print_json}
     return printers.get(printed_as) or table_printer(principal=principal)
+
+
+def print_rows(columns: tuple[Column, ...], rows: "Columns", printed_as: Format) -> None:
+    """Print one block of rows."""
+    for _ in printer_of(printed_as)(columns, [rows]):
+        pass
 
 
 def _rows(

@@ -61,7 +61,7 @@ def _is_outdated(path: Path, text: str) -> bool:
 def _read(folder: Path, kind: str) -> "tuple[pd.DataFrame, str]":
     """The designs in a folder, and their report."""
     from dpgcli.files.table_reader import read_designs
-    from dpgcli.report.page import html, markdown
+    from dpgcli.reports.page import html, markdown
 
     designs, units = read_designs(folder / "designs.parquet")
     text = (markdown if kind == ".md" else html)(designs, units, _facts(folder))

@@ -254,7 +254,7 @@ def _judge(
     study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
 ) -> tuple[int, ExitCode]:
     """Report; how many designs failed, and how the command ends if they may."""
-    from dpgcli.report.page import verdicts_markdown
+    from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements
 
     designs, text = summarize(study.folder, is_new=is_new)

@@ -8,6 +8,7 @@ import typer
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Settings
+from dpgcli.cli.spelling import problem_with_options
 from dpgcli.cli.streams import put
 from dpgcli.errors import Problem
 from dpgcli.text import printable
@@ -39,7 +40,7 @@ def validate(
         try:
             read_spec(path, settings or ())
         except SpecError as error:
-            problems.extend(error.problems)
+            problems.extend(map(problem_with_options, error.problems))
         else:
             if listed_as is ProblemFormat.TEXT:
                 put(f"{path}: ok")

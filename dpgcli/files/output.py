@@ -114,15 +114,6 @@ def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
             raise UsageError(f"{path} is the spec or data that is read: give another name")
 
 
-def check_table_name(path: Path | None) -> None:
-    """Refuse a name that promises another format than Parquet; raises UsageError."""
-    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
-        raise UsageError(
-            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
-            "or --plot for figures"
-        )
-
-
 def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     """Fail before the work rather than after it.
 

@@ -20,11 +20,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dpgcli.arrays import Columns
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_writer import record_batch, schema
-from dpgcli.states.columns import Column, Columns
+from dpgcli.states.columns import Column
 from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")

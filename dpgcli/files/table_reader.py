@@ -28,20 +28,24 @@ def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """
     if path.is_dir():
         raise UsageError(f"{path} is a folder: name the table in it, designs.parquet")
-    table = read_undamaged(path)
+    return designs_in(read_undamaged(path), str(path))
+
+
+def designs_in(table: Any, name: str) -> tuple[pd.DataFrame, dict[str, str]]:
+    """The same of a pyarrow Table; `name` is what messages call it."""
     missing = [name for name in NEEDED if name not in table.column_names]
     if missing:
         raise UsageError(
-            f"{path} is no table of designs: no column {', '.join(missing)}; "
+            f"{name} is no table of designs: no column {', '.join(missing)}; "
             "dpg sweep writes one, designs.parquet"
         )
     if twice := sorted({name for name in table.column_names if table.column_names.count(name) > 1}):
-        raise UsageError(f"{path}: expected each column once, found {', '.join(twice)} again")
+        raise UsageError(f"{name}: expected each column once, found {', '.join(twice)} again")
     units = {
         field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
         for field in table.schema
     }
-    return _plain(path, table), units
+    return _plain(name, table), units
 
 
 def read_undamaged(path: Path) -> Any:
@@ -76,7 +80,7 @@ def undamaged(stream: BinaryIO) -> Any:
     return file if is_whole or not is_ours else None
 
 
-def _plain(path: Path, table: Any) -> pd.DataFrame:
+def _plain(source: str, table: Any) -> pd.DataFrame:
     """The columns of three plain types."""
     names = table.column_names
     swept = names[names.index("design") + 1 : names.index("calibration")]
@@ -90,7 +94,7 @@ def _plain(path: Path, table: Any) -> pd.DataFrame:
         if plain is not None:
             columns[name] = plain
         elif name in (*NEEDED, *swept):
-            raise UsageError(f"{path}: column {name}: expected {kind}, found {column.type}")
+            raise UsageError(f"{source}: column {name}: expected {kind}, found {column.type}")
     return pd.DataFrame(columns)
 
 

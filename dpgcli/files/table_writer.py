@@ -16,12 +16,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dpgcli import __version__
+from dpgcli.arrays import Columns
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Kind
+from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction

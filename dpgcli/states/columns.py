@@ -2,11 +2,6 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
-
-from numpy.typing import NDArray
-
-Columns = dict[str, NDArray[Any]]
 
 
 class Kind(StrEnum):

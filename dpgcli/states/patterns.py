@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Codes, Flags
-from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 
 MOST_SELECTED = 2**26
 MOST_COUNTED = np.uint64(2**62)  # so that the sum of two is a number of 64 bits
@@ -64,15 +64,16 @@ def select(globs: Sequence[str], n_units: int) -> "Selection":
     for glob in globs:
         if not glob or set(glob) - set("01*?"):
             raise UsageError(
-                f"--pattern {shortened(glob)!r}: expected digits 0 and 1 with wildcards * and ?, "
-                f"such as {'1' * n_units} or 1*"
+                Field("patterns"),
+                f" {shortened(glob)!r}: expected digits 0 and 1 with wildcards * and ?, "
+                f"such as {'1' * n_units} or 1*",
             )
     selection = Selection(_transitions(_Globs.of(globs, n_units), n_units))
     if not len(selection):
         named = shortened(", ".join(globs))
         raise NothingSelectedError(f"no pattern of {n_units} units matches {named}")
     if len(selection) > MOST_SELECTED:
-        raise UsageError(too_many(n_units, "--pattern selects"))
+        raise UsageError(too_many(n_units, Field("patterns"), " selects"))
     return selection
 
 
@@ -169,8 +170,9 @@ def _transitions(globs: _Globs, n_units: int) -> list[NDArray[np.int64]]:
         n_symbols = globs.end.bit_length()
         if len(after) > MOST_WAYS or len(after) * n_symbols > MOST_BITS:
             raise UsageError(
-                f"--pattern: globs of {n_symbols:,} symbols that match in {len(after):,} ways or "
-                "more: give fewer at a time, or simpler ones"
+                Field("patterns"),
+                f": globs of {n_symbols:,} symbols that match in {len(after):,} ways or "
+                "more: give fewer at a time, or simpler ones",
             )
         steps.append(np.array(step, np.int64).reshape(-1, 2))
         states = after
@@ -182,8 +184,7 @@ def shortened(text: str) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-def too_many(n_units: int, what: str) -> str:
+def too_many(n_units: int, *what: str) -> Message:
     """Why so many states are refused, and what to do instead."""
-    return (
-        f"{what} more than {MOST_SELECTED:,} of the 2^{n_units} states: select fewer with --pattern"
-    )
+    most = f"more than {MOST_SELECTED:,} of the 2^{n_units} states"
+    return Message(*what, f" {most}: select fewer with ", Field("patterns"))

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.design.scene import Scene
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, Message, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
@@ -194,29 +194,38 @@ def _largest_force(potential: FingerPotential) -> float:
 def _check(scene: Scene, request: Request) -> None:
     if request.formulation not in FORMULATIONS:
         raise UsageError(
-            f"--formulation {request.formulation!r}: expected {' or '.join(FORMULATIONS)}"
+            Field("formulation"),
+            f" {request.formulation!r}: expected {' or '.join(FORMULATIONS)}",
         )
     if request.formulation == "lattice" and scene.finger.is_rigid:
         raise UsageError(
-            "--formulation lattice needs a finite finger.linear_stiffness_N_per_mm: "
-            "node coordinates cannot drop rigid bars; use the chain"
+            Field("formulation"),
+            " lattice needs a finite finger.linear_stiffness_N_per_mm: "
+            "node coordinates cannot drop rigid bars; use the chain",
         )
     if Group.UNCERTAINTY in request.columns:
         _check_uncertainty(scene, request)
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
-        raise UsageError("--target-error chooses among ways of the chain: drop --formulation")
+        raise UsageError(
+            Field("target_error"), " chooses among ways of the chain: drop ", Field("formulation")
+        )
 
 
 def _check_uncertainty(scene: Scene, request: Request) -> None:
     if scene.uncertainty is None:
         cancels = " (those of the curve's own k_b and d cancel)" if scene.finger.law.curve else ""
         raise UsageError(
-            f"--uncertainty: no value of the spec has a standard error{cancels}; "
-            "calibrate it by a file of dpg fit"
+            Field("uncertainty"),
+            f": no value of the spec has a standard error{cancels}; "
+            "calibrate it by a file of dpg fit",
         )
     if request.formulation != "chain":
-        raise UsageError("--uncertainty is known in the chain's coordinates: drop --formulation")
+        raise UsageError(
+            Field("uncertainty"),
+            " is known in the chain's coordinates: drop ",
+            Field("formulation"),
+        )
 
 
 def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
@@ -267,10 +276,11 @@ def _columns(
 
 def _why_left_out(group: Group, n_states: int) -> str:
     if group in ON_REQUEST:
-        return f"given on request: --{group}"
+        return Message("given on request: ", Field(group))
     if n_states <= MOST_STATES_WITH[group]:
         return "the target error drops the bars, without which they would be wrong"
-    return f"left out above {MOST_STATES_WITH[group]:,} states: --columns default,{group}"
+    most = f"left out above {MOST_STATES_WITH[group]:,} states"
+    return Message(most, ": ", Field("columns"), f" default,{group}")
 
 
 def _split(

@@ -10,8 +10,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.errors import UsageError
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.arrays import Columns
+from dpgcli.errors import Field, UsageError
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import SolvedFingers, SolvedStates
 
@@ -79,8 +80,9 @@ def named(quantities: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantit
         groups = ", ".join(dict.fromkeys(q.group for q in quantities))
         single = ", ".join(q.name for q in quantities if q.group is not Group.NODES)
         raise UsageError(
-            f"--columns: {', '.join(unknown)} unknown for this scene; "
-            f"groups: default, all, {groups}; columns: {single}"
+            Field("columns"),
+            f": {', '.join(unknown)} unknown for this scene; "
+            f"groups: default, all, {groups}; columns: {single}",
         )
     return tuple(q for q in quantities if q.name in names or q.group in names)
 

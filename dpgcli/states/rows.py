@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Columns, Flags
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows
 from dpgcli.states.settle import settle
 from dpgcli.states.solved import ALONE, SolvedFingers, Surroundings

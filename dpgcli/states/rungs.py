@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.tip import TIP_ROUNDING
@@ -51,15 +51,16 @@ def check_exactness(tolerance: float, target_error: float | None) -> None:
     """Raise UsageError for a tolerance or a target error (mm) that makes no sense."""
     if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
         raise UsageError(
-            f"--tolerance {tolerance}: expected {SMALLEST_TOLERANCE} … {LARGEST_TOLERANCE} "
-            "of the forces in play; below, rounding decides"
+            Field("tolerance"),
+            f" {tolerance}: expected {SMALLEST_TOLERANCE} … {LARGEST_TOLERANCE} "
+            "of the forces in play; below, rounding decides",
         )
     if target_error is None:
         return
     if not 0.0 < target_error < np.inf:
-        raise UsageError(f"--target-error {target_error} mm: expected a length > 0")
+        raise UsageError(Field("target_error"), f" {target_error} mm: expected a length > 0")
     if tolerance != DEFAULT_TOLERANCE:
-        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
+        raise UsageError(Field("target_error"), " chooses the tolerance: drop ", Field("tolerance"))
 
 
 def error_bounds(units: Units) -> Array:

@@ -13,7 +13,7 @@ from typing import IO
 from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.models import Model
 from dpgcli.calibration.fe.results import displacements, reported_error, version
-from dpgcli.errors import OutputError, SolverError, UsageError
+from dpgcli.errors import Field, OutputError, SolverError, UsageError
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.temporary import temporary_folder
 
@@ -154,8 +154,11 @@ def _ended(job: str, folder: Path, log: IO[bytes], limits: Limits, log_name: Pat
         try:
             return process.wait(limits.time_limit)
         except subprocess.TimeoutExpired:
-            limit = f"{limits.time_limit:g} s (--time-limit)"
-            raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
+            raise SolverError(
+                f"{SOLVER} was ended after {limits.time_limit:g} s (",
+                Field("time_limit"),
+                f"); its log is {log_name}",
+            ) from None
         finally:
             if group is None:
                 process.kill()

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import reason_against, scene_of, spelled
@@ -163,7 +163,8 @@ class Study:
             raise UsageError(
                 f"{self.sweep.space.size:,} designs take {size_text(self.extent.bytes_in_memory)} "
                 f"of memory in their summary, and this machine has {size_text(memory)}: "
-                "take fewer values, or go on with --force"
+                "take fewer values, or go on with ",
+                Field("force"),
             )
         missing = self.store.missing([(0, self.sweep.space.size)])
         n_designs = sum(stop - start for start, stop in missing)
@@ -174,7 +175,8 @@ class Study:
             raise UsageError(
                 f"{n_designs:,} designs have about {n_states:,} states, "
                 f"{size_text(needed)} while they are made, and {size_text(free)} are free: "
-                "take fewer values or units, or go on with --force"
+                "take fewer values or units, or go on with ",
+                Field("force"),
             )
 
     def check_unfinished(self) -> None:
@@ -186,7 +188,10 @@ class Study:
                 what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
                 raise UsageError(
                     f"{self.folder} holds an unfinished sweep {what}: "
-                    "finish it as it was, take another --output, or drop it with --restart"
+                    "finish it as it was, take another ",
+                    Field("output"),
+                    ", or drop it with ",
+                    Field("restart"),
                 )
 
     def drop_unfinished(self) -> None:

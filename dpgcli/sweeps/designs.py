@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array, Codes, Indices
+from dpgcli.arrays import Array, Codes, Columns, Indices
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate
-from dpgcli.states.columns import Columns
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.quantities import Quantity
 from dpgcli.states.rows import RowRequest, solved_rows

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Flags, Indices, keep_freed_memory
+from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
 from dpgcli.sweeps.designs import choices, design_states
 from dpgcli.sweeps.expressions import Expression

@@ -29,7 +29,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from dpgcli.errors import WorkplaceError
+from dpgcli.errors import Field, WorkplaceError
 from dpgcli.signals import STOP_SIGNALS
 from dpgcli.temporary import temporary_folder
 
@@ -313,8 +313,8 @@ class _Pool(ProcessPoolExecutor):
             except (ConnectionError, FileNotFoundError, EOFError) as error:
                 raise BrokenExecutor("the fork server is gone") from error
             except OSError as error:
-                said = f"cannot start a process: {error.strerror}. Take fewer --jobs. {GO_ON}"
-                raise WorkplaceError(said) from error
+                why = f"cannot start a process: {error.strerror}. Take fewer "
+                raise WorkplaceError(why, Field("jobs"), f". {GO_ON}") from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of the base."""

@@ -16,11 +16,12 @@ from dpgcli.errors import WorkplaceError
 from dpgcli.sweeps.executors import Workplace
 
 NO_NUMBERS = (
+    "api",
     "benchmark",
     "cli",
+    "hard_cases",
     "reference",
-    "report",
-    "stress",
+    "reports",
 )  # parts of the package that no number passes through
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import Units
 from dpgcli.states.wells import barriers
 

@@ -29,9 +29,10 @@ KILLS = (
     "    return old(self, broken) if a and a[0].start <= 1 < a[0].stop else old(self, f, *a)\n"
     "S.submit = submit"
 )
-FAILS = (
-    "from dpgcli.stress.verdicts import Outcome\nOutcome.is_failure = property(lambda self: True)"
-)
+FAILS = """
+from dpgcli.hard_cases.verdicts import Outcome
+Outcome.is_failure = property(lambda self: True)
+"""
 BREAKS = (
     ""
     "def broken(*_): raise BrokenPipeError('of a socket')\n"

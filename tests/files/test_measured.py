@@ -225,9 +225,9 @@ def test_moments_of_one_variant(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "where", "said"),
     [
-        (MOMENTS, "variant=d", "--where: expected a text of variant, found 'd' (a, b; c)"),
+        (MOMENTS, "variant=d", "where: expected a text of variant, found 'd' (a, b; c)"),
         (MOMENTS, "varian=c", "header: expected a column varian, found variant, moment_N_mm"),
-        (MOMENTS, "variant", "--where: expected COLUMN=TEXT, found 'variant'"),
+        (MOMENTS, "variant", "where: expected COLUMN=TEXT, found 'variant'"),
         ("moment_N_m,rotation_rad\n1,1\n", None, "expected a column moment_N_mm"),
         ("moment_N_mm,angle\n1,1\n", None, "expected a column rotation_rad or rotation_mid"),
         ("moment_N_mm,rotation_rad\n5,10.3\n", None, "found 10.3 (degrees?)"),

@@ -148,7 +148,7 @@ def test_long_fingers_in_pairs_meet_it_too(reference_finger: Fingers) -> None:
     ],
 )
 def test_targets_that_make_no_sense(reference_finger: Fingers, request_: Request) -> None:
-    with pytest.raises(UsageError, match="--target-error"):
+    with pytest.raises(UsageError, match="target_error"):
         explain(Scene(reference_finger(2, 1e4), ()), request_)
 
 

@@ -53,7 +53,7 @@ def test_a_module_under_another_name_is_other_code(package: Path) -> None:
 
 
 def test_work_on_what_is_printed_leaves_the_code_as_it_is(package: Path) -> None:
-    for name in ("cli/sweep.py", "report/summary.py", "stress/verdicts.py"):
+    for name in ("cli/sweep.py", "reports/summary.py", "hard_cases/verdicts.py"):
         (package / name).write_text("changed = True\n")
     assert code_of(package) == HERE.code
 

@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Columns
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Columns, Group
+from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
 from dpgcli.states.units import Units
 from dpgcli.sweeps.designs import design_states

@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 
 from dpgcli import __version__
 from dpgcli.design.dimensions import AGREEMENT
-from dpgcli.errors import FitError, Problem, SpecError
+from dpgcli.errors import Field, FitError, Problem, SpecError
 from dpgcli.files.calibration.models import (
     Calibration,
     Curve,
@@ -50,6 +50,7 @@ __all__ = [
     "ScalingLaw",
     "Values",
     "calibration_in",
+    "calibration_of",
     "geometry_of",
     "made_by",
     "read_calibration",
@@ -66,6 +67,12 @@ def made_by() -> str:
     import scipy
 
     return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}"
+
+
+def calibration_of(sections: Mapping[str, Any]) -> Calibration:
+    """A calibration with these sections, made by this program."""
+    head = {"calibration_version": VERSION, "made_by": made_by()}
+    return Calibration.model_validate({**head, **sections})
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
@@ -107,7 +114,7 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
     Raises SpecError with every problem.
     """
     data: dict[str, Any] = {} if base is None else base.model_dump(exclude_none=True)
-    place = Place("--geometry")
+    place = Place(Field("geometry"))
     problems: list[Problem] = []
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))

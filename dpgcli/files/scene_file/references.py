@@ -43,13 +43,11 @@ def with_calibrations(document: Document, folder: Path) -> Document:
     return replace(embedded, problems=problems, files=tuple(reader.files))
 
 
-def recalibrated(document: Document, file: Path) -> Document:
+def recalibrated(document: Document, calibration: Calibration) -> Document:
     """The document with a calibration's values in the place of its own, wherever it has them.
 
     They come before its other calibrations, and its lattice sections lose what the file gives.
-    Raises SpecError with every problem of the file.
     """
-    calibration = read_calibration(file).model_copy(update={"file": file.name})
     finger = document.data["finger"]
     said = finger.get("calibration")
     known = calibration.known

@@ -369,7 +369,7 @@ def test_a_grid_over_a_dimension_that_the_spec_lacks(write, problems):
         text=without,
     )
     assert found == [
-        f"--set: finger.lattice.{STIFFNESS}: expected a value, or geometry with "
+        f"settings: finger.lattice.{STIFFNESS}: expected a value, or geometry with "
         "dome_height_mm, found no dome_height_mm "
         "(g.yaml is over dome_height_mm, dome_thickness_mm)"
     ]

@@ -205,7 +205,7 @@ def test_problems_of_form_and_of_content_come_together(problems):
         ("x.yaml", 17, 5, "finger.overrides.x"),
         ("x.yaml", 17, 5, "finger.overrides.x"),
         ("x.yaml", 18, 1, "grip"),
-        ("--set", None, None, "finger.calibration"),
+        ("settings", None, None, "finger.calibration"),
     ]
 
 
@@ -235,7 +235,7 @@ def test_problems_of_form_and_of_content_come_together(problems):
 )
 def test_values_out_of_range_are_refused(problems, key, value):
     (problem,) = problems(FINGER, f"{key}={value}")
-    assert (problem.file, problem.line) == ("--set", None)
+    assert (problem.file, problem.line) == ("settings", None)
     assert problem.key.startswith(key)
 
 
@@ -273,25 +273,25 @@ def test_settings_reach_overrides_written_as_numbers(read):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("units", '--set: setting: expected key.path=value, found "units"'),
-        ("=3", '--set: setting: expected key.path=value, found "=3"'),
-        ("finger..units=3", '--set: setting: expected key.path=value, found "finger..units=3"'),
+        ("units", 'settings: setting: expected key.path=value, found "units"'),
+        ("=3", 'settings: setting: expected key.path=value, found "=3"'),
+        ("finger..units=3", 'settings: setting: expected key.path=value, found "finger..units=3"'),
         (
             "finger.units.a=3",
-            "--set: finger.units.a: expected a key of a section, found 5 at finger.units",
+            "settings: finger.units.a: expected a key of a section, found 5 at finger.units",
         ),
         (
             "finger.unit=3",
-            "--set: finger.unit: expected a known key, found unit (did you mean units?)",
+            "settings: finger.unit: expected a known key, found unit (did you mean units?)",
         ),
         (
             "stroke_mm=3",
-            "--set: stroke_mm: expected a known key, found stroke_mm "
+            "settings: stroke_mm: expected a known key, found stroke_mm "
             "(did you mean finger.lattice.stroke_mm?)",
         ),
         (
             "zzz=3",
-            "--set: zzz: expected a known key, found zzz (known here: finger, gripper)",
+            "settings: zzz: expected a known key, found zzz (known here: finger, gripper)",
         ),
     ],
 )
@@ -301,7 +301,11 @@ def test_wrong_settings(problems, change, message):
 
 def test_a_setting_that_is_no_yaml_is_named(problems):
     (problem,) = problems(FINGER, "finger.units=[1")
-    assert (problem.file, problem.key, problem.expected) == ("--set", "finger.units", "valid YAML")
+    assert (problem.file, problem.key, problem.expected) == (
+        "settings",
+        "finger.units",
+        "valid YAML",
+    )
 
 
 def test_geometry_and_lattice_must_agree(problems):

@@ -7,13 +7,7 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.errors import UsageError
-from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.certify import Status, certify
-from dpgcli.states.margins import limits
-from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
-from dpgcli.stress.cases import (
+from dpgcli.hard_cases.cases import (
     Case,
     all_cases,
     built_in_cases,
@@ -21,7 +15,13 @@ from dpgcli.stress.cases import (
     check_families,
     study_finger,
 )
-from dpgcli.stress.families import FAMILIES, PATTERNS, TURNED, changed, rigid
+from dpgcli.hard_cases.families import FAMILIES, PATTERNS, TURNED, changed, rigid
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status, certify
+from dpgcli.states.margins import limits
+from dpgcli.states.settle import settle
+from dpgcli.states.units import Units
 
 NAMES = [family.name for family in FAMILIES]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dpgcli.report.page import html, markdown, verdicts_markdown
+from dpgcli.reports.page import html, markdown, verdicts_markdown
 from dpgcli.sweeps.gate import check_requirements, requirement
 
 UNITS = {
@@ -260,7 +260,7 @@ def test_many_points_are_drawn_as_pixels() -> None:
 
 
 def test_of_too_many_points_some_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dpgcli.report.maps.MOST_POINTS", 10)
+    monkeypatch.setattr("dpgcli.reports.maps.MOST_POINTS", 10)
     many = pd.concat([space()] * 5, ignore_index=True)
     assert "One design in" not in html(many, UNITS, None)  # a grid is drawn whole
     scattered = many.assign(height_mm=np.linspace(1, 9, len(many)))

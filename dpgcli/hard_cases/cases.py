@@ -11,11 +11,8 @@ from itertools import product
 import numpy as np
 
 from dpgcli.arrays import Flags
-from dpgcli.errors import UsageError
-from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.laws import Published
-from dpgcli.states.plan import FORMULATIONS
-from dpgcli.stress.families import (
+from dpgcli.errors import Field, UsageError
+from dpgcli.hard_cases.families import (
     FAMILIES,
     PATTERNS,
     Family,
@@ -23,6 +20,9 @@ from dpgcli.stress.families import (
     Variant,
     few_patterns,
 )
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.mechanics.laws import Published
+from dpgcli.states.plan import FORMULATIONS
 
 BUILT_IN, GIVEN = "built-in", "spec"
 
@@ -32,7 +32,9 @@ def check_law(finger: Finger) -> None:
     if not isinstance(finger.law, Published):
         raise UsageError(
             f"the reference in extended precision has the published law only, not the "
-            f"{finger.law.description}: take -s finger.law=published"
+            f"{finger.law.description}: take ",
+            Field("setting"),
+            " finger.law=published",
         )
 
 
@@ -100,7 +102,9 @@ def check_families(names: Sequence[str]) -> None:
     known = [family.name for family in (PATTERNS, *FAMILIES)]
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise UsageError(f"--only {', '.join(unknown)}: expected some of {', '.join(known)}")
+        raise UsageError(
+            Field("only"), f" {', '.join(unknown)}: expected some of {', '.join(known)}"
+        )
 
 
 def _chosen(families: Sequence[Family], only: Sequence[str]) -> Iterator[Family]:

@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.hard_cases.cases import Case, built_in_cases, study_finger
+from dpgcli.hard_cases.families import FAMILIES, TURNED, Start, Variant, changed, rigid
+from dpgcli.hard_cases.table import STRESS_COLUMNS, rows, summarized
+from dpgcli.hard_cases.verdicts import Verdict, answered, judged, scaled, stress
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
@@ -16,10 +20,6 @@ from dpgcli.states.margins import limits
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import Units
-from dpgcli.stress.cases import Case, built_in_cases, study_finger
-from dpgcli.stress.families import FAMILIES, TURNED, Start, Variant, changed, rigid
-from dpgcli.stress.table import STRESS_COLUMNS, rows, summarized
-from dpgcli.stress.verdicts import Verdict, answered, judged, scaled, stress
 
 UNIT = rigid(study_finger().with_units([0]))
 

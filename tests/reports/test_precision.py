@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dpgcli.report.precision import cheapest_way, draw_precision, text_figure
+from dpgcli.reports.precision import cheapest_way, draw_precision, text_figure
 
 
 def row(way: str, error: float, seconds: float, group: str = "ladder") -> dict[str, Any]:

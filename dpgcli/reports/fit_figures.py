@@ -3,8 +3,13 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from dpgcli.arrays import Array
-from dpgcli.report.drawing import figure_to, titled
+from dpgcli.calibration.bistable import UNITS, BistableFit, Choice, law
+from dpgcli.calibration.hinge import HingeFit
+from dpgcli.files.measured import Moments
+from dpgcli.reports.drawing import figure_to, titled
 
 
 @dataclass(frozen=True)
@@ -41,3 +46,36 @@ def draw_fit(figure: FitFigure, path: Path) -> None:
                 label = "no data: extrapolated" if place == 0 else None
                 axes.axvspan(*gap, color="0.9", zorder=0, label=label)
         above.legend()
+
+
+def bistable_figure(found: BistableFit, choice: Choice, name: str) -> FitFigure:
+    """The dome's curve with the bistable law through it."""
+    unit = UNITS[choice.quantity]
+    along = np.linspace(min(0.0, float(found.travel.min())), float(found.travel.max()), 400)
+    fitted = law(found.factor * along, found.fit.values, choice.quantity)
+    return FitFigure(
+        title=f"{name}: bistable law, opening = {found.factor:.4g} travel",
+        x=found.travel,
+        observed=found.observed,
+        residuals=found.fit.residuals,
+        line=(along, fitted if unit == "mJ" else found.factor * fitted),
+        x_label="travel of the dome (mm)",
+        y_label=f"{'energy' if unit == 'mJ' else 'force along the travel'} ({unit})",
+        unit=unit,
+        gaps=found.gaps,
+    )
+
+
+def hinge_figure(found: HingeFit, data: Moments, name: str) -> FitFigure:
+    """Moments over rotations with the hinge's line."""
+    ends = np.array([min(0.0, data.rotation.min()), max(0.0, data.rotation.max())])
+    return FitFigure(
+        title=f"{name}: hinge",
+        x=data.rotation,
+        observed=data.moment,
+        residuals=found.fit.residuals,
+        line=(ends, found.fit.values[0] * ends),
+        x_label="rotation (rad)",
+        y_label="moment (N mm)",
+        unit="N mm",
+    )

@@ -4,8 +4,8 @@ import io
 from html import escape
 from typing import Any
 
-from dpgcli.report.drawing import titled
-from dpgcli.report.summary import DesignSpace, is_alike
+from dpgcli.reports.drawing import titled
+from dpgcli.reports.summary import DesignSpace, is_alike
 
 DRAWN = (
     "workspace_area_mm2",

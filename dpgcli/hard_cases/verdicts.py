@@ -11,6 +11,7 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.hard_cases.cases import Case
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
@@ -22,7 +23,6 @@ from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
-from dpgcli.stress.cases import Case
 
 AT_FOLD = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
 FOLD_FACTOR = 4.0
@@ -100,7 +100,7 @@ _ALWAYS_FAIL = (Verdict.WRONG, Verdict.OVERCONFIDENT)
 def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
     """Put cases to the solver and judge what it says; needs mpmath.
 
-    >>> from dpgcli.stress.cases import built_in_cases
+    >>> from dpgcli.hard_cases.cases import built_in_cases
     >>> outcome = next(stress(built_in_cases(["scale"])))
     >>> outcome.case.variant.label, outcome.verdict.value, outcome.true_tip_error < 1e-12
     ('in m', 'right', True)

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.arrays import Columns
+from dpgcli.hard_cases.verdicts import Outcome, Verdict
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
-from dpgcli.stress.verdicts import Outcome, Verdict
 
 
 def _column(name: str, unit: str, description: str, kind: Kind = Kind.NUMBER) -> Column:

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dpgcli.report.drawing import drawn_to, titled
+from dpgcli.files.bench_record import json_value
+from dpgcli.reports.drawing import drawn_to, titled
 
 Row = dict[str, Any]
 
 WIDTH, HEIGHT = 64, 18
 EXACT = 0.1  # of the smallest error: what is exact is drawn there
+SLOWER = 2.0  # times its recorded ratio: more than the noise of a shared machine
 MARKS = "abcdefghijklmnopqrstuvwxyz"
 COLORS = {"ladder": "#0072B2", "one finger": "#56B4E9", "peer": "#D55E00"}  # Okabe and Ito
 MARKERS = {"ladder": "o", "one finger": "s", "peer": "^"}
@@ -134,3 +136,26 @@ def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
             label=f"{number}  {row['way']} ({LABELS[group]})",
         )
         axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(5, 5), fontsize=8)
+
+
+def _which(row: Row) -> str:
+    """The row of a group that varies something."""
+    ratio = f"k_L/k_b {row['stiffness_ratio']:.3g}"
+    return f"{row['n_units']} units, {row['n_designs']:,} designs, {ratio}"
+
+
+def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
+    """What takes a larger multiple of the NumPy kernel's time than it took when recorded."""
+    key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
+    before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
+    slower, n_compared = [], 0
+    for row in now:
+        old = before.get(tuple(json_value(row[name]) for name in key))
+        if not old or not row["relative_time"] > 0.0:
+            continue
+        n_compared += 1
+        ratio = row["relative_time"] / old
+        if ratio > SLOWER:
+            slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, {_which(row)}")
+    verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWER}"
+    return [verdict, *slower]

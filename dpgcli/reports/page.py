@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from dpgcli.report.maps import figures
-from dpgcli.report.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
+from dpgcli.reports.maps import figures
+from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
 from dpgcli.sweeps.gate import Verdict
 from dpgcli.text import printable
 

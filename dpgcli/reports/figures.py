@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.report.drawing import drawn_to
+from dpgcli.reports.drawing import drawn_to
 from dpgcli.states.predict import Prediction
 
 STATES_LABELLED = 16
