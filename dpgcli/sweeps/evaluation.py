@@ -206,8 +206,10 @@ class Evaluation:
         owner = np.concatenate(
             [np.repeat(part.places, n) for part, n in zip(solved, repeats, strict=True)]
         )
-        order = np.argsort(owner, kind="stable")
-        owner = owner[order]
+        order: slice | Indices = slice(None)
+        if (owner[1:] < owner[:-1]).any():
+            order = np.argsort(owner, kind="stable")
+            owner = owner[order]
         return {
             column.name: described[column.name][owner]
             if column.name in described
