@@ -141,7 +141,8 @@ class Evaluation:
         for n_units in np.unique(units).tolist():
             here = np.flatnonzero(units == n_units)
             own = {key: column[here] for key, column in columns.items()}
-            yield places[here], replace(self.base, units=int(n_units)).with_values(own)
+            base = replace(self.base, units=int(n_units), n_designs=len(here))
+            yield places[here], base.with_values(own)
 
     def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
         """Which designs have only values that their keys can have."""
