@@ -226,7 +226,8 @@ class Evaluation:
         reasons: Mapping[int, str],
     ) -> Columns:
         n_designs = len(described["design"])
-        status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("S16")
+        stable, partly, invalid, excluded, _ = (status.encode() for status in DesignStatus)
+        status = np.where(allowed, invalid, excluded).astype("S16")
         rows = dict(described)
         finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
         for column in self.design_columns[len(described) + 2 :]:
@@ -236,7 +237,7 @@ class Evaluation:
             rows[column.name] = values
         for places, metrics in finished:
             complete = metrics["n_stable"] == metrics["n_states"]
-            status[places] = np.where(complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE)
+            status[places] = np.where(complete, stable, partly)
         rows["status"] = status
         texts = [text.encode() for text in reasons.values()]
         reason = np.zeros(n_designs, f"S{max(map(len, texts), default=1)}")
