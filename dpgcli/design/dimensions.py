@@ -61,13 +61,7 @@ class Design:
     calibrations: tuple[str | Calibration, ...] = ()
     law: str | None = None
     gripper: Sizes = field(default_factory=dict)
-
-    @property
-    def n_designs(self) -> int:
-        sections = (self.finger, *self.overrides.values())
-        sizes = [s for part in sections for s in (*part.geometry.values(), *part.lattice.values())]
-        bars = () if self.linear_stiffness is None else (self.linear_stiffness,)
-        return max(map(len, (*sizes, *bars, *self.gripper.values())), default=1)
+    n_designs: int = 1
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -78,6 +72,7 @@ class Design:
         """
         design = self
         for key, column in columns.items():
+            design = replace(design, n_designs=len(column))
             design = design._with_value(key.split("."), column * 1.0)
         return design
 

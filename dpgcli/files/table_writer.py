@@ -228,11 +228,8 @@ def _strings(values: NDArray[Any]) -> Any:
 
 
 def _statuses(codes: NDArray[Any]) -> Any:
-    names = [status.text.encode() for status in Status]
-    ends = np.cumsum([0, *map(len, names)], dtype=np.int32)
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(names))]
-    texts = pa.Array.from_buffers(pa.string(), len(names), buffers)
-    indices = pa.Array.from_buffers(
-        pa.int8(), len(codes), [None, pa.py_buffer(codes.astype(np.int8))]
-    )
-    return pa.DictionaryArray.from_arrays(indices, texts).dictionary_decode()
+    found = np.unique(codes)
+    texts = np.array(
+        [list(Status)[code].text.encode() for code in found], "S"
+    )  # as long as need be
+    return _strings(texts[np.searchsorted(found, codes)])

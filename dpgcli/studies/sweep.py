@@ -15,7 +15,7 @@ from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import reason_against, scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
-from dpgcli.files.sweep_file.space import flattened
+from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.studies.work import Work
@@ -78,7 +78,7 @@ class Study:
         data = self.sweep.base_data
         return Evaluation(
             self.sweep.base.design,
-            {k: v for k, v in flattened(data).items() if type(v) in (int, float)},
+            numbers_of(data),
             partial(reason_against, data),
             value_columns(self.sweep.space),
             self.sweep.constraints,

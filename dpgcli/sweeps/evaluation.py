@@ -146,7 +146,8 @@ class Evaluation:
         for n_units in np.unique(units).tolist():
             here = np.flatnonzero(units == n_units)
             own = {key: column[here] for key, column in columns.items()}
-            yield places[here], replace(self.base, units=int(n_units)).with_values(own)
+            base = replace(self.base, units=int(n_units), n_designs=len(here))
+            yield places[here], base.with_values(own)
 
     def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
         """Which designs have only values that their keys can have."""
@@ -211,8 +212,10 @@ class Evaluation:
         owner = np.concatenate(
             [np.repeat(part.places, n) for part, n in zip(solved, repeats, strict=True)]
         )
-        order = np.argsort(owner, kind="stable")
-        owner = owner[order]
+        order: slice | Indices = slice(None)
+        if (owner[1:] < owner[:-1]).any():
+            order = np.argsort(owner, kind="stable")
+            owner = owner[order]
         return {
             column.name: described[column.name][owner]
             if column.name in described
@@ -228,7 +231,8 @@ class Evaluation:
         reasons: Mapping[int, str],
     ) -> Columns:
         n_designs = len(described["design"])
-        status = np.where(allowed, DesignStatus.INVALID, DesignStatus.EXCLUDED).astype("S16")
+        stable, partly, invalid, excluded, _ = (status.encode() for status in DesignStatus)
+        status = np.where(allowed, invalid, excluded).astype("S16")
         rows = dict(described)
         finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
         for column in self.design_columns[len(described) + 2 :]:
@@ -238,7 +242,7 @@ class Evaluation:
             rows[column.name] = values
         for places, metrics in finished:
             complete = metrics["n_stable"] == metrics["n_states"]
-            status[places] = np.where(complete, DesignStatus.STABLE, DesignStatus.PARTLY_STABLE)
+            status[places] = np.where(complete, stable, partly)
         rows["status"] = status
         texts = [text.encode() for text in reasons.values()]
         reason = np.zeros(n_designs, f"S{max(map(len, texts), default=1)}")

@@ -15,7 +15,7 @@ from dpgcli.states.patterns import MOST_SELECTED
 from dpgcli.sweeps.executors import chunked
 from dpgcli.sweeps.space import Space
 
-DESIGN_SECONDS = 3e-4  # of a design, its states aside; measured
+DESIGN_SECONDS = 2e-5  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
 PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
 MOST_CHUNKS = 10**6  # days of work, and a file each
