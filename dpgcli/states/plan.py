@@ -21,12 +21,11 @@ from dpgcli.states.quantities import ALWAYS, Quantity, declared, named
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.rungs import (
     DEFAULT_TOLERANCE,
-    RUNGS,
+    Exactness,
     Rung,
     bar_flexibility,
-    cheapest,
     check_exactness,
-    error_bounds,
+    exactnesses,
 )
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
@@ -87,7 +86,7 @@ class Plan:
 
     scene: Scene
     request: Request
-    units: Units
+    exactness: Exactness
     method: Method
     split: Split | None
     selection: Selection | None
@@ -100,7 +99,6 @@ class Plan:
     omissions: tuple[Omission, ...]
     residual_limit: float
     bar_flexibility: float
-    rung: Rung | None
     error_bound: float
     expected_seconds: float
     expected_bytes: int
@@ -114,9 +112,19 @@ class Plan:
         return frozenset(column.group for column in self.columns)
 
     @property
+    def units(self) -> Units:
+        """The finger's units, as they are solved."""
+        return self.exactness.units
+
+    @property
+    def rung(self) -> Rung | None:
+        """What was chosen for the target error, if there is one."""
+        return self.exactness.rung
+
+    @property
     def dropped_error(self) -> float:
-        """What a rung without the scene's bars adds to the error of each tip, mm."""
-        return self.bar_flexibility if self.rung is not None and self.rung.drops_bars else 0.0
+        """What dropping the scene's bars adds to the error of each tip, mm."""
+        return float(self.exactness.dropped_error[0])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -141,30 +149,30 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     request = request or Request()
     _check(scene, request)
     n = scene.finger.n_units
-    units = Units.of(scene.finger)
-    flexibility = _flexibility(units)
-    rung, bound = _rung(units, request)
-    if rung is not None:
-        request = replace(request, tolerance=rung.tolerance)
-        units = Units.of(scene.finger.with_bars(np.inf)) if rung.drops_bars else units
-    finger = units.finger
+    scene_units = Units.of(scene.finger)
+    needs_bars = any(quantity.needs_bars for quantity in _asked_for(request))
+    ((_, exactness),) = exactnesses(
+        scene_units, request.tolerance, request.target_error, needs_bars=needs_bars
+    )
+    request, units = replace(request, tolerance=exactness.tolerance), exactness.units
+    is_bounded = request.formulation == "chain"
     selection = select(request.patterns, n) if request.patterns else None
     n_states = 2**n if selection is None else len(selection)
     if n_states > MOST_SELECTED:
         raise UsageError(too_many(n, "the finger has"))
-    potential = FORMULATIONS[request.formulation](finger)
+    potential = FORMULATIONS[request.formulation](units.finger)
     terms = potential.kinds
     is_fitted = scene.uncertainty is not None and request.formulation == "chain"
     available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
-    dropped = rung is not None and rung.drops_bars
-    columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
+    has_bars = not exactness.drops_bars
+    columns, left_out = _columns(available, request.columns, n_states, has_bars=has_bars)
     groups = {column.group for column in columns}
     split = _split(units, potential, request, selection is None, groups)
     n_solves = n_states if split is None else split.n_solves
     return Plan(
         scene=scene,
         request=request,
-        units=units,
+        exactness=exactness,
         method=Method.DIRECT if split is None else Method.PAIRS,
         split=split,
         selection=selection,
@@ -174,11 +182,10 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         n_unit_solves=units.wells.exists.size,
         n_finger_solves=n_solves,
         columns=columns,
-        omissions=(*_omissions(scene, units, split, n_solves, rung), *left_out),
+        omissions=(*_omissions(scene, units, split, n_solves, exactness), *left_out),
         residual_limit=request.tolerance * _largest_force(potential),
-        bar_flexibility=flexibility,
-        rung=rung,
-        error_bound=bound,
+        bar_flexibility=_flexibility(scene_units),
+        error_bound=float(exactness.error_bounds[0]) if is_bounded else np.inf,
         expected_seconds=seconds(
             request.formulation, split, n, n_states, {c.group for c in columns}
         ),
@@ -226,20 +233,6 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
             " is known in the chain's coordinates: drop ",
             Field("formulation"),
         )
-
-
-def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
-    """The cheapest rung for a target error, and its bound (mm): of tips, and of the chain only.
-
-    Stiffness that was asked for needs the bars.
-    """
-    bounds = error_bounds(units)
-    if request.target_error is None:
-        return None, float(bounds[-1, 0]) if request.formulation == "chain" else np.inf
-    if any(q.needs_bars for q in _asked_for(request)):
-        bounds[0] = np.inf
-    (index,) = cheapest(bounds, request.target_error)
-    return RUNGS[index], float(bounds[index, 0])
 
 
 def _asked_for(request: Request) -> Iterator[Quantity]:
@@ -322,16 +315,17 @@ def _flexibility(units: Units) -> float:
 
 
 def _omissions(
-    scene: Scene, units: Units, split: Split | None, n_solves: int, rung: Rung | None
+    scene: Scene, units: Units, split: Split | None, n_solves: int, exactness: Exactness
 ) -> tuple[Omission, ...]:
     finger = units.finger
     n = finger.n_units
     omissions = [Omission("loads, pressure and contact", "the spec has none")]
     if finger.is_rigid:
+        why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
         omissions.append(
             Omission(
                 f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
-                f"{_why_rigid(rung)}; units do not feel each other, "
+                f"{why}; units do not feel each other, "
                 "so the guess is the solution and Newton only certifies it",
                 "bars",
             )
@@ -356,9 +350,3 @@ def _omissions(
             Omission("the second finger", "a mirror image: solved once", "second-finger")
         )
     return tuple(omissions)
-
-
-def _why_rigid(rung: Rung | None) -> str:
-    if rung is None or not rung.drops_bars:
-        return "k_L is infinite"
-    return "the target error allows it"

@@ -1,43 +1,23 @@
 """Many designs at once: all states of each in bounded blocks, and their metrics."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Codes, Columns, Indices
 from dpgcli.design.scene import Gripper, Scene
-from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import Formulate
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.quantities import Quantity
 from dpgcli.states.rows import RowRequest, solved_rows
-from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
+from dpgcli.states.rungs import Exactness
 from dpgcli.states.settle import lanes_at_once
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
 from dpgcli.sweeps.metrics import Metrics
 
 ROWS_AT_ONCE = 2**15  # of one design
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Designs (by place) that take one rung, and the bound on their tips' error, mm."""
-
-    rung: Rung
-    places: Indices
-    bounds: Array
-
-
-def choices(finger: Finger, target_error: float) -> Iterator[Choice]:
-    """The cheapest rung of each design that is bounded by the target error (mm), by rung."""
-    bounds = error_bounds(Units.of(finger))
-    chosen = cheapest(bounds, target_error)
-    for index in np.unique(chosen):
-        places = np.flatnonzero(chosen == index)
-        yield Choice(RUNGS[index], places, bounds[index, places])
 
 
 class Block(NamedTuple):
@@ -53,31 +33,28 @@ class Block(NamedTuple):
 
 def design_states(
     scene: Scene,
-    formulate: Formulate,
-    tolerance: float,
+    exactness: Exactness,
     quantities: tuple[Quantity, ...],
-    *,
-    drops_bars: bool = False,
 ) -> Iterator[Block]:
     """All states of a batch of designs, design by design, in blocks.
 
     A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
-    depends on its number of units alone. If it drops the bars, the error of the tips includes what
-    that costs.
+    depends on its number of units alone.
     """
-    units = Units.of(scene.finger)
+    units, dropped = exactness.units, exactness.dropped_error
     n_designs = units.finger.n_designs
-    dropped = np.zeros(n_designs)
-    if drops_bars:
-        dropped = bar_flexibility(units)
-        units = Units.of(units.finger.with_bars(np.inf))
 
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
         around = Surroundings(*_placement(scene, n_designs, lanes))
         request = RowRequest(
-            formulate, tolerance, quantities, around, dropped[lanes], has_bars=not drops_bars
+            chain_potential,
+            exactness.tolerance,
+            quantities,
+            around,
+            dropped[lanes],
+            has_bars=not exactness.drops_bars,
         )
         return solved_rows(_designs(units, lanes), inverted, request)
 

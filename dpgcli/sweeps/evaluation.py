@@ -12,10 +12,11 @@ from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
-from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
-from dpgcli.sweeps.designs import choices, design_states
+from dpgcli.states.rungs import exactnesses
+from dpgcli.states.units import Units
+from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 from dpgcli.sweeps.space import Space
@@ -186,23 +187,15 @@ class Evaluation:
         return allowed
 
     def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
-        if self.target_error is None:
-            for block in design_states(scene, chain_potential, self.tolerance, self.quantities):
-                yield _Solved(places[block.places], block.rows, block.metrics)
-            return
-        for choice in choices(scene.finger, self.target_error):
-            rung = choice.rung
-            for block in design_states(
-                scene.take_lanes(choice.places),
-                chain_potential,
-                rung.tolerance,
-                self.quantities,
-                drops_bars=rung.drops_bars,
-            ):
-                if block.metrics is not None:
-                    block.metrics["rung"] = np.full(len(block.places), rung.name, "S24")
-                    block.metrics["error_bound_mm"] = choice.bounds[block.places]
-                yield _Solved(places[choice.places][block.places], block.rows, block.metrics)
+        found = exactnesses(Units.of(scene.finger), self.tolerance, self.target_error)
+        for some, exactness in found:
+            alike = scene if len(some) == len(places) else scene.take_lanes(some)
+            for block in design_states(alike, exactness, self.quantities):
+                if block.metrics is not None and exactness.rung is not None:
+                    name = np.full(len(block.places), exactness.rung.name, "S24")
+                    block.metrics["rung"] = name
+                    block.metrics["error_bound_mm"] = exactness.error_bounds[block.places]
+                yield _Solved(places[some][block.places], block.rows, block.metrics)
 
     def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
         """Rows of all groups, brought back into the order of the designs."""
