@@ -132,7 +132,7 @@ class PartStore:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
             with whole_file(self.folder / SAID, Mark.ANY) as temporary:
-                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
+                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8", newline="\n")
 
     def said(self) -> dict[str, str]:
         """What the sweep is about; empty where that is not said, or is damaged.
