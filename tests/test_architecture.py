@@ -81,3 +81,18 @@ def test_no_function_is_longer_than_sixty_lines() -> None:
             if isinstance(node, ast.FunctionDef):
                 assert node.end_lineno is not None
                 assert node.end_lineno - node.lineno < 60, f"{path}: {node.name}"
+
+
+def test_text_is_written_with_the_same_line_ends_everywhere() -> None:
+    """Python would write those of Windows there, and marks and hashes would differ."""
+    written = []
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+                continue
+            modes = [arg.value for arg in node.args[:1] if isinstance(arg, ast.Constant)]
+            if node.func.attr == "write_text" or (node.func.attr == "open" and modes == ["w"]):
+                ends = [word.value for word in node.keywords if word.arg == "newline"]
+                assert [ast.literal_eval(end) for end in ends] == ["\n"], path
+                written.append(path)
+    assert len(written) >= 5

@@ -1,6 +1,7 @@
 """How a command ends: exit codes, and what becomes of each kind of error."""
 
 import functools
+import gc
 import signal
 import sys
 import threading
@@ -102,6 +103,7 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
     if OUTPUT.error is not None and not isinstance(OUTPUT.error, ConnectionError):
         say(f"dpg: cannot write the output: {OUTPUT.error.strerror}")
         code = code or ExitCode.USAGE
+    gc.freeze()  # nobody needs the garbage that would be looked for at the end
     sys.exit(code)
 
 

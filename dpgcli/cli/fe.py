@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dpgcli.cli.exits import command
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
 from dpgcli.cli.streams import put, say
 
@@ -181,3 +182,7 @@ def _carry_out(
     if not quiet:
         sys.stdout.flush()
         say(f"{finding} ({time.monotonic() - start:.3g} s)")
+
+
+for _function in (dome, hinge):
+    app.command()(command(_function))

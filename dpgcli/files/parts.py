@@ -1,8 +1,9 @@
 """Results of chunks on disk, so that an interrupted sweep can go on.
 
 A part is a Parquet file of a range of designs, with a row for each block of work: the list of its
-states and the list of its designs. Its name is its range and the SHA-256 of its bytes: a part that
-does not match its name does not count.
+states and the list of its designs. Its name is its range and a SHA-256 of its bytes and of its
+sweep, by the name of the folder: a part that does not match its name, damaged or of another sweep,
+does not count.
 """
 
 import hashlib
@@ -90,8 +91,8 @@ class Part(NamedTuple):
 
     @property
     def is_damaged(self) -> bool:
-        """Whether its bytes do not match its name."""
-        return not self.path.is_file() or _digest(self.path) not in self.path.name
+        """Whether its bytes and its sweep do not match its name."""
+        return not self.path.is_file() or _digest(self.path, self.path.parent) not in self.path.name
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class PartStore:
             with temporary_file(place) as (scratch, _):
                 with scratch.open("wb") as file:
                     yield file
-                name = f"{place.name}-{_digest(scratch)}.part"
+                name = f"{place.name}-{_digest(scratch, self.folder)}.part"
                 with whole_file(self.folder / name, Mark.ANY) as temporary:
                     scratch.replace(temporary)
         except OSError as error:
@@ -132,7 +133,7 @@ class PartStore:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
             with whole_file(self.folder / SAID, Mark.ANY) as temporary:
-                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
+                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8", newline="\n")
 
     def said(self) -> dict[str, str]:
         """What the sweep is about; empty where that is not said, or is damaged.
@@ -169,7 +170,7 @@ class PartStore:
         return sorted(Part(int(m[1]), int(m[2]), path) for m, path in matches if m)
 
     def damaged(self) -> list[Part]:
-        """Parts whose bytes do not match their name."""
+        """Parts that do not match their name: damaged, or of another sweep."""
         return [part for part in self.parts() if part.is_damaged]
 
     def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -194,6 +195,9 @@ def _is_description(path: Path) -> bool:
     return path.is_file() and not path.is_symlink() and is_own(path, Mark.PARTS)
 
 
-def _digest(path: Path) -> str:
+def _digest(path: Path, sweep: Path) -> str:
+    """Of a part's bytes, as one of the sweep that a folder is of."""
+    digest = hashlib.sha256(sweep.name.encode())
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        hashlib.file_digest(file, lambda: digest)
+    return digest.hexdigest()[:16]

@@ -131,7 +131,7 @@ def write_run(path: Path, facts: dict[str, Any]) -> None:
     """Write what differs between runs (times, host) beside a table."""
     text = json.dumps({"written_by": f"dpg {__version__}", **facts}, indent=2)
     with whole_file(path, Mark.FACTS) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
 def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:

@@ -2,17 +2,23 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
 
 import pandas as pd
+from markdown_it import MarkdownIt
 
 from dpgcli.reports.maps import figures
 from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
 from dpgcli.sweeps.gate import Verdict
 from dpgcli.text import printable
 
-MARKDOWN_SPECIALS = re.compile(r"([\\`*|<>\[\]])")
+# what would be markup: an underscore inside a word is not, nor is & alone
+MARKDOWN_SPECIALS = re.compile(r"([\\`*|<>\[\]]|(?<![^\W_])_|_(?![^\W_])|&(?=#?\w+;))")
+TAGS = {  # a table that is too wide is scrolled alone; a head is told to be one of a column
+    "<table>": "<div><table>",
+    "</table>": "</table></div>",
+    "<th>": '<th scope="col">',
+}
 STYLE = """
 :root { color-scheme: light dark; --text: #1a1a1a; --page: #fff; --line: #ccc; }
 @media (prefers-color-scheme: dark) { :root { --text: #e6e6e6; --page: #16181c; --line: #444; } }
@@ -36,12 +42,11 @@ def markdown(
 def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
     """The same as a page of HTML that needs no other file, with figures if Matplotlib is there."""
     space = DesignSpace(designs, units)
-    numbered = enumerate(sections(space, facts))
-    body = "\n".join(_html(section, 2 if place else 1) for place, section in numbered)
+    body = _html(_markdown(sections(space, facts)))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width">\n<title>Design space</title>\n'
-        f"<style>{STYLE}</style>\n</head>\n<body>\n{body}\n"
+        f"<style>{STYLE}</style>\n</head>\n<body>\n{body}"
         f"<h2>Figures</h2>\n{figures(space)}\n</body>\n</html>\n"
     )
 
@@ -78,20 +83,9 @@ def _escaped(text: str) -> str:
     return MARKDOWN_SPECIALS.sub(r"\\\1", printable(" ".join(text.split())))
 
 
-def _entities(text: str) -> str:
-    return escape(printable(" ".join(text.split())))
-
-
-def _html(section: Section, level: int) -> str:
-    blocks = [
-        f"<p>{_entities(block)}</p>" if isinstance(block, str) else _html_table(block)
-        for block in section.blocks
-    ]
-    return "\n".join((f"<h{level}>{escape(section.title)}</h{level}>", *blocks))
-
-
-def _html_table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{_entities(cell)}</th>' for cell in table.head)
-    rows = ["".join(f"<td>{_entities(cell)}</td>" for cell in row) for row in table.rows]
-    lines = "\n".join(f"<tr>{row}</tr>" for row in (head, *rows))
-    return f"<div><table>\n{lines}\n</table></div>"
+def _html(text: str) -> str:
+    """Markdown as HTML; whatever looks like a tag in the text is none in the page."""
+    page: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    for tag, instead in TAGS.items():
+        page = page.replace(tag, instead)
+    return page

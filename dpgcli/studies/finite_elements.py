@@ -111,7 +111,7 @@ def curve_path(model: Model, folder: Path) -> Path:
 
 def _write(path: Path, text: str) -> None:
     with whole_file(path, MARKS[path.suffix]) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def solve(deck: Path, limits: Limits) -> Output:

@@ -253,10 +253,11 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     """
     metadata = parts_of[0].said()
     for store in parts_of:
-        if not store.said():
+        if not store.said().get(FINGERPRINT, "").startswith(store.folder.name):
             raise UsageError(f"{store.folder / SAID} is damaged: run its sweep again")
         if damaged := store.damaged():
-            raise UsageError(f"{damaged[0].path} is damaged: run its sweep again")
+            wrong = "is damaged, or of another sweep: run its sweep again"
+            raise UsageError(f"{damaged[0].path} {wrong}")
     for store in parts_of[1:]:
         if changed := differences(metadata, store.said()):
             raise UsageError(f"{store.folder.parent.parent} differs in {', '.join(changed)}")

@@ -17,7 +17,7 @@ try:
     main()
 except SystemExit as end:
     assert not end.code, end.code
-report.write_text(" ".join({name.partition(".")[0] for name in sys.modules}))
+report.write_text(" ".join(sys.modules))
 """
 AT_START = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "pydantic", "numba"}
 PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba", "rich", "shapely", "filelock"}
@@ -28,7 +28,7 @@ Loaded = Callable[..., set[str]]
 
 @pytest.fixture
 def loaded(tmp_path: Path) -> Loaded:
-    """Names of the top-level modules that a run has loaded."""
+    """Names of the modules that a run has loaded."""
 
     def modules(*arguments: str) -> set[str]:
         report = tmp_path / "modules.txt"
@@ -73,3 +73,21 @@ def test_predicting_loads_neither_tables_nor_figures(
 def test_writing_a_table_loads_no_pandas(loaded: Loaded, tmp_path: Path) -> None:
     table = str(tmp_path / "states.parquet")
     assert "pandas" not in loaded("predict", str(CONFIGS / "three_unit.yaml"), "-o", table)
+
+
+def test_a_command_loads_no_other_than_those_it_shares_with(loaded: Loaded) -> None:
+    found = loaded("predict", str(CONFIGS / "three_unit.yaml"))
+    others = {
+        "bench",
+        "check",
+        "compare",
+        "fe",
+        "fit",
+        "init",
+        "merge",
+        "report",
+        "stress",
+        "sweep",
+    }
+    assert "dpgcli.cli.predict" in found
+    assert not {f"dpgcli.cli.{name}" for name in others} & found

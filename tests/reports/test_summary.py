@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from dpgcli.reports.page import html, markdown, verdicts_markdown
+from dpgcli.reports.page import _html, _markdown, html, markdown, verdicts_markdown
+from dpgcli.reports.summary import Section, Table
 from dpgcli.sweeps.gate import check_requirements, requirement
+from dpgcli.text import printable
 
 UNITS = {
     "height_mm": "mm",
@@ -229,6 +233,19 @@ def test_the_page_has_the_same_cells_and_needs_no_other_file() -> None:
     assert (page.count("<h1>"), page.count("<h2>")) == (1, 7)
     assert "prefers-color-scheme: dark" in page
     assert not re.search(r"url\((?!#)|@import|<script|<link", page)
+
+
+@given(st.text(max_size=40))
+@example("a&lt;b &#60; &amp;amp; & c")
+@example("_a_ b_c __d__ *e* ~~f~~ ![g](h) <i@j.k> https://l.m `n` \\* \\")
+@example("---")
+@example("- 1. # > + =")
+def test_whatever_a_cell_says_the_page_says_the_same(text: str) -> None:
+    table = Table(("a", "b"), [["0", text], [text, "1"]])
+    reader = Cells()
+    reader.feed(_html(_markdown([Section("S", [table])])))
+    said = printable(" ".join(text.split()))
+    assert reader.cells == ["a", "b", "0", said, said, "1"]
 
 
 def svg_texts(designs: pd.DataFrame) -> list[str]:

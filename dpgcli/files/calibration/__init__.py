@@ -86,7 +86,10 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     yaml.width = 110
     yaml.allow_unicode = True
     content = calibration.model_dump(exclude_none=True)
-    with whole_file(path, Mark.CALIBRATION) as new, new.open("w", encoding="utf-8") as stream:
+    with (
+        whole_file(path, Mark.CALIBRATION) as new,
+        new.open("w", encoding="utf-8", newline="\n") as stream,
+    ):
         yaml.dump(content, stream)
 
 
