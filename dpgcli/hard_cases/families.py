@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
-from dpgcli.states.margins import limits, margins
+from dpgcli.states.margins import last_where, limits, margins
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
@@ -21,7 +21,6 @@ from dpgcli.states.wells import inverted_wells
 ALL_PATTERNS_UP_TO = 4  # units
 GRADED = 4  # units
 LONG = 30  # units: of longer fingers one pattern has to do, since extended precision is slow
-BISECTIONS = 54
 FOLDING = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
@@ -240,14 +239,14 @@ def _approach(bars: str, finger: Finger, name: str, limit: float) -> Iterator[Va
 
 def _last_linearity(unit: Finger) -> float:
     """The α from which on a unit with elastic bars does not rest beyond its barrier."""
-    low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        units = Units.of(changed(unit, force_linearity=middle))
+
+    def rests(linearity: Array) -> Flags:
+        units = Units.of(changed(unit, force_linearity=linearity))
         settled = settle(units, chain_potential, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
-        is_stable = settled.status[0] == Status.STABLE
-        low, high = (middle, high) if is_stable else (low, middle)
-    return low
+        is_stable: Flags = settled.status[0] == Status.STABLE
+        return is_stable
+
+    return last_where(rests, np.array(0.0), np.array(1.0)).item()
 
 
 def _crossed(base: Finger) -> Iterator[Variant]:
