@@ -63,6 +63,13 @@ def test_the_solver_knows_no_finger() -> None:
     assert {name.split(".")[1] for name in known} <= {"arrays", "equilibrium"}
 
 
+def test_the_room_for_designs_knows_no_files_and_no_specs() -> None:
+    paths = list((PACKAGE / "design").rglob("*.py"))
+    words = [word for path in paths for word in path.read_text(encoding="utf-8").split()]
+    assert len(paths) > 5
+    assert not {"pydantic", "pathlib", "yaml"} & set(words)
+
+
 @pytest.mark.parametrize("folder", ["mechanics", "design", "equilibrium", "states", "calibration"])
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
     for path in (PACKAGE / folder).rglob("*.py"):

@@ -151,6 +151,12 @@ def test_the_words_for_one_design_are_its_own() -> None:
     assert origins == ["extrapolated", "calibrated", "extrapolated"]
 
 
+def test_values_given_twice_agree_to_a_millionth() -> None:
+    strokes = 3.5 * (1.0 + np.array([-1.1e-6, -0.9e-6, 0.0, 0.9e-6, 1.1e-6]))
+    found = resolve(DESIGNS["given"].with_values({"finger.lattice.stroke_mm": strokes}))
+    assert found.are_wrong.tolist() == [True, False, False, False, True]
+
+
 @pytest.mark.parametrize("section", [Geometry, Lattice, GripperSpec])
 def test_a_key_can_have_the_values_that_a_spec_takes(section: Any) -> None:
     values = np.array([-91, -90, -1, 0, 1e-13, 1e-12, 0.5, 1, 1.5, 90, 91, 1e12, 2e12, np.inf])

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import Gripper, Origin, Source
 from dpgcli.errors import SpecError
-from dpgcli.files.scene_file import canonical_json, json_schema, read_spec, scene_of, starter
+from dpgcli.files.scene_file import (
+    canonical_json,
+    json_schema,
+    models,
+    read_spec,
+    scene_of,
+    starter,
+)
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import SECTIONS, checked
 from dpgcli.files.yaml_file import Document
@@ -153,6 +162,23 @@ def test_every_example_is_a_scene(path):
     scene = scene_of(read_spec(path))
     assert scene.finger.n_units == units[path.stem.split("_")[0]]
     assert (scene.gripper is not None) == (path.stem == "gripper")
+
+
+def test_reading_a_spec_resolves_it_once(monkeypatch):
+    calls = []
+    monkeypatch.setattr(models, "resolve", lambda design: calls.append(1) or resolve(design))
+    spec = read_spec(CONFIGS / "graded_five_unit.yaml")
+    assert scene_of(spec).finger.n_units == scene_of(spec).finger.n_units == 5
+    assert calls == [1]
+
+
+def test_a_resolved_spec_can_be_sent_and_compared():
+    paths = (CONFIGS / "graded_five_unit.yaml", CONFIGS / "calibration" / "three_gap_finger.yaml")
+    for path in paths:
+        spec, again = read_spec(path), read_spec(path)
+        sent = pickle.loads(pickle.dumps(spec))
+        assert scene_of(sent).sources == scene_of(spec).sources
+        assert sent == spec == again
 
 
 def test_the_starter_means_the_three_unit_finger_and_names_every_key(read):
