@@ -15,11 +15,14 @@ from dpgcli.design.rules import (
     STROKE,
     Derivation,
 )
-from dpgcli.mechanics.curve import FEWEST_POINTS, bridged, spline
+from dpgcli.mechanics.curve import AT_REST, FEWEST_POINTS, bridged, spline
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
 
 WHERE = ("finger", "law")
 HINT = "dpg fit bistable writes one"
+NEXT_TO_NOTHING = 0.01  # of a curve's energies
+NEAR_START = 4.0  # first travels: as far the slope is like that from rest to the first point
+STEEPER = 1.5  # than any slope nearby: no dome's own
 NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
 
 
@@ -62,9 +65,8 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
         return Domes(PushOnly(PUBLISHED))
     if calibration is None or calibration.curve is None:
         return Issue(WHERE, "a calibration with a curve beside law: tabulated", "none", HINT)
-    if len(calibration.curve.travel) < FEWEST_POINTS:
-        found = f"{len(calibration.curve.travel)} in {calibration.file}"
-        return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
+    if issue := _curve_issue(calibration, calibration.curve):
+        return issue
     stiffness, stroke = (calibration.values.get(key) for key in NORMALS)
     if stiffness is None or stroke is None:
         expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
@@ -72,6 +74,29 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
     if law == "tabulated":
         return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
     return _pushing(calibration, calibration.curve, stiffness.value)
+
+
+def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
+    """Too few points, or a first one whose energy cannot be counted from rest."""
+    travels, energies = np.array(curve.travel), np.array(curve.energy)
+    begins_before = travels[0] < 0.0
+    n_points = len(travels)
+    if begins_before:
+        n_points = 1 + int((travels > AT_REST * np.ptp(travels)).sum())
+    if n_points < FEWEST_POINTS:
+        from_rest = " from rest on" if begins_before else ""
+        found = f"{n_points}{from_rest} in {calibration.file}"
+        return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
+    start, energy = travels[0], energies[0]
+    if start <= 0.0 or abs(energy) <= NEXT_TO_NOTHING * np.ptp(energies):
+        return None
+    near = travels[1:] <= max(NEAR_START * start, travels[FEWEST_POINTS - 1])
+    steepest = np.abs(np.diff(energies) / np.diff(travels))[near].max()
+    if abs(energy) <= STEEPER * steepest * start:
+        return None
+    expected = "a curve that begins at rest, travel 0, or whose energies are counted from there"
+    found = f"{energy:g} mJ at {start:g} mm in {calibration.file}"
+    return Issue(WHERE, expected, found, "add the point at travel 0 to the curve")
 
 
 def _no_well(calibration: Calibration) -> Issue:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 FEWEST_POINTS = 4
+AT_REST = 1e-6  # of the travels: points as near to rest are not told from it
 
 
 class Derivatives(NamedTuple):
@@ -58,12 +59,19 @@ class Curve:
 def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     """The C² cubic spline through points of increasing travel.
 
-    Where the first point is rest, at travel 0, values are counted from the one there, and the slope
-    vanishes: a dome at rest exerts no force, and an energy is known but for a constant. Raises
-    ValueError for fewer than four points or travels that do not increase.
+    Values are counted from rest, at travel 0, and the slope vanishes there: a dome at rest exerts
+    no force, and an energy is known but for a constant. Points before rest only tell what the value
+    there is. Where all points are beyond it, nothing is known of rest. Raises ValueError for fewer
+    than four points from rest on, or travels that do not increase.
+
+    >>> dome = spline((-1.0, 0.0, 1.0, 2.0, 3.0), (101.0, 100.0, 101.0, 104.0, 109.0))
+    >>> [round(float(part), 9) for part in dome(np.array(2.0))]
+    [4.0, 4.0, 2.0]
     """
     from scipy.interpolate import CubicSpline
 
+    if travel[0] < 0.0 < travel[-1]:
+        travel, value = _from_rest(travel, value)
     if len(travel) < FEWEST_POINTS or np.any(np.diff(travel) <= 0.0):
         raise ValueError(f"travel: expected {FEWEST_POINTS} or more increasing values: {travel}")
     starts_at_rest = travel[0] == 0.0
@@ -74,6 +82,18 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
     coefficients = np.concatenate((before, cubic.c, after), axis=1)
     return Curve(np.asarray(travel, float), coefficients, _rests(cubic))
+
+
+def _from_rest(
+    travel: tuple[float, ...], value: tuple[float, ...]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Points from rest on, the value at rest by a spline through all."""
+    from scipy.interpolate import CubicSpline
+
+    at_rest = float(CubicSpline(travel, value)(0.0))
+    is_beyond = np.array(travel) > AT_REST * np.ptp(travel)
+    beyond, values = (np.array(part)[is_beyond].tolist() for part in (travel, value))
+    return (0.0, *beyond), (at_rest, *values)
 
 
 def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tuple[Array, Array]:

@@ -92,7 +92,7 @@ def inverted_wells(finger: Finger) -> Wells:
         extension,
         np.where(exists, barrier, MIDDLE) * stroke,
         np.arcsin(extension / (2.0 * finger.segment_height)),
-        _spring_barrier(finger, MIDDLE * stroke),
+        _spring_barrier(finger),
         snap,
         -reset,
     )
@@ -108,13 +108,13 @@ def _opened(finger: Finger, widest: Array) -> Array:
     return np.asarray(np.minimum(opening, widest))
 
 
-def _spring_barrier(finger: Finger, otherwise: Array) -> Array:
+def _spring_barrier(finger: Finger) -> Array:
     """Where the dome's spring alone turns over, mm; nowhere if it has no second well.
 
-    `otherwise` where a dome has done so before it opens its unit.
+    Below 0 where a dome has done so before it opens its unit.
     """
     top = finger.law.rests(finger.domes).top
-    return np.asarray(np.where(np.isnan(top), np.inf, np.where(top > 0.0, top, otherwise)))
+    return np.asarray(np.where(np.isnan(top), np.inf, top))
 
 
 def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
@@ -149,13 +149,15 @@ def _searched_wells(finger: Finger) -> Wells:
     energy = _rigid_energy(finger, grid)[:-1]
     places = np.arange(SEARCHED - 1)[:, None, None]
     is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
+    turned = _spring_barrier(finger)
+    is_well &= grid[1:] > turned  # before it a unit may rest in a ripple, but is not inverted
     # the well that lies deepest below both sides, and the highest top before it: ripples pass
     left, right = (np.maximum.accumulate(e, axis=0) for e in (energy, energy[::-1]))
     depth = np.minimum(left, right[::-1]) - energy
     wells = np.where(is_well, depth, -np.inf).argmax(axis=0)
     is_top &= places < wells
     tops = np.where(is_top.any(axis=0), np.where(is_top, energy, -np.inf).argmax(axis=0), -1)
-    exists = is_well.any(axis=0) & np.isfinite(own) & within_reach
+    exists = is_well.any(axis=0) & within_reach
     well = _bisected(finger, grid, wells, rises=True)
     top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
     stroke = np.broadcast_to(finger.stroke, exists.shape)
@@ -166,7 +168,7 @@ def _searched_wells(finger: Finger) -> Wells:
         extension,
         barrier,
         np.arcsin(extension / lever),
-        _spring_barrier(finger, barrier),
+        turned,
         _largest(slope, grid <= barrier),
         _largest(-slope, (grid >= barrier) & (grid <= extension)),
     )
