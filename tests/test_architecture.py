@@ -11,6 +11,7 @@ PACKAGE = Path(dpgcli.__file__).parent
 FLOORS = {
     "errors": 0,
     "arrays": 0,
+    "code": 0,
     "signals": 0,
     "temporary": 0,
     "text": 0,

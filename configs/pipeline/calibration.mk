@@ -7,16 +7,17 @@ SPEC ?= ../three_unit.yaml
 MESH ?= coarse
 # How far a unit opens where its dome rests inverted, mm (assumed: dome height - unit separation).
 STROKE ?= 3.5
-export SPEC MESH STROKE
+DPG_VERSION := $(shell $(DPG) --version)
+export SPEC MESH STROKE DPG_VERSION
 
 .DELETE_ON_ERROR:
 .PHONY: all clean force
 all: $(OUT)/states.parquet
 
-$(OUT)/dome/dome.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value
+$(OUT)/dome/dome.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value $(OUT)/DPG_VERSION.value
 	$(DPG) fe dome $(SPEC) --out $(@D) --mesh $(MESH) --run
 
-$(OUT)/hinge/hinge.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value
+$(OUT)/hinge/hinge.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value $(OUT)/DPG_VERSION.value
 	$(DPG) fe hinge $(SPEC) --out $(@D) --mesh $(MESH) --run
 
 $(OUT)/dome.yaml: $(OUT)/dome/dome.csv $(OUT)/STROKE.value

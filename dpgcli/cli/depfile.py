@@ -2,49 +2,71 @@
 
 import os
 import re
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from dpgcli.studies.sweep import Study
-
 
 # What no spelling brings past Make: characters, places where more of them have a meaning (users'
 # homes, libraries, special targets, grouped targets, members of archives), patterns of both kinds.
 UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f=;|\\]|^~|^-l|^\.[A-Z_]+$|[ &]$|\(.*\)$|%.*[*?[]|[*?[].*%")
 SPECIAL = re.compile(r"([ #:*?[])")
+HERE = re.compile(r"^(\./+)+")  # Make drops it before it looks at the rest
 HEAD = "# dpg sweep: what its tables are made from"
 
 
-def write_depfile(path: Path, study: "Study") -> None:
+def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> str:
     """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does.
 
+    Make knows a target by its letters: `folder` is as it was typed, and the targets are in it
+    as a rule has them that names `$(OUT)/states.parquet`, and as they are commonly spelled.
     Raises UsageError for a name that Make would read as something else than a name.
     """
-    from dpgcli.files.output import Mark, check_not_read, whole_file
-    from dpgcli.studies.sweep import DESIGNS, STATES
-
-    check_not_read(study.sweep.files, (path,))
-    targets = " ".join(_target(study.folder / name) for name in (STATES, DESIGNS))
-    sources = [source for source in study.sweep.files if source != Path("-")]
-    text = f"{HEAD}\n{targets}: {' '.join(map(_spelled, sources))}\n"
-    text += "".join(f"\n{_target(source)}:\n" for source in sources)
-    study.folder.mkdir(parents=True, exist_ok=True)
-    with whole_file(path, Mark.DEPFILE) as temporary:
-        temporary.write_bytes(os.fsencode(text))
+    names = [f"{each}/{name}" for each in (folder, Path(folder)) for name in tables]
+    targets = dict.fromkeys(map(_target, names))
+    sources = [_plain(source) for source in files if source != Path("-")]
+    text = f"{HEAD}\n{' '.join(targets)}: {' '.join(map(_spelled, sources))}\n"
+    return text + "".join(f"\n{_target(source)}:\n" for source in sources)
 
 
-def _target(path: Path) -> str:
+@dataclass(frozen=True)
+class Depfile:
+    """A depfile to write once its tables are."""
+
+    path: Path
+    text: str
+
+    def check(self) -> None:
+        """Fail before the work. Raises OutputError for a file that is there and no depfile."""
+        from dpgcli.files.output import Mark, check_writable
+
+        check_writable(self.path, Mark.DEPFILE)
+
+    def write(self) -> None:
+        """Write it. Raises OutputError where that fails."""
+        from dpgcli.files.output import Mark, whole_file
+
+        with whole_file(self.path, Mark.DEPFILE) as temporary:
+            temporary.write_bytes(os.fsencode(self.text))
+
+
+def _plain(path: Path) -> str:
+    """A name without `..` that leads back: not behind a linked folder, whose `..` is elsewhere."""
+    plain = os.path.normpath(path)
+    is_same = os.path.realpath(Path(plain).parent) == os.path.realpath(path.parent)
+    return plain if is_same else os.fspath(path)
+
+
+def _target(name: str) -> str:
     """A name before a colon, where a % would make a pattern of it."""
-    return _spelled(path).replace("%", r"\%")
+    return _spelled(name).replace("%", r"\%")
 
 
-def _spelled(path: Path) -> str:
+def _spelled(name: str) -> str:
     """A name as Make reads it."""
     from dpgcli.errors import UsageError
     from dpgcli.files.places import shown
 
-    name = os.path.normpath(path)
+    name = HERE.sub("", name)
     if unfit := UNFIT.search(name):
         raise UsageError(f"--depfile: Make cannot take {shown(unfit[0])} in the name {name}")
     return SPECIAL.sub(r"\\\1", name).replace("$", "$$")

@@ -65,7 +65,13 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
+        from dpgcli.code import sha256_of_code
+
         print(f"dpg {__version__}")
+        libraries = (f"{name} {version(name)}" for name in ("numpy", "scipy", "pyarrow"))
+        print(f"package {sha256_of_code()[:16]}, {', '.join(libraries)}")
         raise typer.Exit
 
 

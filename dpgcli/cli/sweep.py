@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.check import append_summary, code_of, print_verdicts
-from dpgcli.cli.depfile import write_depfile
+from dpgcli.cli.depfile import Depfile, depfile_text
 from dpgcli.cli.exits import ExitCode, Terminated
 from dpgcli.cli.options import (
     LONG,
@@ -52,7 +52,9 @@ class ExecutorName(StrEnum):
 
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")]
+Output = Annotated[  # as it is typed, for Make
+    str, typer.Option("-o", "--output", metavar="PATH", help="Folder of the tables")
+]
 Jobs = Annotated[
     int | None,
     typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
@@ -72,7 +74,9 @@ Part = Annotated[
 ]
 Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
-Depfile = Annotated[Path | None, typer.Option("--depfile", help="Write the files read, for Make")]
+DepfilePath = Annotated[
+    Path | None, typer.Option("--depfile", help="Write the files read, for Make")
+]
 Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
@@ -95,45 +99,45 @@ def sweep(
     target_error: TargetError = None,
     restart: Restart = False,
     force: Force = False,
-    depfile: Depfile = None,
+    depfile: DepfilePath = None,
     require: Require = None,
     max_failed: MaxFailed = 0,
     summary_file: SummaryFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Evaluate every design of a space, resumably."""
-    if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
+    folder = Path(output)
+    if executor is ExecutorName.PROCESSES and jobs != 1 and not folder.exists():
         _start_fork_server_early()
-    from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
-    from dpgcli.studies.sweep import drop_half_written, drop_parts
+    from dpgcli.studies.sweep import drop_half_written
 
     part = _shard(shard)
     limit = _patience(executor, scheduler, wait)
-    if part is not None and (require or summary_file):
-        raise UsageError("--require and --summary-file need the whole table: give them to check")
-    study = _study(spec, settings or (), output, tolerance, target_error)
+    if part is not None:
+        _check_part(require, summary_file, depfile)
+    study = _study(spec, settings or (), folder, tolerance, target_error)
     _check_names(study, depfile, summary_file)
     rules = _rules(study, require or [])
-    if depfile is not None:
-        write_depfile(depfile, study)
-    with sole_use(output):
-        drop_half_written(output)
+    described = None if depfile is None else _described(study, output, depfile)
+    with sole_use(folder):
+        drop_half_written(folder)
+        if described is not None:
+            described.check()
         is_new = restart or not study.is_up_to_date
         if is_new:
             study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
-            if part is None:
-                _check_tables(study)
-            _check_folder(study, restart=restart, force=force)
+            _check_folder(study, part, restart=restart, force=force)
             if not quiet:
                 _say_before(study)
             progress = _computed(study, _workplace(executor, jobs, scheduler, limit), part, quiet)
+            if described is not None:  # first: new tables beside an old one would stay for good
+                described.write()
             _conclude(study, progress, part, settings or (), quiet)
         else:
-            if part is None and study.owns_all_parts:  # what a run left that was stopped at its end
-                drop_parts(study.folder)
-            if not quiet:
-                say(f"{output}: up to date")
+            if described is not None:
+                described.write()
+            _leave(study, part, quiet)
         if part is None:
             n_failed, code = _judge(study, rules, summary_file, is_new, quiet)
         else:
@@ -141,6 +145,22 @@ def sweep(
     check_failed(n_failed, max_failed)
     if code:
         raise typer.Exit(code)
+
+
+def _check_part(require: list[str] | None, summary_file: Path | None, depfile: Path | None) -> None:
+    """Raise UsageError for options that are about tables, which a shard does not make."""
+    from dpgcli.errors import UsageError
+
+    if require or summary_file:
+        raise UsageError("--require and --summary-file need the whole table: give them to check")
+    if depfile:
+        raise UsageError("--depfile says what the tables are made from, and a shard makes none")
+
+
+def _described(study: "Study", output: str, depfile: Path) -> Depfile:
+    from dpgcli.studies.sweep import DESIGNS, STATES
+
+    return Depfile(depfile, depfile_text(output, (STATES, DESIGNS), study.sweep.files))
 
 
 def _start_fork_server_early() -> None:
@@ -205,8 +225,10 @@ def _check_tables(study: "Study") -> None:
     check_outputs(study.sweep.files, *outputs(study.folder))
 
 
-def _check_folder(study: "Study", *, restart: bool, force: bool) -> None:
-    """Refuse what is unfinished there, unless it is to go, and what has no room."""
+def _check_folder(study: "Study", part: "Shard | None", *, restart: bool, force: bool) -> None:
+    """Refuse what is in the way there, unfinished unless it is to go, and what has no room."""
+    if part is None:
+        _check_tables(study)
     if restart:
         study.drop_unfinished()
     study.check_unfinished()
@@ -248,6 +270,16 @@ def _conclude(
         say(run_summary(study.folder, progress, part))
     for replay in replays:
         say(f"failed, its worker died twice; alone: {replay}")
+
+
+def _leave(study: "Study", part: "Shard | None", quiet: bool) -> None:
+    """Say that there is nothing to do; remove what a run left that was stopped at its end."""
+    from dpgcli.studies.sweep import drop_parts
+
+    if part is None and study.owns_all_parts:
+        drop_parts(study.folder)
+    if not quiet:
+        say(f"{study.folder}: up to date")
 
 
 def _judge(

@@ -155,8 +155,6 @@ def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:
     """Fail before the work rather than after it."""
     target = Path(os.path.realpath(path))
     try:
-        if path.is_dir():
-            raise IsADirectoryError(None, "is a folder")
         with _beside(target):
             _check_replaceable(target, mark)
     except OSError as error:
@@ -221,7 +219,9 @@ def _beside(path: Path) -> Iterator[Path]:
     """
     if control := control_character(str(path)):
         raise OSError(None, f"{control} in it")
-    if path.exists() and not path.is_file() and not path.is_dir():
+    if path.is_dir():
+        raise IsADirectoryError(None, "is a folder")
+    if path.exists() and not path.is_file():
         raise OSError(None, "is a device or pipe, not a file")
     with temporary_file(path) as (temporary, handle):
         _permit(handle, path)

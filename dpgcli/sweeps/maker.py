@@ -1,6 +1,5 @@
 """Who makes the numbers of a sweep: versions and code, so that nobody else's are taken for them."""
 
-import hashlib
 import os
 import pkgutil
 import platform
@@ -12,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 import dpgcli
+from dpgcli.code import PACKAGE, sha256_of_code
 from dpgcli.errors import WorkplaceError
 from dpgcli.sweeps.executors import Workplace
 
@@ -37,21 +37,15 @@ class Maker(NamedTuple):
 
 
 def code_of(package: Path) -> str:
-    """SHA-256 of all modules of a package that its numbers come from, their names included.
+    """SHA-256 of all modules of a package that its numbers come from.
 
-    About 7 ms; not `NO_NUMBERS`, so that work on what is printed leaves finished parts as they are.
+    Not `NO_NUMBERS`, so that work on what is printed leaves finished parts as they are.
     """
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        name = path.relative_to(package)
-        if name.parts[0] not in NO_NUMBERS:
-            content = path.read_bytes()
-            digest.update(f"{name.as_posix()} {len(content)} ".encode() + content)
-    return digest.hexdigest()
+    return sha256_of_code(package, NO_NUMBERS)
 
 
 # who works in this process, found when it began to: its files may have changed since
-HERE = Maker(dpgcli.__version__, np.__version__, code_of(Path(dpgcli.__file__).parent))
+HERE = Maker(dpgcli.__version__, np.__version__, code_of(PACKAGE))
 # asked with a function that every Python has: one of this package would end a worker without it
 WHO = partial(pkgutil.resolve_name, f"{__name__}:HERE")
 

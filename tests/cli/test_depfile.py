@@ -4,12 +4,10 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
 
 import pytest
 
-from dpgcli.cli.depfile import write_depfile
+from dpgcli.cli.depfile import Depfile, depfile_text
 from dpgcli.errors import UsageError
 from dpgcli.files.sweep_file import read_sweep
 
@@ -63,9 +61,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def depend(folder: str, *files: str) -> None:
     """A depfile of tables in a folder, made from these files."""
-    sweep = SimpleNamespace(files=tuple(map(Path, files)))
-    study = cast("Any", SimpleNamespace(sweep=sweep, folder=Path(folder)))
-    write_depfile(Path("sweep.d"), study)
+    text = depfile_text(folder, ("states.parquet", "designs.parquet"), map(Path, files))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    Depfile(Path("sweep.d"), text).write()
 
 
 def make() -> str:
@@ -116,6 +114,54 @@ def test_make_reads_the_name_of_the_folder(here: Path, name: str) -> None:
     assert make() == "make: Nothing to be done for 'all'.\n"
     aged(table, OLD - 1.0)
     assert make() == "again\n"
+
+
+@needs_make
+@pytest.mark.parametrize(
+    "folder", ["g", "g/", "g//h", "./g", ".//g", "g/.", "a/../g", "linked/../g", "{}/../{}/g", "."]
+)
+def test_make_knows_the_tables_as_its_rule_spells_them(here: Path, folder: str) -> None:
+    (here / "a").mkdir()
+    (here / "b").mkdir()
+    (here / "linked").symlink_to(here / "b")
+    (here / "read.csv").touch()
+    folder = folder.format(here, here.name)
+    depend(folder, "read.csv")
+    rule = f"OUT := {folder}\n$(OUT)/states.parquet:\n\t@echo again\n\ninclude sweep.d\n"
+    Path("Makefile").write_text(rule, encoding="utf-8")
+    table = Path(folder) / "states.parquet"
+    table.touch()
+    aged(here / "read.csv", OLD)
+    command = ["make", "--no-print-directory", f"{folder}/states.parquet"]
+    assert b"up to date" in subprocess.run(command, capture_output=True, check=True).stdout
+    aged(table, OLD - 1.0)
+    assert subprocess.run(command, capture_output=True, check=True).stdout == b"again\n"
+
+
+@needs_make
+def test_what_leads_back_from_a_linked_folder_is_named_as_it_is(here: Path) -> None:
+    """What the kernel reads lies beside the folder that is linked to."""
+    (here / "elsewhere" / "sweeps").mkdir(parents=True)
+    (here / "sweeps").symlink_to(here / "elsewhere" / "sweeps")
+    for name in ("elsewhere/three_unit.yaml", "three_unit.yaml"):
+        (here / name).touch()
+        aged(here / name, OLD)
+    depend("out", "sweeps/../three_unit.yaml", "elsewhere/sweeps/../three_unit.yaml")
+    (here / "out" / "states.parquet").touch()
+    aged(here / "out" / "states.parquet", NEW)
+    first = Path("sweep.d").read_text(encoding="utf-8").splitlines()[1].split(": ")[1]
+    assert first == "sweeps/../three_unit.yaml elsewhere/three_unit.yaml"
+    aged(here / "three_unit.yaml", CHANGED)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    aged(here / "elsewhere" / "three_unit.yaml", CHANGED)
+    assert make() == "again\n"
+
+
+@pytest.mark.parametrize("folder", ["./~root", ".//-lm", "./"])
+def test_what_make_drops_from_a_name_hides_nothing(here: Path, folder: str) -> None:
+    names = ("a",) if folder != "./" else (".IGNORE",)
+    with pytest.raises(UsageError, match="Make cannot take"):
+        depfile_text(folder, names, ())
 
 
 @pytest.mark.parametrize("name", UNFIT, ids=ascii)

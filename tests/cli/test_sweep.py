@@ -18,7 +18,9 @@ import pandas as pd
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.errors import OutputError
 from dpgcli.files.output import sole_use
+from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import read_sweep
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.studies.sweep import Study
@@ -565,6 +567,49 @@ def test_an_output_takes_the_place_of_no_file_that_is_read(
 def test_a_refused_depfile_leaves_no_empty_folder(call: Any, domes: Path) -> None:
     assert call("sweep", "domes.yaml", *SERIAL, "--depfile", "base.yaml").exit_code == 2
     assert not (domes / "out").exists()
+
+
+def test_a_depfile_is_that_of_the_tables_beside_it(call: Any, domes: Path) -> None:
+    """Whatever is refused leaves it alone; tables that are up to date have it again."""
+    run = ("sweep", "domes.yaml", *SERIAL, "--depfile", "out.d")
+    assert call(*run).exit_code == ExitCode.DONE
+    before = (domes / "out.d").read_bytes()
+    (domes / "copy.yaml").write_bytes((domes / "domes.yaml").read_bytes() + b"\n# another\n")
+    other = ("sweep", "copy.yaml", "-s", "finger.law=published", *run[2:])
+    with sole_use(domes / "out"):
+        assert "another dpg is at work" in call(*other).stderr
+    theirs = PartStore(domes / "out" / ".parts" / ("a" * 16))
+    theirs.say({"dpg.designs": "3"})
+    assert "holds an unfinished sweep" in call(*other).stderr
+    theirs.drop()
+    assert "a shard makes none" in call(*other, "--shard", "1/2").stderr
+    (domes / "out" / "run.json").write_text("{}")
+    assert "cannot write out/run.json" in call(*other).stderr
+    assert (domes / "out.d").read_bytes() == before
+    (domes / "out.d").unlink()
+    assert "out: up to date\n" in call(*run).stderr
+    assert (domes / "out.d").read_bytes() == before
+
+
+def test_a_depfile_is_there_before_the_tables(
+    call: Any, domes: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tables that are new beside a depfile that is not would look up to date for good."""
+
+    def assemble(study: Study) -> None:
+        assert (domes / "out.d").exists()
+        assert not (study.folder / "states.parquet").exists()
+        raise OutputError("no space")
+
+    monkeypatch.setattr(Study, "assemble", assemble)
+    assert call("sweep", "domes.yaml", *SERIAL, "--depfile", "out.d").exit_code == ExitCode.USAGE
+
+
+@pytest.mark.parametrize("name", ["/", ".", "out"])
+def test_a_folder_is_no_depfile(call: Any, domes: Path, name: str) -> None:
+    result = call("sweep", "domes.yaml", *SERIAL, "--depfile", name)
+    assert result.exit_code == ExitCode.USAGE
+    assert f"cannot write {name}: is a folder" in result.stderr.lower()
 
 
 def test_a_changed_calibration_is_computed_anew(call: Any, domes: Path) -> None:

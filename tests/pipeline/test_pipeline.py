@@ -65,6 +65,40 @@ def test_make_does_what_is_out_of_date_and_no_more(checkout: Path) -> None:
     assert "dpg sweep" in changed.stdout
 
 
+@pytest.mark.parametrize("out", ["g/", "g//h", "$PWD/../pipeline/g"])
+def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path, out: str) -> None:
+    said = (
+        "base: ../three_unit.yaml\n"
+        "space: [{key: finger.geometry.dome_height_mm, values: [6, 6.5]}]\n"
+    )
+    (checkout / "configs" / "sweeps" / "s.yaml").write_text(said, encoding="utf-8")
+    gate = (f"OUT={out}", "SWEEP=../sweeps/s.yaml", "REQUIRE='reach_max_mm < 41'")
+    first = make(checkout, *gate)
+    assert first.returncode == 0, first.stderr
+    assert "dpg sweep" not in make(checkout, *gate).stdout
+    base = checkout / "configs" / "three_unit.yaml"
+    base.write_text(base.read_text().replace("separation_mm: 3", "separation_mm: 4"))
+    changed = make(checkout, *gate)
+    assert changed.returncode == 2, changed.stdout
+    assert "not met: reach_max_mm < 41" in changed.stdout
+
+
+def test_other_code_judges_anew(checkout: Path) -> None:
+    """Tables that are as they were are not computed again, but what is said of them is."""
+    assert make(checkout).returncode == 0
+    program = checkout / "bin" / "dpg"
+    new = 'case "$1" in --version) echo dpg 99.0;; *) exec "$0".old "$@";; esac\n'
+    program.rename(program.with_name("dpg.old"))
+    program.write_text(f"#!/bin/sh\n{new}", encoding="utf-8")
+    program.chmod(0o755)
+    again = make(checkout)
+    assert again.returncode == 0, again.stderr
+    assert "up to date" in again.stderr
+    assert "dpg check" in again.stdout
+    assert "dpg report" in again.stdout
+    assert "dpg" not in make(checkout).stdout
+
+
 def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     result = make(checkout, "REQUIRE='min_barrier_mJ > 1e6'")
     assert result.returncode == 2  # of make: a recipe failed
@@ -98,15 +132,15 @@ def test_other_choices_make_a_calibration_anew(checkout: Path) -> None:
     """Dry runs: `dpg` prints what it would do, and makes what it is told to."""
     program = checkout / "bin" / "dpg"
     program.write_text(
-        '#!/bin/sh\necho ran "$@"\n'
+        '#!/bin/sh\necho ran "$@" "$CODE"\n'
         'case "$1" in fe) mkdir -p "$5"; touch "$5/$2.csv";; esac\n'
         'for last; do :; done\ncase "$1" in fit|predict) touch "$last";; esac\n',
         encoding="utf-8",
     )
     folder = checkout / "configs" / "pipeline"
 
-    def ran(choices: str) -> list[str]:
-        done = shell(f"make -f calibration.mk {choices}", checkout, folder)
+    def ran(choices: str, **env: str) -> list[str]:
+        done = shell(f"make -f calibration.mk {choices}", checkout, folder, **env)
         assert done.returncode == 0, done.stderr
         return [line.split()[1] for line in done.stdout.splitlines() if line.startswith("ran ")]
 
@@ -116,6 +150,10 @@ def test_other_choices_make_a_calibration_anew(checkout: Path) -> None:
     assert ran("STROKE=3.4") == ["fit", "predict"]
     assert sorted(ran("STROKE=3.4 MESH=fine")) == sorted(everything)
     assert sorted(ran("STROKE=3.4 MESH=fine SPEC=../five_unit.yaml")) == sorted(everything)
+    assert sorted(ran("STROKE=3.4 MESH=fine SPEC=../five_unit.yaml", CODE="2")) == sorted(
+        everything
+    )
+    assert ran("STROKE=3.4 MESH=fine SPEC=../five_unit.yaml", CODE="2") == []
 
 
 def workflow() -> dict[str, Any]:

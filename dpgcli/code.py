@@ -1,0 +1,22 @@
+"""Which code this is: versions alone do not tell, where a package is installed to be edited."""
+
+import hashlib
+from collections.abc import Collection
+from pathlib import Path
+
+PACKAGE = Path(__file__).parent
+
+
+def sha256_of_code(package: Path = PACKAGE, left_out: Collection[str] = ()) -> str:
+    """SHA-256 of all modules of a package, names included, but for the parts left out; 7 ms.
+
+    >>> len(sha256_of_code())
+    64
+    """
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        name = path.relative_to(package)
+        if name.parts[0] not in left_out:
+            content = path.read_bytes()
+            digest.update(f"{name.as_posix()} {len(content)} ".encode() + content)
+    return digest.hexdigest()
