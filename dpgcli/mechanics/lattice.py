@@ -82,7 +82,7 @@ class Lattice:
         return vectors(coordinates, self.finger.segment_height)
 
     def _distances(self) -> Array:
-        """How far the stations reach from the base, Σ L + H in mm, shape (unit, designs)."""
+        """Largest distance of the stations from the base, Σ L + H, mm, shape (unit, designs)."""
         finger = self.finger
         lengths = finger.segment_length
         lengths = np.broadcast_to(lengths, (finger.n_units, lengths.shape[1]))
@@ -99,7 +99,7 @@ class Lattice:
 
     @cached_property
     def rounding_floor(self) -> Array:
-        """Where the residual stops falling, N, shape (1, designs): 2 k_L ε (Σ L + H).
+        """The rounding floor of the residual, 2 k_L ε (Σ L + H), N, shape (1, designs).
 
         A position is stored to within ε/2 of itself, a bar's extension is the difference of
         two, and up to three bars meet at a node. Measured at equilibria of 1 to 40 units
@@ -110,7 +110,10 @@ class Lattice:
 
     @cached_property
     def gradient_scale(self) -> Array:
-        """The stronger unit's forces at a node, and what keeps `FINEST_TOLERANCE` in reach."""
+        """Forces in play at a node, N: the stronger unit's, plus the floor over `FINEST_TOLERANCE`.
+
+        The second part keeps a relative residual of `FINEST_TOLERANCE` attainable.
+        """
         scale = self.finger.force_scale
         shared = scale.copy()
         shared[:-1] = np.maximum(scale[:-1], scale[1:])
@@ -118,12 +121,12 @@ class Lattice:
 
     @cached_property
     def stiffness_scale(self) -> Array:
-        """Of the springs and hinges, k_b + k_θ/H²: what a soft direction is measured by."""
+        """Stiffness of the soft directions, k_b + k_θ/H², N/mm, by which pivots are judged."""
         return self._rowwise(self.finger.force_scale / self.finger.stroke)
 
     @cached_property
     def step_cap(self) -> Array:
-        """What a turn of the whole finger by 0.2 d/H, at most 0.3 rad, moves a node by."""
+        """The motion of a node, mm, by a turn of the whole finger by 0.2 d/H, at most 0.3 rad."""
         turn = np.minimum(0.2 * self.finger.stroke / self.finger.segment_height, 0.3)
         return self._rowwise(turn * self._distances())
 

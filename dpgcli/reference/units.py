@@ -39,8 +39,8 @@ def inverted_angle(unit: Unit) -> "mpf":
 
     Both corners are open by m; without a second well, by the angle of the full stroke. With
     x = 2H sin m the unit's moment is 2 H² k_b times sin 2m P(u) + 2κm, where u = x/d, β = 1−α,
-    P = 1 + β(2u² − 3u) and κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots are between, and they are
-    told apart where P + 2κm/sin 2m is smallest (our derivation).
+    P = 1 + β(2u² − 3u) and κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots
+    are between, and they are told apart where P + 2κm/sin 2m is smallest (our derivation).
     """
     from mpmath import asin, cos, sin
 

@@ -27,10 +27,10 @@ def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class RowRequest:
-    """What rows are to hold and how exactly: what a plan decides for all batches.
+    """The quantities of rows and their accuracy, which a plan decides for all batches.
 
     `around` and `dropped_error`, the error of the tip (mm) by what the units lack of the scene,
-    are for all states, or by lane. Without the scene's bars, what needs them is NaN.
+    are for all states, or by lane. Quantities that need the scene's bars are NaN without these.
     """
 
     formulate: Formulate

@@ -1,9 +1,9 @@
-"""How a certified state answers to its finger's values: dq/dp = −H⁻¹ ∂g/∂p, exact to rounding.
+"""Derivatives of certified states by their finger's values, dq/dp = −H⁻¹ ∂g/∂p.
 
 The Hessian H is factorized at the state already. The derivative of the gradient g by a value p
 comes from a complex step: Im g(q; p + ih)/h with h = 1e-100 (Squire and Trapp, SIAM Review 40,
-1998, 110). Nothing is subtracted, so nothing cancels, and every law and every value is covered
-by the one formula that states are solved with.
+1998, 110). It is exact to rounding: nothing is subtracted, nothing cancels, and every law and
+every value is covered by the one formula that states are solved with.
 """
 
 from collections.abc import Mapping, Sequence
