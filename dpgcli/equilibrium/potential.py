@@ -26,6 +26,7 @@ class Evaluation:
 
     @property
     def energy(self) -> Array:
+        """The sum over terms, (batch,)."""
         first, *rest = self.energies
         return sum(rest, start=first)
 

@@ -79,14 +79,17 @@ class Finger:
 
     @property
     def n_designs(self) -> int:
+        """Number of fingers in the batch."""
         return int(np.broadcast_shapes(*(v.shape for v in self.arrays().values()))[1])
 
     @property
     def is_rigid(self) -> bool:
+        """Whether all bars are rigid, k_L infinite."""
         return bool(np.isinf(self.linear_stiffness).all())
 
     @property
     def is_uniform(self) -> bool:
+        """Whether every array has one value for all units."""
         return all(values.shape[0] == 1 for values in self.arrays().values())
 
     @property

@@ -95,6 +95,7 @@ class Lattice:
 
     @cached_property
     def force_unit(self) -> Array:
+        """1: all coordinates are lengths."""
         return np.ones((self.size, 1))
 
     @cached_property
@@ -131,6 +132,7 @@ class Lattice:
         return self._rowwise(turn * self._distances())
 
     def take_lanes(self, index: Indices) -> "Lattice":
+        """The lattices of some lanes of the batch."""
         return Lattice(self.finger.take_lanes(index))
 
     def moved(self, coordinates: Array, step: Array) -> Array:
@@ -146,15 +148,18 @@ class Lattice:
         return np.stack((*base, *top), axis=1).reshape(coordinates.shape)
 
     def of_shape(self, shape: Internal) -> Array:
+        """The node positions of a shape, mm, (size, batch)."""
         chain = Chain(self.finger)
         stations = chain.stations(chain.of_shape(shape))
         nodes = np.stack(np.broadcast_arrays(*stations), axis=1)
         return nodes.reshape(-1, nodes.shape[2])
 
     def openings(self, coordinates: Array) -> Array:
+        """Extension x = |t| − L of every bistable spring, mm, (unit, batch)."""
         return extension(self._vectors(coordinates).top, self.finger.segment_length, 0)
 
     def springs(self, coordinates: Array) -> Springs:
+        """Extensions, impossible shapes, and the levers n × p and n × q, n along the spring."""
         cell = self._vectors(coordinates)
         along = cell.top / np.hypot(*cell.top)
         levers = cross(along, cell.near), cross(along, cell.far)
@@ -162,6 +167,7 @@ class Lattice:
         return Springs(self.openings(coordinates), impossible(shape), np.stack(levers))
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        """Moments of the forces on all nodes that a corner turns (our derivation)."""
         base, top = coordinates.reshape(-1, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)
         on_base, on_top = gradient.reshape(-1, 2, 2, gradient.shape[1]).transpose(1, 2, 0, 3)
         own = cross(top - base, on_top)  # of each station's strut, about the station
@@ -173,9 +179,11 @@ class Lattice:
         return -np.stack((about_near, about_far))
 
     def stations(self, coordinates: Array) -> Stations:
+        """The node positions, mm: views of the coordinates."""
         return Stations(*(coordinates[k::4] for k in range(4)))
 
     def tip(self, coordinates: Array) -> tuple[Array, Array]:
+        """Tip x, y (mm) and angle −Σ (a + b), (3, batch), and their Jacobian, (size, 3, batch)."""
         cell = self._vectors(coordinates)
         near, far = corners(cell)  # their sum counts full turns, an angle of the strut would not
         tip = np.stack((coordinates[-4], coordinates[-3], -total(near + far)))
@@ -187,5 +195,6 @@ class Lattice:
         return tip, jacobian
 
     def station_jacobian(self, coordinates: Array) -> Array:
+        """The unit matrix: nodes are the coordinates, (size, size, batch)."""
         size, batch = coordinates.shape
         return np.repeat(np.eye(size)[:, :, None], batch, axis=2)

@@ -35,10 +35,12 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
+        """The word in tables, such as `not_bistable`."""
         return self.name.lower()
 
     @property
     def meaning(self) -> str:
+        """The sentence in summaries."""
         return _MEANINGS[self]
 
 

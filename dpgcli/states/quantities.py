@@ -74,6 +74,9 @@ def named(quantities: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantit
     """The declared quantities that are named, each by its name or its group's.
 
     Raises UsageError for names that are neither, with what there is.
+
+    >>> [q.name for q in named(declared(3, ("bistable", "hinge"), False), ["energies"])]
+    ['bistable_energy_mJ', 'hinge_energy_mJ']
     """
     known = {q.name for q in quantities} | {q.group for q in quantities}
     if unknown := [name for name in names if name not in known]:

@@ -17,7 +17,11 @@ from dpgcli.states.units import Units
 
 
 def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
-    """Patterns and statuses as strings; all else unchanged."""
+    """Patterns and statuses as strings; all else unchanged.
+
+    >>> as_text(Column("status", "", "", kind=Kind.STATUS), np.array([0, 4])).tolist()
+    ['stable', 'folded']
+    """
     if column.kind is Kind.PATTERN:
         return np.asarray(values.astype(str))
     if column.kind is Kind.STATUS:
