@@ -13,7 +13,7 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
-from dpgcli.benchmark.ablation import KEEPABLE
+from dpgcli.benchmark.ablation import ABLATIONS
 from dpgcli.cli import (
     bench,
     check,
@@ -169,7 +169,7 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in README}
-    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *KEEPABLE}
+    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *ABLATIONS}
     named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

@@ -23,7 +23,7 @@ from dpgcli.calibration.interpolants import Multilinear, ThinPlates
 from dpgcli.design.calibrations import Estimate
 from dpgcli.errors import FitError
 
-SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its corners
+HULL_TOLERANCE = 1e-9  # of the ranges: rounding may put the hull's own corners outside it
 CONSTANT = "ln(value at reference)"
 
 
@@ -43,7 +43,7 @@ class Points:
 
     @cached_property
     def reference(self) -> Array:
-        """The point nearest to the middle: where a scaling law's errors are small (key,)."""
+        """The point nearest to the middle, (key,), where a scaling law's errors are small."""
         away = np.log(self.geometry)
         size = np.ptp(away, axis=0)
         away = (away - away.mean(axis=0)) / np.where(size > 0.0, size, 1.0)
@@ -57,13 +57,15 @@ class Points:
     def are_inside(self, geometry: Array) -> Flags:
         """Whether geometries (design, key) lie in the convex hull of the points, edges included."""
         scaled, own = self._scaled(np.real(geometry)), self._scaled(self.geometry)
-        in_range = ((scaled >= -SLACK) & (scaled <= own.max(axis=0) + SLACK)).all(axis=1)
+        in_range = ((scaled >= -HULL_TOLERANCE) & (scaled <= own.max(axis=0) + HULL_TOLERANCE)).all(
+            axis=1
+        )
         if len(self.over) == 1:
             return np.asarray(in_range)
-        return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=SLACK) >= 0))
+        return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=HULL_TOLERANCE) >= 0))
 
     def _scaled(self, geometry: Array) -> Array:
-        """Geometries (design, key) over the ranges of the points, which begin at 0."""
+        """Geometries (design, key) mapped so that the points range from 0 to 1 in each key."""
         size = np.ptp(self.geometry, axis=0)
         return np.asarray((geometry - self.geometry.min(axis=0)) / np.where(size > 0.0, size, 1.0))
 

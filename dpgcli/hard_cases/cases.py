@@ -42,7 +42,7 @@ def check_law(finger: Finger) -> None:
 class Case:
     """A state to find: the pattern of a variant by one formulation.
 
-    `subject` says whose finger was the base, the built-in one or the spec's.
+    `subject` names the base finger: the built-in one or the spec's.
     """
 
     subject: str
@@ -58,7 +58,7 @@ class Case:
 
     @property
     def has_own_guess(self) -> bool:
-        """Whether the search begins where the solver by itself begins."""
+        """Whether the search starts at the solver's own guess."""
         return self.variant.start == Start()
 
 
@@ -85,7 +85,7 @@ def built_in_cases(only: Sequence[str] = ()) -> Iterator[Case]:
     >>> case.family, case.variant.label, case.pattern, case.formulation
     ('stiffness', 'k_L/k_b = 1e0', '111', 'chain')
     """
-    for family in _chosen(FAMILIES, only):
+    for family in _with_names(FAMILIES, only):
         yield from _cases(BUILT_IN, family, study_finger())
 
 
@@ -93,7 +93,7 @@ def cases_of(finger: Finger, only: Sequence[str] = ()) -> Iterator[Case]:
     """States of a finger, then every family around its first, middle and last unit."""
     n = finger.n_units
     few = finger.with_units(sorted({0, n // 2, n - 1}))
-    for family in _chosen((PATTERNS, *FAMILIES), only):
+    for family in _with_names((PATTERNS, *FAMILIES), only):
         yield from _cases(GIVEN, family, finger if family is PATTERNS else few)
 
 
@@ -107,7 +107,7 @@ def check_families(names: Sequence[str]) -> None:
         )
 
 
-def _chosen(families: Sequence[Family], only: Sequence[str]) -> Iterator[Family]:
+def _with_names(families: Sequence[Family], only: Sequence[str]) -> Iterator[Family]:
     return (family for family in families if not only or family.name in only)
 
 

@@ -1,4 +1,4 @@
-"""What is pushed how far: the families of stiff and extreme variants of a finger."""
+"""Families of stiff and extreme variants of a finger, each of which varies one property."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
 ALL_PATTERNS_UP_TO = 4  # units
-GRADED = 4  # units
-LONG = 30  # units: of longer fingers one pattern has to do, since extended precision is slow
-FOLDING = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
+N_GRADED = 4  # units
+LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
+FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
-TURNED = {  # near and far corner (rad), and the pattern that the dome's opening looks like
+FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
     "straight": ((0.0, 0.0), "0"),
     "inverted": ((0.15, 0.15), "1"),
     "folded inward": ((-3.0, -3.0), "0"),
@@ -36,7 +36,7 @@ TURNED = {  # near and far corner (rad), and the pattern that the dome's opening
 
 @dataclass(frozen=True)
 class Start:
-    """Where a search begins; by default, at the pattern's own geometric guess.
+    """The start of a search; by default, the pattern's own geometric guess.
 
     Else each inverted unit is opened by `strokes` strokes, or the corners of every unit, near
     and far, are at `corners` (rad).
@@ -48,9 +48,9 @@ class Start:
 
 @dataclass(frozen=True)
 class Variant:
-    """A finger of one design, pushed some way; no patterns stand for `few_patterns`.
+    """A finger of one design with the patterns to solve; none stand for `few_patterns`.
 
-    The solver gets its lengths in another unit, `scale` of which are a mm.
+    The solver gets lengths in another unit, with `scale` of these units in a mm.
     """
 
     label: str
@@ -61,15 +61,14 @@ class Variant:
 
 
 class Family(NamedTuple):
-    """Variants of a base finger that go together."""
+    """Variants of a base finger in one property."""
 
     name: str
-    meaning: str
     variants: Callable[[Finger], Iterator[Variant]]
 
 
 def repeated(finger: Finger, n_units: int) -> Finger:
-    """A finger of n units that goes through those of another again and again."""
+    """A finger of n units that repeats those of another in turn."""
     return finger.with_units([unit % finger.n_units for unit in range(n_units)])
 
 
@@ -104,7 +103,7 @@ def few_patterns(n_units: int, *, with_ground: bool = False) -> tuple[str, ...]:
     >>> few_patterns(3), few_patterns(1, with_ground=True)
     (('111', '101'), ('1', '0'))
     """
-    if n_units >= LONG:
+    if n_units >= LONG_FINGER:
         return (("1000" * n_units)[:n_units],)
     ground = ("0" * n_units,) if with_ground else ()
     patterns = ("1" * n_units, ("10" * n_units)[:n_units], *ground)
@@ -138,7 +137,7 @@ def _linearity(base: Finger) -> Iterator[Variant]:
 
 
 def _stroke(base: Finger) -> Iterator[Variant]:
-    """Up to half a turn of one unit; a softer hinge lets wide openings rest."""
+    """Strokes up to half a turn of one unit; a softer hinge lets wide openings rest."""
     for value in (1e-3, 1e-2, 0.1, 1.0):
         yield from _both(f"d = {value:g} mm", changed(base, stroke=value))
     height = base.segment_height.max()
@@ -151,7 +150,9 @@ def _stroke(base: Finger) -> Iterator[Variant]:
 def _length(base: Finger) -> Iterator[Variant]:
     for n in (1, 2, 5, 8, 13, 32, 64):
         yield from _both(f"n = {n}", repeated(base, n))
-    yield Variant(f"n = {LONG}, in a ring", repeated(base, LONG), ("1" * LONG,))
+    yield Variant(
+        f"n = {LONG_FINGER}, in a ring", repeated(base, LONG_FINGER), ("1" * LONG_FINGER,)
+    )
 
 
 def _hinge(base: Finger) -> Iterator[Variant]:
@@ -168,8 +169,8 @@ def _scale(base: Finger) -> Iterator[Variant]:
 
 def _graded(base: Finger) -> Iterator[Variant]:
     """Four units that differ by orders of magnitude, step by step or by turns."""
-    finger = repeated(base, GRADED)
-    steps, by_turns = np.logspace(-3.0, 3.0, GRADED), np.resize([1e-3, 1e3], GRADED)
+    finger = repeated(base, N_GRADED)
+    steps, by_turns = np.logspace(-3.0, 3.0, N_GRADED), np.resize([1e-3, 1e3], N_GRADED)
     fingers = {}
     for words, factors in (("from 1e-3 to 1e3", steps), ("1e-3 and 1e3 by turns", by_turns)):
         domes = factors[:, None] * finger.bistable_stiffness
@@ -178,13 +179,13 @@ def _graded(base: Finger) -> Iterator[Variant]:
         fingers[f"k_θ × {words}"] = changed(finger, hinge_stiffness=hinges)
         both = changed(finger, bistable_stiffness=domes, hinge_stiffness=hinges)
         fingers[f"k_b and k_θ × {words}"] = both
-    strokes, lengths = np.logspace(-2.0, 0.8, GRADED), np.logspace(2.0, -0.5, GRADED)
+    strokes, lengths = np.logspace(-2.0, 0.8, N_GRADED), np.logspace(2.0, -0.5, N_GRADED)
     fingers["d from 0.01 to 6.3 mm"] = changed(finger, stroke=strokes)
     fingers["L from 100 to 0.3 mm"] = changed(finger, segment_length=lengths)
-    linearities = np.resize([0.0, 0.2], GRADED)
+    linearities = np.resize([0.0, 0.2], N_GRADED)
     fingers["α = 0 and 0.2 by turns"] = changed(finger, force_linearity=linearities)
     for label, graded in fingers.items():
-        patterns = dict.fromkeys((*few_patterns(GRADED), _all_that_can(graded)))
+        patterns = dict.fromkeys((*few_patterns(N_GRADED), _all_that_can(graded)))
         yield from _both(label, graded, patterns=tuple(patterns))
 
 
@@ -195,7 +196,7 @@ def _all_that_can(finger: Finger) -> str:
 
 
 def _wells(base: Finger) -> Iterator[Variant]:
-    """Both wells at nearly the same energy: α and the hinge almost nothing."""
+    """Wells of nearly the same energy: α and the hinge's stiffness nearly zero."""
     for linearity, part in ((1e-2, 1e-2), (1e-4, 1e-4), (1e-8, 1e-4), (0.0, 1e-4), (1e-12, 1e-6)):
         hinge = part * base.hinge_stiffness
         even = changed(base, force_linearity=linearity, hinge_stiffness=hinge)
@@ -203,7 +204,7 @@ def _wells(base: Finger) -> Iterator[Variant]:
 
 
 def _guess(base: Finger) -> Iterator[Variant]:
-    """Between stiff bars too: the geometric guess would be the answer already."""
+    """Starts away from the geometric guess, which between stiff bars is the answer already."""
     for strokes in (0.5, 0.6, 0.75, 0.9, 1.0, 1.25, 1.5, 2.0):
         yield from _both(
             f"{strokes:g} stroke{'s' * (strokes != 1.0)}", base, start=Start(strokes=strokes)
@@ -214,11 +215,11 @@ def _guess(base: Finger) -> Iterator[Variant]:
 
 
 def _fold(base: Finger) -> Iterator[Variant]:
-    """The weakest unit alone, up to where it loses its second well, and beyond."""
+    """The weakest unit alone, at and beyond the loss of its second well."""
     unit = base.with_units([int(np.argmin(margins(base).force_linearity))])
     folds = limits(unit)
     stiff = _with_bars(unit, 1e9)
-    for name in FOLDING:
+    for name in FOLD_SYMBOLS:
         limit = float(getattr(folds, name)[0])
         yield from _approach("k_L = ∞", rigid(unit), name, limit)
         yield from _approach("k_L/k_b = 1e9", stiff, name, limit)
@@ -229,16 +230,16 @@ def _fold(base: Finger) -> Iterator[Variant]:
 
 
 def _approach(bars: str, finger: Finger, name: str, limit: float) -> Iterator[Variant]:
-    """A value's way to its limit, and a bit beyond; none where there is no limit."""
+    """Variants with a value near its limit, on both sides; none without a limit."""
     for distance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, -1e-12, -1e-7, -1e-2):
         if limit > 0.0:
             at = changed(finger, **{name: limit * (1.0 - distance)})
             side = f"fold − {distance:g}" if distance > 0.0 else f"fold + {-distance:g}"
-            yield Variant(f"{FOLDING[name]} at {side}, {bars}", at, ("1",))
+            yield Variant(f"{FOLD_SYMBOLS[name]} at {side}, {bars}", at, ("1",))
 
 
 def _last_linearity(unit: Finger) -> float:
-    """The α from which on a unit with elastic bars does not rest beyond its barrier."""
+    """The largest α with which a unit with elastic bars still rests beyond its barrier."""
 
     def rests(linearity: Array) -> Flags:
         units = Units.of(changed(unit, force_linearity=linearity))
@@ -250,16 +251,16 @@ def _last_linearity(unit: Finger) -> float:
 
 
 def _crossed(base: Finger) -> Iterator[Variant]:
-    """Every unit as near to its loss of bistability, between bars from soft to very stiff."""
-    grades = np.linspace(0.7, 1.4, GRADED)
-    uniform, graded = repeated(base, GRADED), repeated(base.with_units([0]), GRADED)
+    """Units equally near to their loss of bistability, between bars from soft to very stiff."""
+    grades = np.linspace(0.7, 1.4, N_GRADED)
+    uniform, graded = repeated(base, N_GRADED), repeated(base.with_units([0]), N_GRADED)
     fingers = {
         "1 unit": base.with_units([0]),
         "1 unit of short stroke": changed(
             base.with_units([0]), stroke=0.07 * base.segment_height[0]
         ),
-        f"{GRADED} units": uniform,
-        f"{GRADED} graded units": changed(
+        f"{N_GRADED} units": uniform,
+        f"{N_GRADED} graded units": changed(
             graded,
             stroke=grades * graded.stroke[0],
             bistable_stiffness=grades[::-1] * graded.bistable_stiffness[0],
@@ -274,24 +275,24 @@ def _crossed(base: Finger) -> Iterator[Variant]:
 
 
 def _mirror(base: Finger) -> Iterator[Variant]:
-    """One unit, from shapes that no finger takes: each is next to a minimum of the equations."""
+    """One unit from impossible shapes, each next to a minimum of the equations."""
     unit = base.with_units([0])
-    for name, (corners, pattern) in TURNED.items():
+    for name, (corners, pattern) in FOLDED_STARTS.items():
         yield from _both(f"from {name}", unit, patterns=(pattern,), start=Start(corners=corners))
 
 
-PATTERNS = Family("patterns", "states of the finger as it is given", _patterns)
+PATTERNS = Family("patterns", _patterns)  # states of the finger as it is given
 FAMILIES = (
-    Family("stiffness", "k_L/k_b from 1 to 1e15, and infinite", _stiffness),
-    Family("linearity", "α from 0 through the loss of bistability to 1", _linearity),
-    Family("stroke", "d from 1e-3 mm to more than twice the height", _stroke),
-    Family("length", "1 to 64 units", _length),
-    Family("hinge", "k_θ from 0 to 1e12 N mm/rad", _hinge),
-    Family("scale", "lengths in m, µm, km and nm give the answer in mm", _scale),
-    Family("graded", "units that differ by orders of magnitude", _graded),
-    Family("wells", "two wells of nearly the same energy", _wells),
-    Family("guess", "searches that begin at 0.5 to 2 strokes", _guess),
-    Family("fold", "α, k_θ and d at the loss of bistability, to 1e-12 of it", _fold),
-    Family("crossed", "k_L, the distance to the fold, units and grading at once", _crossed),
-    Family("mirror", "searches that begin folded through or mirrored", _mirror),
+    Family("stiffness", _stiffness),  # k_L/k_b from 1 to 1e15, and infinite
+    Family("linearity", _linearity),  # α from 0 through the loss of bistability to 1
+    Family("stroke", _stroke),  # d from 1e-3 mm to more than twice the height
+    Family("length", _length),  # 1 to 64 units
+    Family("hinge", _hinge),  # k_θ from 0 to 1e12 N mm/rad
+    Family("scale", _scale),  # lengths in m, µm, km and nm give the answer in mm
+    Family("graded", _graded),  # units that differ by orders of magnitude
+    Family("wells", _wells),  # two wells of nearly the same energy
+    Family("guess", _guess),  # searches that begin at 0.5 to 2 strokes
+    Family("fold", _fold),  # α, k_θ and d at the loss of bistability, to 1e-12 of it
+    Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
+    Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

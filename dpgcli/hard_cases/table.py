@@ -1,4 +1,4 @@
-"""What a gauntlet came to: a table row for every case, and a line for every family."""
+"""Results of the hard cases: a table row for every case, a summary for every family."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ STRESS_COLUMNS = (
 
 
 def rows(outcomes: Sequence[Outcome]) -> Columns:
-    """Columns of `STRESS_COLUMNS` by name; true errors of what is not called stable are NaN."""
+    """Columns of `STRESS_COLUMNS` by name, a row for each outcome."""
     cases, answers = [o.case for o in outcomes], [o.answer for o in outcomes]
     return {
         "subject": np.array([case.subject for case in cases]),
@@ -87,10 +87,10 @@ def summarized(outcomes: Iterable[Outcome]) -> list[FamilySummary]:
     for outcome in outcomes:
         case = outcome.case
         groups.setdefault((case.subject, case.family, case.formulation), []).append(outcome)
-    return [_summary(names, members) for names, members in groups.items()]
+    return [_family_summary(names, members) for names, members in groups.items()]
 
 
-def _summary(names: tuple[str, str, str], outcomes: list[Outcome]) -> FamilySummary:
+def _family_summary(names: tuple[str, str, str], outcomes: list[Outcome]) -> FamilySummary:
     found = [outcome for outcome in outcomes if outcome.verdict is Verdict.RIGHT]
     bent = [o.answer for o in found if "1" in o.case.pattern]
     verdicts = [outcome.verdict for outcome in outcomes]

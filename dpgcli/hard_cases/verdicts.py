@@ -1,7 +1,7 @@
-"""Hold the solver's answers to hard cases against extended precision.
+"""Judge the solver's answers to hard cases by extended precision.
 
-The truth is what `extended` finds from the shape that the solver called stable, and, where it
-called none so, from a start of extended's own too.
+The truth is the equilibrium that `reference` finds from the shape that the solver called stable
+and, where it called none stable, from the reference's own start too.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,14 +24,25 @@ from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 from dpgcli.states.wells import inverted_wells
 
-AT_FOLD = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
+FOLD_DISTANCE = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
 FOLD_FACTOR = 4.0
-FAINT = 1e-6  # of a spring's stiffness: a curvature by nodes that may be called marginal
+MARGINAL_EIGENVALUE = (
+    1e-6  # of a spring's stiffness: a curvature by nodes that may be called marginal
+)
 LARGEST_CONDITION = 1.0 / np.finfo(float).eps  # what doubles can tell from infinity
 
 
 class Verdict(StrEnum):
-    """What an answer is worth, by extended precision."""
+    """Assessment of the solver's answer to a case by extended precision.
+
+    - right: called stable, and it is, with an error within the stated one
+    - recognized: a minimum that is not the pattern's, and not called stable
+    - no such state: not called stable, and extended precision finds no such state either
+    - marginal: refused as marginal; it is a minimum, but its curvature nearly vanishes
+    - missed: not called stable, though extended precision finds the state
+    - overconfident: called stable, and it is, but its error exceeds the stated one
+    - wrong: called stable, but it is not
+    """
 
     RIGHT = "right"
     RECOGNIZED = "recognized"
@@ -41,28 +52,14 @@ class Verdict(StrEnum):
     OVERCONFIDENT = "overconfident"
     WRONG = "wrong"
 
-    @property
-    def meaning(self) -> str:
-        return _MEANINGS[self]
-
-
-_MEANINGS = {
-    Verdict.RIGHT: "called stable, and it is, with an error within the stated one",
-    Verdict.RECOGNIZED: "a minimum that is not the pattern's, and not called stable",
-    Verdict.NO_SUCH_STATE: "not called stable, and extended precision finds no such state either",
-    Verdict.MARGINAL: "refused as marginal; it is a minimum, but its curvature nearly vanishes",
-    Verdict.MISSED: "not called stable, though extended precision finds the state",
-    Verdict.OVERCONFIDENT: "called stable, and it is, but its error exceeds the stated one",
-    Verdict.WRONG: "called stable, but it is not",
-}
-
 
 @dataclass(frozen=True)
 class Answer:
-    """What the solver says to a case, with lengths in mm.
+    """The solver's answer to a case, with lengths in mm.
 
-    `nodes` (4 n, 1) and `pose` (3,) are where the search ended, whatever its status;
-    `tip_error` (mm) and `angle_error` (rad) the errors that it states.
+    `nodes` (4 n, 1) in mm and `pose` (3,), tip x, y (mm) and angle (rad), are those at the end of
+    the search, whatever its status; `tip_error` (mm) and `angle_error` (rad) are the errors that
+    the solver states; `residual` and `residual_floor` in N.
     """
 
     status: Status
@@ -79,7 +76,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Outcome:
-    """An answer with its verdict, and its true errors (mm, rad), NaN where there is no truth."""
+    """An answer with its verdict and its true errors (mm, rad), NaN without a true state."""
 
     case: Case
     answer: Answer
@@ -89,7 +86,7 @@ class Outcome:
 
     @property
     def is_failure(self) -> bool:
-        """Missing a state is a failure of the chain alone, and from its own guess alone."""
+        """Whether the command fails; a missed state counts for the chain's own guess only."""
         is_default = self.case.formulation == "chain" and self.case.has_own_guess
         return self.verdict in _ALWAYS_FAIL or (self.verdict is Verdict.MISSED and is_default)
 
@@ -98,7 +95,7 @@ _ALWAYS_FAIL = (Verdict.WRONG, Verdict.OVERCONFIDENT)
 
 
 def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
-    """Put cases to the solver and judge what it says; needs mpmath.
+    """Solve cases and judge the answers, one at a time; needs mpmath.
 
     >>> from dpgcli.hard_cases.cases import built_in_cases
     >>> outcome = next(stress(built_in_cases(["scale"])))
@@ -110,7 +107,7 @@ def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of mechanisms
 def answered(case: Case) -> Answer:
-    """What the solver says, in the case's own units of length."""
+    """Solve a case in its own unit of length; the answer is in mm."""
     scale = case.variant.scale
     units = Units.of(scaled(case.variant.finger, scale))
     settled = _settled(case, units)
@@ -133,7 +130,14 @@ def answered(case: Case) -> Answer:
 
 
 def scaled(finger: Finger, scale: float) -> Finger:
-    """The finger with lengths in another unit, `scale` of which are a mm; forces stay in N."""
+    """The finger with lengths in another unit; forces stay in N.
+
+    `scale` is the number of these units in a mm, such as 1e-3 for meters.
+
+    >>> from dpgcli.hard_cases.cases import study_finger
+    >>> float(scaled(study_finger(), 1e-3).segment_length[0, 0])  # m
+    0.0135
+    """
     lengths = ("segment_length", "segment_height", "stroke", "hinge_stiffness")
     arrays = finger.arrays()
     changes = {name: arrays[name] * scale for name in lengths}
@@ -142,7 +146,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
 
 
 def _settled(case: Case, units: Units) -> Settled:
-    """Where the search ends, from wherever the case begins it."""
+    """Solve from the case's start: its corner angles, its strokes, or the solver's own guess."""
     begin, shape = case.variant.start, None
     if begin.corners is not None:
         rest = np.zeros((1, 1))
@@ -155,7 +159,7 @@ def _settled(case: Case, units: Units) -> Settled:
 
 
 def _numerics(potential: FingerPotential, coordinates: Array) -> tuple[float, float]:
-    """What rounding leaves of the residual (N), and the condition of the Hessian H.
+    """The residual's rounding floor (N) and the condition of the Hessian H.
 
     Each coordinate q is stored to within ε/2 of itself, and evaluating as much again: ε |H| |q|.
     The condition, in the 2-norm, is that of H scaled to a unit diagonal: of what no choice of
@@ -183,7 +187,7 @@ def _dense(band: Array) -> Array:
 
 
 def judged(case: Case, answer: Answer) -> Outcome:
-    """Hold an answer against extended precision."""
+    """The answer's verdict and true errors by extended precision."""
     if answer.status != Status.STABLE:
         return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)
     truth = _next_to(case, answer)
@@ -198,7 +202,7 @@ def judged(case: Case, answer: Answer) -> Outcome:
 
 
 def _next_to(case: Case, answer: Answer) -> ExtendedStates:
-    """What extended precision finds from where the search ended."""
+    """The equilibrium in extended precision next to the end of the solver's search."""
     return extended_states(case.variant.finger, case.inverted, answer.nodes)
 
 
@@ -207,7 +211,7 @@ def _is_state(truth: ExtendedStates) -> bool:
 
 
 def _refusal(case: Case, answer: Answer) -> Verdict:
-    """Whether there was a state to be found where none was called stable."""
+    """The verdict on an answer that is not stable: was there a state to find?"""
     if case.variant.start.corners is not None:
         truth = _next_to(case, answer)
         if truth.is_minimum[0] and not truth.in_pattern[0]:
@@ -218,16 +222,18 @@ def _refusal(case: Case, answer: Answer) -> Verdict:
         truth = _next_to(case, answer)
     if not _is_state(truth):
         return Verdict.NO_SUCH_STATE
-    is_faint = truth.min_eigenvalue[0] < FAINT * case.variant.finger.bistable_stiffness.max()
+    is_faint = (
+        truth.min_eigenvalue[0] < MARGINAL_EIGENVALUE * case.variant.finger.bistable_stiffness.max()
+    )
     is_marginal = answer.status is Status.MARGINAL and is_faint
     return Verdict.MARGINAL if is_marginal else Verdict.MISSED
 
 
 def _is_at_fold(case: Case) -> bool:
-    """Whether α is within 1e-8 of where, with rigid bars, an inverted unit loses its well."""
+    """Whether α is within 1e-8 of an inverted unit's loss of bistability with rigid bars."""
     finger = case.variant.finger
     below, above = (
         inverted_wells(replace(finger, force_linearity=finger.force_linearity + by)).exists
-        for by in (-AT_FOLD, AT_FOLD)
+        for by in (-FOLD_DISTANCE, FOLD_DISTANCE)
     )
     return bool(((below != above) & case.inverted).any())

@@ -56,7 +56,7 @@ def _worst_and_mean(errors: "Array", unit: str) -> str:
 def draw_comparison(
     known: KnownStates, found: Comparison, calibrated: Comparison | None, name: str, path: Path
 ) -> None:
-    """Draw each state's limiting layer to its tip, and what is known, to an SVG or PNG file."""
+    """Draw each predicted limiting layer beside the known tip and shape, to SVG or PNG."""
     from matplotlib import colormaps
 
     words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": titled(name)}

@@ -38,7 +38,7 @@ class _Shape:
 
 
 def _shapes(rows: dict[str, Any], n_units: int, is_gripper: bool) -> Iterator[_Shape]:
-    """Shapes of the certified states; labels only where there is room, and once a state."""
+    """Draw the shapes of certified states; few of them with labels, one for each state."""
     stable = np.flatnonzero(rows["status"] == "stable")
     for state in stable:
         for finger in ("upper_", "lower_") if is_gripper else ("",):

@@ -14,7 +14,7 @@ from dpgcli.reports.drawing import figure_to, titled
 
 @dataclass(frozen=True)
 class FitFigure:
-    """What to draw: `line` is the fitted law, x and y; labels name their units.
+    """The content of a figure: `line` is the fitted law, x and y; labels name their units.
 
     `gaps` are stretches of x in which there are no data.
     """

@@ -1,4 +1,4 @@
-"""Fits in rows and in words: values with their errors, and how well the model meets the data."""
+"""Fits as rows and in words: values, their errors, and the quality of the fit."""
 
 import math
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ def quantity_rows(law: Law) -> tuple[tuple[Column, ...], Columns]:
 
 
 def quality(fit: Fit, unit: str) -> str:
-    """How well the model meets the data, in words."""
+    """The quality of a fit in words: residual, R², strongest correlation."""
     if fit.n_points <= sum(parameter.is_free for parameter in fit.parameters):
         return f"{fit.n_points} point{'s' * (fit.n_points != 1)}, met exactly"
     text = f"{fit.n_points} points: rms residual {fit.rms:.3g} {unit}"
@@ -105,7 +105,7 @@ def bistable_summary(found: BistableFit, choice: Choice) -> Iterator[str]:
 
 
 def hinge_summary(found: HingeFit) -> Iterator[str]:
-    """Quality, and the stiffness at both ends where it is not the same."""
+    """Quality, and the secant stiffness at both ends if they differ."""
     yield quality(found.fit, "N mm")
     near, far = found.secants
     if near != far:
@@ -131,7 +131,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
 
 
 def grid_summary(law: Law, table: Table) -> Iterator[str]:
-    """Points, over what, and what they share."""
+    """The number of points, their keys, and the values that all points share."""
     points = law.points
     reference = ", ".join(
         f"{key} {value:g}" for key, value in zip(points.over, points.reference, strict=True)

@@ -52,7 +52,7 @@ def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, An
 
 
 def verdicts_markdown(verdicts: Sequence[Verdict]) -> str:
-    """What a check found, with the first designs that fail each requirement."""
+    """Verdicts on requirements as Markdown, with the first designs that fail each."""
     lines: list[str | Table] = []
     for verdict in verdicts:
         lines.append(str(verdict))

@@ -1,4 +1,4 @@
-"""Error against run time: a figure, the same in plain text, and what it comes to."""
+"""Error against run time: a figure, the same in plain text, and its conclusions."""
 
 import math
 from collections.abc import Sequence
@@ -11,8 +11,8 @@ from dpgcli.reports.drawing import drawn_to, titled
 Row = dict[str, Any]
 
 WIDTH, HEIGHT = 64, 18
-EXACT = 0.1  # of the smallest error: what is exact is drawn there
-SLOWER = 2.0  # times its recorded ratio: more than the noise of a shared machine
+ZERO_DRAWN_AT = 0.1  # of the smallest error
+SLOWDOWN = 2.0  # of its recorded ratio: more than the noise of a shared machine
 MARKS = "abcdefghijklmnopqrstuvwxyz"
 COLORS = {"ladder": "#0072B2", "one finger": "#56B4E9", "peer": "#D55E00"}  # Okabe and Ito
 MARKERS = {"ladder": "o", "one finger": "s", "peer": "^"}
@@ -36,13 +36,13 @@ def model_error(rows: Sequence[Row]) -> float | None:
 
 
 def _least_drawn(rows: Sequence[Row]) -> float:
-    """Where errors of zero go (mm) on axes that have no zero."""
+    """The error (mm) at which zero is drawn on a logarithmic axis."""
     errors = [row["max_tip_error_mm"] for row in points(rows)]
-    return EXACT * min((error for error in errors if error > 0.0), default=1.0)
+    return ZERO_DRAWN_AT * min((error for error in errors if error > 0.0), default=1.0)
 
 
 def cheapest_way(rows: Sequence[Row], target: float) -> str:
-    """A sentence: which way is the cheapest below an error (mm)."""
+    """A sentence that names the cheapest method below an error (mm)."""
     meets = [
         row
         for row in rows
@@ -71,9 +71,9 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     low, high = math.floor(min(up)), math.ceil(top)
     grid = [[" "] * WIDTH for _ in range(HEIGHT)]
     if model is not None:
-        grid[_place(math.log10(model), high, low, HEIGHT)] = list("-" * WIDTH)
+        grid[_cell(math.log10(model), high, low, HEIGHT)] = list("-" * WIDTH)
     for x, y, mark in zip(across, up, MARKS, strict=False):
-        _mark(grid[_place(y, high, low, HEIGHT)], _place(x, left, right, WIDTH), mark)
+        _mark(grid[_cell(y, high, low, HEIGHT)], _cell(x, left, right, WIDTH), mark)
     heads = {0: f"1e{high:+03d}", HEIGHT - 1: f"1e{low:+03d}"}
     lines = ["largest tip error, mm"]
     lines += [f"{heads.get(i, ''):>6} |{''.join(line)}".rstrip() for i, line in enumerate(grid)]
@@ -95,8 +95,8 @@ def _mark(line: list[str], place: int, mark: str) -> None:
     line[next(free, place)] = mark
 
 
-def _place(value: float, first: float, last: float, size: int) -> int:
-    """Where a value lies between the first and the last of `size` places."""
+def _cell(value: float, first: float, last: float, size: int) -> int:
+    """The index of a value among `size` cells from `first` to `last`."""
     share = (value - first) / (last - first) if last != first else 0.0
     return min(size - 1, max(0, round(share * (size - 1))))
 
@@ -145,7 +145,7 @@ def _which(row: Row) -> str:
 
 
 def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
-    """What takes a larger multiple of the NumPy kernel's time than it took when recorded."""
+    """Slowdowns against a record, by times relative to the NumPy kernel's, in words."""
     key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
     before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
     slower, n_compared = [], 0
@@ -155,7 +155,7 @@ def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
             continue
         n_compared += 1
         ratio = row["relative_time"] / old
-        if ratio > SLOWER:
+        if ratio > SLOWDOWN:
             slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, {_which(row)}")
-    verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWER}"
+    verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWDOWN}"
     return [verdict, *slower]

@@ -1,4 +1,4 @@
-"""What a design space comes to: sections of text and tables, as `page` renders them.
+"""The summary of a design space: sections of text and tables, which `page` renders.
 
 Same table and facts, same sections: what differs between runs comes from the facts alone.
 """
@@ -34,7 +34,7 @@ WITHOUT_REASON = {
     "excluded": "a constraint is not met",
     "partly_stable": "some patterns have no certified state; states.parquet says why",
 }
-ALIKE = 1e-9  # relative
+RELATIVE_EQUALITY = 1e-9  # relative
 MOST_ROWS = 30
 LONGEST_LIST = 500  # characters
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
@@ -56,7 +56,7 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """A table of designs, and how its numbers are written."""
+    """A table of designs with the units of its columns, and its numbers as text."""
 
     designs: pd.DataFrame
     units: Mapping[str, str]
@@ -105,7 +105,7 @@ class DesignSpace:
 
 
 def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Section]:
-    """All there is to say about a space; `facts` are those of the run that made it."""
+    """All sections about a space; `facts` are those of the run that made it."""
     counted = Section("Design space", [_extent(space)])
     if not len(space.designs):
         return [counted, *_times(facts)]
@@ -161,7 +161,7 @@ def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Itera
     if is_alike(merit):
         ends = {"all alike": merit.max()}
     for word, end in ends.items():
-        alike = values.index[np.isclose(merit, end, rtol=ALIKE, atol=0)]
+        alike = values.index[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
         others = f" and {len(alike) - 1:,} more" if len(alike) > 1 else ""
         value = space.shown(name, values[alike[0]])
         yield [name, word, value, space.number(alike[0]) + others, *space.point(alike[0])]
@@ -169,11 +169,11 @@ def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Itera
 
 def is_alike(values: Any) -> bool:
     """Whether values differ by no more than rounding."""
-    return bool(np.isclose(values.max(), values.min(), rtol=ALIKE, atol=0))
+    return bool(np.isclose(values.max(), values.min(), rtol=RELATIVE_EQUALITY, atol=0))
 
 
 def _failures(space: DesignSpace) -> list[str | Table]:
-    """Designs that are not stable, grouped by their reasons, which differ in numbers only."""
+    """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
     others = space.of_status(*STATUSES[1:])
     if others.empty:
         return ["Every design is stable."]
@@ -258,6 +258,6 @@ def _fact(key: str, value: Any) -> str:
 
 
 def shortened(table: Table, n_rows: int) -> list[str | Table]:
-    """A table, and how many rows it would have more."""
+    """A table, and a line that counts the rows left out."""
     n_more = n_rows - len(table.rows)
     return [table, f"And {n_more:,} more."] if n_more else [table]

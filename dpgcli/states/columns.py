@@ -5,7 +5,7 @@ from enum import StrEnum
 
 
 class Kind(StrEnum):
-    """What a column holds; patterns are bytes, statuses codes, counts whole numbers."""
+    """The type of a column: patterns are bytes, statuses codes, counts whole numbers."""
 
     PATTERN = "pattern"
     STATUS = "status"

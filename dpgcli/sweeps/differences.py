@@ -1,4 +1,4 @@
-"""What differs between two runs, by what their metadata say."""
+"""Differences between the metadata of two runs."""
 
 import json
 from typing import Any

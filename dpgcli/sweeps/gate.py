@@ -15,7 +15,7 @@ from dpgcli.text import printable
 
 @dataclass(frozen=True)
 class Failure:
-    """A design that does not meet a requirement, and what was found in it."""
+    """A design that fails a requirement, with the values found in it."""
 
     design: int
     values: dict[str, float]

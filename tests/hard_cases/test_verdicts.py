@@ -7,7 +7,7 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.hard_cases.cases import Case, built_in_cases, study_finger
-from dpgcli.hard_cases.families import FAMILIES, TURNED, Start, Variant, changed, rigid
+from dpgcli.hard_cases.families import FAMILIES, FOLDED_STARTS, Start, Variant, changed, rigid
 from dpgcli.hard_cases.table import STRESS_COLUMNS, rows, summarized
 from dpgcli.hard_cases.verdicts import Verdict, answered, judged, scaled, stress
 from dpgcli.mechanics.chain import Chain
@@ -67,13 +67,13 @@ def test_a_saddle_called_stable_is_wrong() -> None:
     assert (outcome.verdict, outcome.is_failure) == (Verdict.WRONG, True)
 
 
-@pytest.mark.parametrize("corners", [turned[0] for turned in TURNED.values()])
+@pytest.mark.parametrize("corners", [turned[0] for turned in FOLDED_STARTS.values()])
 def test_whatever_is_no_state_is_wrong_when_called_stable(corners: tuple[float, float]) -> None:
     """The two physical minima are right for their own pattern only, the others for none."""
     turned = answered(case_of(UNIT, "1", start=Start(corners=corners)))
     called = replace(turned, status=Status.STABLE)
     outcome = judged(case_of(UNIT, "1", start=Start(corners=corners)), called)
-    own = Verdict.RIGHT if corners == TURNED["inverted"][0] else Verdict.WRONG
+    own = Verdict.RIGHT if corners == FOLDED_STARTS["inverted"][0] else Verdict.WRONG
     assert outcome.verdict is own
     assert outcome.is_failure is (own is Verdict.WRONG)
 
@@ -265,11 +265,6 @@ def test_a_family_with_nothing_right_has_no_numbers() -> None:
     (summary,) = summarized([judged(case, straight)])
     assert (summary.n_failures, summary.verdicts[Verdict.WRONG]) == (1, 1)
     assert np.isnan([summary.condition, summary.true_tip_error, summary.iterations]).all()
-
-
-def test_every_verdict_and_family_has_a_meaning() -> None:
-    assert all(verdict.meaning for verdict in Verdict)
-    assert len({verdict.meaning for verdict in Verdict}) == len(Verdict)
 
 
 @pytest.mark.slow

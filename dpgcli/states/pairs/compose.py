@@ -57,7 +57,7 @@ class _Block:
 
 
 class _Fit(NamedTuple):
-    """How well two halves agree at the shared strut."""
+    """Residuals and errors of pairs by the disagreement of their halves at the shared strut."""
 
     residual: Array
     relative_residual: Array

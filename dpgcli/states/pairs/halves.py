@@ -36,7 +36,7 @@ from dpgcli.states.units import Units
 
 @dataclass(frozen=True)
 class Joint:
-    """How a half holds the shared strut, arrays of shape (entry,), mm and N.
+    """A half's force and stiffness at the shared strut, arrays of shape (entry,), mm and N.
 
     `extension` s of the strut in the half's own solution, `force` the half's force on it
     (∂E/∂s), `stiffness` the derivative of that force and `tip_motion` the motion of the finger's
@@ -102,13 +102,13 @@ class Split:
 
     @property
     def weakest(self) -> float:
-        """What the weakest unit bears in its weaker well, N; see `Batch.is_balanced`."""
+        """The smallest holding force of a unit in either well, N; see `certify`."""
         wells = self.units.wells
         return float(np.minimum(np.abs(wells.reset_force), wells.snap_force).min())
 
     @cached_property
     def strut_force(self) -> float:
-        """The forces in play at the shared strut in the state in which they are smallest, N."""
+        """The forces in play at the shared strut in the ground state, the smallest, N."""
         ground = np.zeros((self.n_units, 1), bool)
         chain = Chain(self.units.finger.with_domes(ground))
         return float(chain.gradient_scale[4 * self.n_inner - 1, 0])
@@ -215,7 +215,7 @@ def _inner_joint(
 def _outer_joint(
     settled: Settled, context: Potential[Chain], at_context: Evaluation, jacobian: Array
 ) -> Joint:
-    """A unit force on the strut moves context and outer half: what the context takes is known.
+    """The outer half's joint: a unit force on the strut moves both; the context's part is known.
 
     Uses up the context's Hessian.
     """
