@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.predict import explain, predict, validate
+    from dpgcli.api.report import report
     from dpgcli.api.stress import stress
+    from dpgcli.api.sweep import merge, sweep
     from dpgcli.errors import (
         DpgError,
         FitError,
@@ -54,9 +56,12 @@ __all__ = [
     "fit_finger",
     "fit_grid",
     "fit_hinge",
+    "merge",
     "predict",
     "read_calibration",
+    "report",
     "stress",
+    "sweep",
     "uniform_finger",
     "validate",
 ]
@@ -70,9 +75,12 @@ _HOMES = {
     "fit_finger": "api.fits.finger",
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
+    "merge": "api.sweep",
     "predict": "api.predict",
     "read_calibration": "files.calibration",
+    "report": "api.report",
     "stress": "api.stress",
+    "sweep": "api.sweep",
     "uniform_finger": "mechanics.finger",
     "validate": "api.predict",
 }
