@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.finger import fit_finger
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
-    from dpgcli.api.predict import explain, predict, validate
+    from dpgcli.api.predict import explain, predict
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.validate import validate
     from dpgcli.errors import (
         DpgError,
         FitError,
@@ -82,7 +83,7 @@ _HOMES = {
     "stress": "api.stress",
     "sweep": "api.sweep",
     "uniform_finger": "mechanics.finger",
-    "validate": "api.predict",
+    "validate": "api.validate",
 }
 
 

@@ -1,4 +1,4 @@
-"""`predict`, `explain` and `validate`: the stable states of a finger or gripper."""
+"""`predict` and `explain`: the stable states of a finger or gripper."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table
-from dpgcli.errors import Field, Problem, SpecError, UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.scene import Scene
 from dpgcli.states import plan
 from dpgcli.states import predict as states
@@ -124,22 +124,6 @@ def explain(
     given = scene_input(spec, settings)
     request = request_of(patterns, columns, formulation, tolerance, target_error)
     return plan.explain(given.scene, request)
-
-
-def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
-    """All problems of specs, none where they are right; nothing is solved.
-
-    >>> problem, = validate({"finger": {"units": 0}})[:1]
-    >>> problem.key, problem.expected
-    ('finger.units', 'a whole number from 1 to 64')
-    """
-    problems: list[Problem] = []
-    for spec in specs:
-        try:
-            scene_input(spec, settings)
-        except SpecError as error:
-            problems += error.problems
-    return tuple(problems)
 
 
 def request_of(

@@ -32,7 +32,7 @@ def validate(
     ] = ProblemFormat.TEXT,
 ) -> None:
     """Check specs without solving."""
-    from dpgcli.api.predict import validate
+    from dpgcli.api.validate import validate
 
     problems: list[Problem] = []
     for path in specs:
