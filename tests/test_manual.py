@@ -13,6 +13,7 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
+import dpgcli as dpg
 from dpgcli.benchmark.ablation import ABLATIONS
 from dpgcli.cli import (
     bench,
@@ -76,8 +77,8 @@ COMMANDS = {
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def sessions() -> list[list[tuple[str, str]]]:
@@ -122,12 +123,21 @@ def test_the_sweep_shown_is_valid(tmp_path: Path) -> None:
     assert read_sweep(path).space.size == 13 * 3 * 3 * 2 * 64
 
 
-def test_the_example_in_python_runs(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_the_examples_in_python_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(ROOT)
-    exec(blocks("python")[-1], {})
-    assert "'101' '111'" in capsys.readouterr().out
+    """One after the other, in a folder of their own beside the examples."""
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    monkeypatch.chdir(tmp_path)
+    section = re.search(r"^## From Python\n(.*?)^## ", README, re.MULTILINE | re.DOTALL)
+    assert section is not None
+    names: dict[str, object] = {}
+    for example in blocks("python", section[1]):
+        exec(example, names)
+    said = capsys.readouterr().out
+    assert "101" in said
+    assert "met: n_stable == 32: all 3 designs" in said
+    assert (tmp_path / "dome.yaml").exists()
 
 
 def test_the_examples_of_reading_tables_run(
@@ -140,9 +150,17 @@ def test_the_examples_of_reading_tables_run(
     assert run(app, ["sweep", str(sweep_file), "-o", "out", "--executor", "serial"]).exit_code == 0
     spec = ROOT / "configs" / "five_unit.yaml"
     assert run(app, ["predict", str(spec), "-o", "states.parquet"]).exit_code == 0
-    for example in blocks("python")[:-1]:
+    examples = blocks("python", README.partition("## From Python\n")[0])
+    assert examples
+    for example in examples:
         exec(example, {})
     assert "tip_y_mm" in capsys.readouterr().out
+
+
+def test_every_function_is_named() -> None:
+    functions = [name for name in dpg.__all__ if inspect.isfunction(getattr(dpg, name))]
+    named = {name for name in functions if re.search(rf"(`|dpg\.){name}\b", README)}
+    assert set(functions) - named <= {"read_calibration", "uniform_finger"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -82,7 +82,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
         return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
     if isinstance(spec, Mapping):
         name, own = "spec", tuple[Path, ...]()
-        document = with_calibrations(_document(spec, settings), Path())
+        document = spec_document(spec, settings)
     else:
         name, own = str(spec), (Path(spec),)
         document = read_scene(spec, setting_texts(settings))
@@ -93,11 +93,16 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
     """A spec key by key, as `files.scene_file.read_keys`: calibrations need not exist yet."""
     if isinstance(spec, Mapping):
-        return checked_keys(_document(spec, settings))
+        return checked_keys(_without_calibrations(spec, settings))
     return checked_keys(with_settings(read_document(spec), setting_texts(settings)))
 
 
-def _document(data: Mapping[str, Any], settings: Settings) -> Document:
+def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
+    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    return with_calibrations(_without_calibrations(data, settings), Path())
+
+
+def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
     return with_settings(Document("spec", plain(data), {}), setting_texts(settings))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput, check_installed, scene_input
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, NothingSelectedError, UsageError
-from dpgcli.files.stress_table import write_stress
+from dpgcli.files.study_tables import write_stress
 from dpgcli.hard_cases import verdicts
 from dpgcli.hard_cases.cases import Case, all_cases, check_families
 from dpgcli.hard_cases.table import STRESS_COLUMNS, FamilySummary, rows, summarized

@@ -4,16 +4,15 @@ E = ½ k_b x² [1 + (1−α)(x²/d² − 2x/d)] at the opening x = f u that a tr
 are compared as they are, forces as f F(x), since dE/du = f dE/dx.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY, STIFFNESS, STROKE, Loss, Quantity, Rule
 from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import (
     Record,
     cleaned,
@@ -26,7 +25,7 @@ from dpgcli.calibration.record import (
     unsampled,
     work,
 )
-from dpgcli.errors import Field, FitError, UsageError
+from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.curve import FEWEST_POINTS
 
@@ -40,49 +39,6 @@ STROKE_BOUNDS = (0.01, 100.0)  # of the largest opening: bounds of the stroke
 
 
 UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
-
-
-def parse_number(text: str) -> float | None:
-    """A number from zero on, None for anything else.
-
-    >>> parse_number("3.5"), parse_number("-1"), parse_number("3,5")
-    (3.5, None, None)
-    """
-    if not re.fullmatch(r"\s*[0-9]*\.?[0-9]*(?:[eE][-+]?[0-9]+)?\s*", text):
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if value < float("inf") else None
-
-
-@dataclass(frozen=True)
-class Opening:
-    """x = factor u: `amount` is the factor, or the opening (mm) of the inverted well."""
-
-    rule: Rule
-    amount: float = 1.0
-
-    @classmethod
-    def of(cls, text: str) -> Self:
-        """The mapping in a text: equal, proportional:FACTOR or stroke:MM.
-
-        Raises UsageError for anything else.
-
-        >>> Opening.of("stroke:3.5").amount
-        3.5
-        """
-        rule, _, amount = text.partition(":")
-        size = parse_number(amount)
-        if text == Rule.EQUAL:
-            return cls(Rule.EQUAL)
-        if rule in (Rule.PROPORTIONAL, Rule.STROKE) and size:
-            return cls(Rule(rule), size)
-        raise UsageError(
-            Field("travel_to_opening"),
-            f" {text}: expected equal, proportional:FACTOR or stroke:MM, with a number > 0",
-        )
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,13 @@ def fail(code: ExitCode, message: str) -> NoReturn:
     raise typer.Exit(code)
 
 
+def check_failed(n_failed: int, max_failed: int) -> None:
+    """End the command with its exit code if more designs failed than may."""
+    if n_failed > max_failed:
+        designs = "design" if n_failed == 1 else "designs"
+        fail(ExitCode.FAILED_CASES, f"{n_failed:,} {designs} failed; --max-failed is {max_failed}")
+
+
 def run_and_exit(app: Callable[..., object]) -> NoReturn:
     """Run the program and exit with its code, whatever state the streams are in."""
     open_streams()

@@ -48,14 +48,14 @@ def explain(
     ] = PlanFormat.TEXT,
 ) -> None:
     """Say what predict will do, and leave out, and why."""
-    from dpgcli.files.scene_file import read_spec, scene_of
+    from dpgcli.api.inputs import scene_input
     from dpgcli.states import plan
 
-    scene = scene_of(read_spec(spec, settings or ()))
+    given = scene_input(spec, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
-    made = plan.explain(scene, request)
+    made = plan.explain(given.scene, request)
     if printed_as is PlanFormat.JSON:
         import json
 

@@ -91,17 +91,11 @@ def request_of(
     target_error: str | None = None,
 ) -> "Request":
     """The options as a request."""
-    from dpgcli.states.plan import Request
-    from dpgcli.states.rungs import DEFAULT_TOLERANCE
+    from dpgcli.api import predict
 
-    names = tuple(name.strip() for name in columns.split(",") if name.strip())
-    return Request(
-        patterns=tuple(patterns or ()),
-        columns=(*names, *_groups(nodes=nodes, uncertainty=uncertainty)),
-        formulation=formulation.value,
-        tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
-        target_error=None if target_error is None else millimeters("--target-error", target_error),
-    )
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    names = (*columns.split(","), *_groups(nodes=nodes, uncertainty=uncertainty))
+    return predict.request_of(patterns or (), names, formulation.value, tolerance, target)
 
 
 def _groups(**wanted: bool) -> list[str]:

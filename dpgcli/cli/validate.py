@@ -32,18 +32,14 @@ def validate(
     ] = ProblemFormat.TEXT,
 ) -> None:
     """Check specs without solving."""
-    from dpgcli.errors import SpecError
-    from dpgcli.files.scene_file import read_spec
+    from dpgcli.api.validate import validate
 
     problems: list[Problem] = []
     for path in specs:
-        try:
-            read_spec(path, settings or ())
-        except SpecError as error:
-            problems.extend(map(problem_with_options, error.problems))
-        else:
-            if listed_as is ProblemFormat.TEXT:
-                put(f"{path}: ok")
+        found = validate(path, settings=settings or ())
+        problems.extend(map(problem_with_options, found))
+        if not found and listed_as is ProblemFormat.TEXT:
+            put(f"{path}: ok")
     _PRINTERS[listed_as](problems)
     if problems:
         raise typer.Exit(ExitCode.USAGE)

@@ -114,6 +114,16 @@ def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
             raise UsageError(f"{path} is the spec or data that is read: give another name")
 
 
+def run_file(table: Path) -> Path:
+    """The file of what differs between runs: states.parquet, states.run.json.
+
+    >>> run_file(Path("out/states.parquet")).as_posix()
+    'out/states.run.json'
+    """
+    stem = table.stem if table.suffix == ".parquet" else table.name
+    return table.parent / f"{stem}.run.json"
+
+
 def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     """Fail before the work rather than after it.
 

@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.comparison import Comparison
-from dpgcli.calibration.finger import FingerFit
-from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import KnownStates
 from dpgcli.reports.drawing import drawn_to, titled
 from dpgcli.states.patterns import texts
+
+if TYPE_CHECKING:  # SciPy is in the way of comparisons, which need none
+    from dpgcli.calibration.finger import FingerFit
+    from dpgcli.calibration.fits import Fit
 
 
 def comparison_summary(found: Comparison, calibrated: Comparison | None, law: str) -> Iterator[str]:
@@ -79,7 +81,7 @@ def draw_comparison(
         axes.legend(frameon=False)
 
 
-def draw_fitted(study: FingerFit, found: Fit, name: str, path: Path) -> None:
+def draw_fitted(study: "FingerFit", found: "Fit", name: str, path: Path) -> None:
     """Draw the states of a finger as it was and as it was fitted beside the known ones."""
     draw_comparison(study.known, study.compared(None), study.compared(found), name, path)
 

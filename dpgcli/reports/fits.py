@@ -14,7 +14,7 @@ from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
 from dpgcli.calibration.hinge import HingeFit
 from dpgcli.design.dimensions import unit_of
-from dpgcli.files.measured import Table
+from dpgcli.files.measured import GridTable
 from dpgcli.states.columns import Column, Group, Kind
 
 FINGER_UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad"}
@@ -130,7 +130,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
         )
 
 
-def grid_summary(law: Law, table: Table) -> Iterator[str]:
+def grid_summary(law: Law, table: GridTable) -> Iterator[str]:
     """The number of points, their keys, and the values that all points share."""
     points = law.points
     reference = ", ".join(

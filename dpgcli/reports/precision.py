@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dpgcli.files.bench_record import json_value
+from dpgcli.files.study_tables import json_value
 from dpgcli.reports.drawing import drawn_to, titled
 
 Row = dict[str, Any]

@@ -70,6 +70,12 @@ def test_predicting_loads_neither_tables_nor_figures(
     assert loaded(*arguments) & PREDICTING == set()
 
 
+def test_comparing_loads_no_scipy(loaded: Loaded, tmp_path: Path) -> None:
+    tips = tmp_path / "tips.csv"
+    tips.write_text("pattern,tip_x_mm,tip_y_mm\n000,51,0\n")
+    assert loaded("compare", str(CONFIGS / "three_unit.yaml"), str(tips)) & PREDICTING == set()
+
+
 def test_writing_a_table_loads_no_pandas(loaded: Loaded, tmp_path: Path) -> None:
     table = str(tmp_path / "states.parquet")
     assert "pandas" not in loaded("predict", str(CONFIGS / "three_unit.yaml"), "-o", table)

@@ -172,7 +172,7 @@ def test_shards_stay_until_all_is_written(
 ) -> None:
     shards = shard(1, 2, 3)
     with monkeypatch.context() as patch:
-        patch.setattr("dpgcli.reports.page.markdown", _stop)
+        patch.setattr("dpgcli.api.report.page", _stop)
         assert call("merge", *shards, "-o", "s1").exit_code != ExitCode.DONE
     assert call("merge", *shards, "-o", "s1").exit_code == ExitCode.DONE
     assert not (folder / "s1" / ".parts").exists()

@@ -36,8 +36,8 @@ Outcome.is_failure = property(lambda self: True)
 BREAKS = (
     ""
     "def broken(*_): raise BrokenPipeError('of a socket')\n"
-    "import dpgcli.files.scene_file as specs\n"
-    "specs.read_spec = broken"
+    "import dpgcli.api.inputs as specs\n"
+    "specs.read_scene = broken"
 )
 FEW = (
     "from dpgcli.states.predict import Prediction\n"

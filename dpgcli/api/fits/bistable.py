@@ -17,8 +17,9 @@ from dpgcli.api.fits.result import (
 )
 from dpgcli.api.inputs import check_positive, chosen
 from dpgcli.calibration import bistable
-from dpgcli.calibration.bistable import UNITS, BistableFit, Choice, Opening
+from dpgcli.calibration.bistable import UNITS, BistableFit, Choice
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity
+from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import Record
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import Field, UsageError

@@ -82,7 +82,7 @@ def bistable(
 ) -> None:
     """Fit k_b, alpha and d of the bistable law to a dome's curve."""
     from dpgcli.api.fits.bistable import fit_bistable
-    from dpgcli.calibration.bistable import Opening
+    from dpgcli.calibration.opening import Opening
     from dpgcli.errors import UsageError
 
     if travel_to_opening is None:
@@ -110,7 +110,7 @@ def bistable(
 def _fixed(texts: Sequence[str]) -> dict[str, float]:
     """Values by key; those of keys that the law does not have are not looked at."""
     from dpgcli.api.fits.bistable import limits_of
-    from dpgcli.calibration.bistable import parse_number
+    from dpgcli.calibration.opening import parse_number
     from dpgcli.errors import UsageError
 
     fixed = {}

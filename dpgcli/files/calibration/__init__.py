@@ -94,7 +94,11 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
 
 def read_calibration(path: str | Path) -> Calibration:
-    """Read and check a calibration. Raises SpecError with every problem and its place."""
+    """Read and check a calibration. Raises SpecError with every problem and its place.
+
+    >>> read_calibration("configs/calibration/push_3.5mm.yaml").has("stroke_mm")
+    True
+    """
     return calibration_in(read_document(path))
 
 

@@ -22,7 +22,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
-from dpgcli.files.measured import Table
+from dpgcli.files.measured import GridTable
 
 
 def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) -> dict[str, object]:
@@ -137,7 +137,7 @@ def grid_of(law: Law) -> Grid:
     )
 
 
-def grid_doubts(law: Law, table: Table) -> Iterator[str]:
+def grid_doubts(law: Law, table: GridTable) -> Iterator[str]:
     """What a user should know about a table of points, in words."""
     yield from table.doubts
     if table.ignored:

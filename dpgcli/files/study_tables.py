@@ -1,4 +1,4 @@
-"""What a benchmark measured, as a table and as a record for later ones."""
+"""What `bench` and `stress` found, as tables, and records of benchmarks for later ones."""
 
 import json
 import os
@@ -12,7 +12,17 @@ import numpy as np
 
 from dpgcli.benchmark.bench import COLUMNS, Row, as_columns
 from dpgcli.files.scene_file import spelled
-from dpgcli.files.table_writer import record_batch, schema, write_run, write_table
+from dpgcli.files.table_writer import (
+    SCHEMA_VERSION,
+    record_batch,
+    schema,
+    versions,
+    write_run,
+    write_table,
+)
+from dpgcli.hard_cases.table import STRESS_COLUMNS
+from dpgcli.hard_cases.table import rows as stress_rows
+from dpgcli.hard_cases.verdicts import Outcome
 
 
 def write_bench(path: Path, rows: Sequence[Row], spec_json: str, command: Sequence[str]) -> None:
@@ -25,6 +35,15 @@ def write_record(path: Path, rows: Sequence[Row], spec_json: str, command: Seque
     """Write all rows, the machine and the command to a JSON file."""
     plain = [{key: json_value(value) for key, value in row.items()} for row in rows]
     write_run(path, {**_machine(command), "spec": spec_json, "rows": plain})
+
+
+def write_stress(path: Path, outcomes: Sequence[Outcome], spec_json: str | None) -> None:
+    """Write every case, with the spec whose finger was pushed, if there is one."""
+    metadata = {"dpg.schema_version": str(SCHEMA_VERSION), "dpg.versions": versions()}
+    if spec_json is not None:
+        metadata["dpg.spec"] = spec_json
+    batch = record_batch(STRESS_COLUMNS, stress_rows(outcomes))
+    write_table(path, schema(STRESS_COLUMNS), [batch], metadata)
 
 
 def json_value(value: Any) -> Any:
