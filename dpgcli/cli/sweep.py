@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -98,8 +99,7 @@ def sweep(
 ) -> None:
     """Evaluate every design of a space, resumably."""
     folder = Path(output)
-    if executor is ExecutorName.PROCESSES and jobs != 1 and not folder.exists():
-        _start_fork_server_early()
+    _start_fork_server_early(executor, jobs, folder)
     from dpgcli.api.sweep import Place, shard_of, study_of
     from dpgcli.files.output import sole_use
     from dpgcli.studies.run import run
@@ -108,38 +108,29 @@ def sweep(
     part = shard_of(shard)
     limit = None if wait is None else seconds("--wait", wait)
     place = Place(executor.value, jobs, scheduler, limit)
-    if part is not None:
-        _check_part(require, summary_file, depfile)
+    _check_part(part, require, summary_file, depfile)
     target = None if target_error is None else millimeters("--target-error", target_error)
     study = study_of(spec, folder, settings or (), tolerance, target)
     _check_names(study, depfile, summary_file)
     rules = _rules(study, require or [])
     described = None if depfile is None else _described(study, output, depfile)
 
-    def computed() -> "Progress":
-        progress = _computed(study, place, part, quiet)
-        if described is not None:  # first: new tables beside an old one would stay for good
-            described.write()
-        return progress
-
+    work = partial(_computed, study, place, part, quiet)
+    carry_out = partial(
+        run,
+        study,
+        part,
+        restart=restart,
+        force=force,
+        is_sent=place.is_sent,
+        settings=settings or (),
+        command=sys.argv,
+        warn=say,
+        tell=(lambda line: None) if quiet else say,
+    )
     with sole_use(folder):
         drop_half_written(folder)
-        if described is not None:
-            described.check()
-        is_new = run(
-            study,
-            part,
-            computed,
-            restart=restart,
-            force=force,
-            is_sent=place.is_sent,
-            settings=settings or (),
-            command=sys.argv,
-            warn=say,
-            tell=(lambda line: None) if quiet else say,
-        )
-        if described is not None and not is_new:
-            described.write()
+        is_new = carry_out(work) if described is None else described.beside(carry_out, work)
         if part is None:
             n_failed, code = _judge(study, rules, summary_file, is_new, quiet)
         else:
@@ -149,10 +140,17 @@ def sweep(
         raise typer.Exit(code)
 
 
-def _check_part(require: list[str] | None, summary_file: Path | None, depfile: Path | None) -> None:
+def _check_part(
+    part: "Shard | None",
+    require: list[str] | None,
+    summary_file: Path | None,
+    depfile: Path | None,
+) -> None:
     """Raise UsageError for options that are about tables, which a shard does not make."""
     from dpgcli.errors import UsageError
 
+    if part is None:
+        return
     if require or summary_file:
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     if depfile:
@@ -165,8 +163,10 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
     return Depfile(depfile, depfile_text(output, (STATES, DESIGNS), study.sweep.files))
 
 
-def _start_fork_server_early() -> None:
+def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
+    if executor is not ExecutorName.PROCESSES or jobs == 1 or folder.exists():
+        return
     from dpgcli.sweeps.executors import start_fork_server
 
     start_fork_server("dpgcli.studies.sweep", "shapely")

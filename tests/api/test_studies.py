@@ -25,7 +25,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "TABLE_UNITS", 3)
     monkeypatch.setattr(module, "BATCH", 8)
     monkeypatch.setattr(module, "PEER_STATES", 1)
-    monkeypatch.setattr("dpgcli.benchmark.timing.SHORTEST", 0.0)
+    monkeypatch.setattr("dpgcli.benchmark.timing.SHORTEST_ROUND", 0.0)
 
 
 def test_a_comparison_as_by_its_command(printed: Rows, folder: Path) -> None:
