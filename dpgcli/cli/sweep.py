@@ -147,7 +147,7 @@ def _start_fork_server_early() -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
     from dpgcli.sweeps.executors import start_fork_server
 
-    start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
+    start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep", "filelock")
 
 
 def _study(
