@@ -151,6 +151,19 @@ def test_the_words_for_one_design_are_its_own() -> None:
     assert origins == ["extrapolated", "calibrated", "extrapolated"]
 
 
+def test_a_value_of_an_override_is_one_of_its_units() -> None:
+    """In place of what the override says already, beside it, and of units that had none."""
+    columns = {
+        "finger.overrides.4-5.geometry.dome_height_mm": np.array([7.0, 6.8]),
+        "finger.overrides.2.lattice.stroke_mm": np.array([3.5, 3.5]),
+    }
+    stroke = resolve(DESIGNS["graded"].with_values(columns)).lattice["stroke"]
+    assert (
+        pytest.approx(np.array([[3.5, 3.5, 3.5, 3.7, 3.7], [3.5, 3.5, 3.5, 3.5, 3.5]]), rel=1e-12)
+        == stroke.T
+    )
+
+
 def test_a_unit_cell_has_room_between_its_walls() -> None:
     cells = {"finger.geometry.unit_cell_mm": np.array([1.0, 2.0, 2.5])}
     found = resolve(DESIGNS["published"].with_values(cells))
