@@ -12,7 +12,7 @@ from dpgcli.design.calibrations import PUBLISHED, Calibration, DomeCurve, Fitted
 from dpgcli.design.dimensions import Design, Section, are_possible
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import ORIGINS
-from dpgcli.files.scene_file.models import GripperSpec
+from dpgcli.files.scene_file.models import FingerSpec, GripperSpec
 from dpgcli.files.sections import Geometry, Lattice
 
 GEOMETRY = {
@@ -151,23 +151,56 @@ def test_the_words_for_one_design_are_its_own() -> None:
     assert origins == ["extrapolated", "calibrated", "extrapolated"]
 
 
+def test_a_value_of_an_override_is_one_of_its_units() -> None:
+    """In place of what the override says already, beside it, and of units that had none."""
+    columns = {
+        "finger.overrides.4-5.geometry.dome_height_mm": np.array([7.0, 6.8]),
+        "finger.overrides.2.lattice.stroke_mm": np.array([3.5, 3.5]),
+    }
+    stroke = resolve(DESIGNS["graded"].with_values(columns)).lattice["stroke"]
+    assert (
+        pytest.approx(np.array([[3.5, 3.5, 3.5, 3.7, 3.7], [3.5, 3.5, 3.5, 3.5, 3.5]]), rel=1e-12)
+        == stroke.T
+    )
+
+
+def test_a_unit_cell_has_room_between_its_walls() -> None:
+    cells = {"finger.geometry.unit_cell_mm": np.array([1.0, 2.0, 2.5])}
+    found = resolve(DESIGNS["published"].with_values(cells))
+    assert found.are_wrong.tolist() == [True, True, False]
+    assert [issue.expected for issue in found.problems.of(1)] == ["a length > 2 mm"]
+
+
 def test_values_given_twice_agree_to_a_millionth() -> None:
     strokes = 3.5 * (1.0 + np.array([-1.1e-6, -0.9e-6, 0.0, 0.9e-6, 1.1e-6]))
     found = resolve(DESIGNS["given"].with_values({"finger.lattice.stroke_mm": strokes}))
     assert found.are_wrong.tolist() == [True, False, False, False, True]
 
 
-@pytest.mark.parametrize("section", [Geometry, Lattice, GripperSpec])
-def test_a_key_can_have_the_values_that_a_spec_takes(section: Any) -> None:
-    values = np.array([-91, -90, -1, 0, 1e-13, 1e-12, 0.5, 1, 1.5, 90, 91, 1e12, 2e12, np.inf])
-    for key in section.model_fields:
-        needed = {} if section is not GripperSpec else {"base_spacing_mm": 1.0}
+@pytest.mark.parametrize(
+    ("section", "needed"),
+    [
+        (Geometry, {}),
+        (Lattice, {}),
+        (GripperSpec, {"base_spacing_mm": 1.0}),
+        (FingerSpec, {"units": 1}),
+    ],
+)
+def test_a_key_can_have_the_values_that_a_spec_takes(section: Any, needed: Any) -> None:
+    limits = [1e-12, 1.0, 90.0, 1e12, 1e18]
+    values = np.array(
+        [-91, -90, -1, 0, 0.5, 1.5, *(f * x for x in limits for f in (0.99, 1, 1.01))]
+    )
 
-        def takes(value: float, key: str = key, needed: Any = needed) -> bool:
-            try:
-                section.model_validate({**needed, key: value})
-            except ValueError:
-                return False
-            return True
+    def takes(key: str, value: float) -> bool:
+        try:
+            section.model_validate({**needed, key: value})
+        except ValueError:
+            return False
+        return True
 
-        assert are_possible(key, values).tolist() == [takes(value) for value in values.tolist()]
+    numbers = {k for k, f in section.model_fields.items() if "float" in str(f.annotation)}
+    for key in numbers:
+        every = np.append(values, np.inf)
+        assert are_possible(key, every).tolist() == [takes(key, v) for v in every.tolist()], key
+    assert numbers
