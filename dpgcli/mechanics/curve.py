@@ -31,12 +31,14 @@ class Curve:
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
     Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
     the well, where the slope vanishes: the minimum that lies deepest below what is on both its
-    sides, and the highest maximum before it; NaN where there is none.
+    sides, and the highest maximum before it; NaN where there is none. `ripples` are the lesser
+    wells between the two, each with the top after it.
     """
 
     knots: Array
     coefficients: Array
     rests: tuple[float, float]
+    ripples: tuple[tuple[float, float], ...]
 
     def __call__(self, travel: Array) -> Derivatives:
         """Value and derivatives at travels of any shape, complex ones too.
@@ -81,7 +83,7 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     ends = [np.array([0.5 * cubic(x, 2), cubic(x, 1), cubic(x)]) for x in (travel[0], travel[-1])]
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
     coefficients = np.concatenate((before, cubic.c, after), axis=1)
-    return Curve(np.asarray(travel, float), coefficients, _rests(cubic))
+    return Curve(np.asarray(travel, float), coefficients, *_rests(cubic))
 
 
 def _from_rest(
@@ -136,14 +138,19 @@ def _continued(travel: Array, value: Array, beyond: Array) -> Array:
     return np.asarray(value[nearest[0]] + slope * beyond + bend * beyond**2)
 
 
-def _rests(cubic: "CubicSpline") -> tuple[float, float]:
-    """The deepest well, by how much it lies below both sides, and the highest top before it."""
+def _rests(
+    cubic: "CubicSpline",
+) -> tuple[tuple[float, float], tuple[tuple[float, float], ...]]:
+    """The highest top before the deepest well, by how much it lies below both sides, and that well.
+
+    Then the wells between the two, each with the next top.
+    """
     slope, bend = cubic.derivative(), cubic.derivative(2)
     roots = np.array([root for root in slope.roots(extrapolate=False) if root > 0.0])
     tops, wells = (roots[sign * bend(roots) > 0.0] for sign in (-1.0, 1.0))
     wells = wells[wells > np.min(tops, initial=np.inf)]
     if not len(wells):
-        return np.nan, np.nan
+        return (np.nan, np.nan), ()
     last = float(cubic(cubic.x[-1]))
     depths = [
         min(cubic(tops[tops < well]).max(), np.max(cubic(tops[tops > well]), initial=last))
@@ -152,4 +159,7 @@ def _rests(cubic: "CubicSpline") -> tuple[float, float]:
     ]
     well = float(wells[np.argmax(depths)])
     before = tops[tops < well]
-    return float(before[np.argmax(cubic(before))]), well
+    top = float(before[np.argmax(cubic(before))])
+    lesser = wells[(wells > top) & (wells < well)]
+    ripples = tuple((float(lower), float(before[before > lower].min())) for lower in lesser)
+    return (top, well), ripples

@@ -173,8 +173,9 @@ class Tabulated(Attached):
 class PushOnly:
     """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
 
-    Outside them dome and neighbor do not touch, the energy is constant there. Only inverted
-    domes act: which those are is a state of contact, given beside the energy.
+    Outside them dome and neighbor do not touch, the energy is constant there. So it is where a
+    curve with ripples would pull, from a lesser well to the next top: the dome stays in that well.
+    Only inverted domes act: which those are is a state of contact, given beside the energy.
     """
 
     def __init__(self, law: Published | Tabulated) -> None:
@@ -200,6 +201,11 @@ class PushOnly:
         touches = (place > np.real(top)) & (place < np.real(well))
         apart = np.where(place < np.real(well), top, well)
         apart = np.where(np.isnan(apart), 0.0, apart)  # never inverted: never in touch
+        travel = dome.stroke + dome.contact
+        for ripple in self.curve.ripples if self.curve is not None else ():
+            lower, upper = (rest * travel - dome.contact for rest in ripple)
+            lets_go = (place > np.real(lower)) & (place < np.real(upper))
+            touches, apart = touches & ~lets_go, np.where(lets_go, lower, apart)
         energy, *derivatives = self.law.response(np.where(touches, extension, apart), dome)
         force, stiffness = (np.where(touches, values, 0.0) for values in derivatives)
         return Response(energy, force, stiffness)

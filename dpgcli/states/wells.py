@@ -49,9 +49,12 @@ class Wells(ByUnit):
     the full stroke (of where a dome that only pushes still does) and `barrier` is the middle, so
     that a search can still begin.
 
-    `spring_barrier` is the x (mm) at which the dome's spring alone turns over. With any bars and
-    hinges a unit rests inverted only beyond it, since what holds the unit straight pulls back;
-    infinite where the spring does not. The unit's own barrier lies between it and the well.
+    `spring_barrier` is the x (mm) at which the dome's spring alone turns over: the highest top
+    before the deepest well of its curve, infinite where there is none. A unit counts as inverted
+    exactly where it is open beyond it, with any bars and hinges: what holds the unit straight pulls
+    back, so that it rests inverted only there. A unit in a ripple before it counts as not inverted,
+    whatever the hinge makes of the ripple's depth; `extension` is the deepest of the wells beyond
+    it, and the unit's own barrier lies between the two.
     `snap_force` and `reset_force` (N, on the opening) are what a unit bears in its ground and in
     its inverted well; where there is no second well, `reset_force` is negative, what is lacking.
     """
@@ -111,10 +114,10 @@ def _opened(finger: Finger, widest: Array) -> Array:
 def _spring_barrier(finger: Finger) -> Array:
     """Where the dome's spring alone turns over, mm; nowhere if it has no second well.
 
-    Below 0 where a dome has done so before it opens its unit.
+    0 where a dome has done so before it opens its unit.
     """
     top = finger.law.rests(finger.domes).top
-    return np.asarray(np.where(np.isnan(top), np.inf, top))
+    return np.asarray(np.where(np.isnan(top), np.inf, np.maximum(top, 0.0)))
 
 
 def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
@@ -150,7 +153,7 @@ def _searched_wells(finger: Finger) -> Wells:
     places = np.arange(SEARCHED - 1)[:, None, None]
     is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
     turned = _spring_barrier(finger)
-    is_well &= grid[1:] > turned  # before it a unit may rest in a ripple, but is not inverted
+    is_well &= grid[:-1] >= turned  # before it a unit may rest in a ripple, but is not inverted
     # the well that lies deepest below both sides, and the highest top before it: ripples pass
     left, right = (np.maximum.accumulate(e, axis=0) for e in (energy, energy[::-1]))
     depth = np.minimum(left, right[::-1]) - energy
