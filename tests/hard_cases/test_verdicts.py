@@ -273,7 +273,9 @@ def test_a_family_with_nothing_right_has_no_numbers() -> None:
     [family.name for family in FAMILIES],
 )
 def test_the_gauntlet_is_passed(family: str) -> None:
-    for outcome in stress(built_in_cases([family])):
+    outcomes = list(stress(built_in_cases([family])))
+    assert outcomes
+    for outcome in outcomes:
         case = outcome.case
         what = (case.variant.label, case.pattern, case.formulation, outcome.answer.status)
         assert not outcome.is_failure, (*what, outcome.verdict)

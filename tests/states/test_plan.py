@@ -104,6 +104,7 @@ def test_columns_are_those_of_the_plan(
     scene = Scene(reference_finger(n_units, 1e4), ())
     prediction = predict(scene, Request(("1*0",), columns))
     blocks = list(prediction.blocks())
+    assert blocks
     for block in blocks:
         assert list(block) == [column.name for column in prediction.plan.columns]
         assert len({len(values) for values in block.values()}) == 1

@@ -47,6 +47,7 @@ def test_metrics_follow_from_the_states(study: Any, tables: Any, base: str) -> N
     states, designs = tables(study(HEIGHTS, SEPARATIONS, base=base))
     metrics = designs.set_index("design")
     assert set(states["design"]) == set(metrics.index[metrics["status"] == "stable"])
+    assert len(states)
     for number, rows in states[states["status"] == "stable"].groupby("design"):
         row = metrics.loc[number]
         length = rows["tip_x_mm"][rows["pattern"].str.count("1") == 0].item()

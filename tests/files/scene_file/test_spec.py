@@ -486,7 +486,9 @@ def test_the_schema_describes_every_key():
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert schema["title"] == "dpg spec"
     assert schema["additionalProperties"] is False
+    assert schema["$defs"]
     for definition in schema["$defs"].values():
+        assert definition["properties"]
         for key, value in definition["properties"].items():
             assert value["description"], key
     json.dumps(schema, allow_nan=False)
