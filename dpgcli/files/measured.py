@@ -85,7 +85,7 @@ class Moments:
 
 
 @dataclass(frozen=True)
-class GridTable:
+class Table:
     """Geometries (point, key) by `over`, and positive quantities (point,) by key.
 
     `constant` holds geometry that is the same in all points. `doubts` are what no soft finger has,
@@ -146,7 +146,7 @@ def read_moments(source: Tabular, where: str | None = None) -> Moments:
     return Moments(columns[MOMENT], columns[rotation], texts, unused, sheet.sha256)
 
 
-def read_table(source: Tabular) -> GridTable:
+def read_table(source: Tabular) -> Table:
     """Quantities over geometries: columns that are keys of the geometry, and the others.
 
     Columns of text are left out. Raises SpecError with every problem at once.
@@ -182,7 +182,7 @@ def read_table(source: Tabular) -> GridTable:
         problems.append(sheet.problem(None, "file", "geometries that differ", "one and the same"))
     if problems:
         raise SpecError(in_order(problems))
-    return GridTable(
+    return Table(
         over,
         np.stack([columns[key] for key in over], axis=1),
         {name: columns[name] for name in others},

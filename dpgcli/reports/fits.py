@@ -12,7 +12,7 @@ from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
 from dpgcli.calibration.hinge import HingeFit
-from dpgcli.files.measured import GridTable
+from dpgcli.files.measured import Table
 from dpgcli.files.sections import unit_of
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.rows import Columns
@@ -130,7 +130,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
         )
 
 
-def grid_summary(law: Law, table: GridTable) -> Iterator[str]:
+def grid_summary(law: Law, table: Table) -> Iterator[str]:
     """Points, over what, and what they share."""
     points = law.points
     reference = ", ".join(

@@ -21,7 +21,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
-from dpgcli.files.measured import GridTable
+from dpgcli.files.measured import Table
 from dpgcli.files.sections import LARGEST, SMALLEST
 
 
@@ -137,7 +137,7 @@ def grid_of(law: Law) -> Grid:
     )
 
 
-def grid_doubts(law: Law, table: GridTable) -> Iterator[str]:
+def grid_doubts(law: Law, table: Table) -> Iterator[str]:
     """What a user should know about a table of points, in words."""
     yield from table.doubts
     if table.ignored:
