@@ -10,7 +10,7 @@ covariance of the values is
 equal size; a curve that the model cannot follow has neither.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,9 +22,14 @@ from dpgcli.calibration.losses import influence
 from dpgcli.calibration.search import Function, Parameter, Search
 from dpgcli.errors import FitError
 
-__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
+__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "Watch", "fit", "fit_linear", "unwatched"]
 
 CONFIDENCE = 0.95  # of bootstrap intervals
+Watch = Callable[[int], None]  # is told how many samples are done
+
+
+def unwatched(n_done: int) -> None:
+    """Tell nobody how many samples are done."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,7 @@ def fit(
     loss_scale: float | None = None,
     resamples: int = 0,
     seed: int = 0,
+    watch: Watch = unwatched,
 ) -> Fit:
     """Fit the free parameters so that the residuals become small.
 
@@ -87,7 +93,8 @@ def fit(
     (point, n). `loss_scale` is the size from which a residual counts less; by default a multiple
     of the median residual.
     `resamples` asks for bootstrap intervals: points drawn anew with replacement, each time
-    fitted again; the same `seed` gives the same intervals.
+    fitted again; the same `seed` gives the same intervals. `watch` is told before each how
+    many are done.
 
     Raises FitError if there are fewer points than free parameters, if some of them cannot be
     told apart, or if the search does not converge; ValueError for a start outside its bounds.
@@ -109,7 +116,7 @@ def fit(
     found = _judged(search, values, still_free, scale, observed)
     found = replace(found, at_bound=free & ~still_free)
     found = replace(found, warnings=_warnings(found))
-    return _bootstrapped(search, found, free, resamples, seed) if resamples else found
+    return _bootstrapped(search, found, free, resamples, seed, watch) if resamples else found
 
 
 def fit_linear(
@@ -207,14 +214,17 @@ def _warnings(found: Fit) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _bootstrapped(search: Search, found: Fit, free: Flags, resamples: int, seed: int) -> Fit:
+def _bootstrapped(
+    search: Search, found: Fit, free: Flags, resamples: int, seed: int, watch: Watch
+) -> Fit:
     """The fit with percentile intervals over points drawn with replacement.
 
     Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 6.2.4.
     """
     random = np.random.default_rng(seed)
     fitted = []
-    for _ in range(resamples):
+    for n_done in range(resamples):
+        watch(n_done)
         rows = random.integers(found.n_points, size=found.n_points)
         try:
             again = replace(search, rows=rows)

@@ -112,6 +112,22 @@ def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | No
     outputs = ((output, Mark.TABLE), (plot, Mark.FIGURE), (run_file, Mark.FACTS))
     check_outputs(sources, *outputs)
     check_table_name(output)
+    if output is not None and run_file is not None:
+        _check_whose(run_file, output)
+
+
+def _check_whose(run_file: Path, output: Path) -> None:
+    """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.table_reader import read_run
+
+    table = (read_run(run_file) or {}).get("table") if _holds(run_file) else None
+    if isinstance(table, str) and table != output.name and (output.parent / table).is_file():
+        raise UsageError(f"{run_file} has the facts of {table}: give another name")
+
+
+def _holds(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0
 
 
 def _run_file(output: Path) -> Path:
