@@ -118,16 +118,16 @@ def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | No
 
 def _check_whose(run_file: Path, output: Path) -> None:
     """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
+    import json
+
     from dpgcli.errors import UsageError
-    from dpgcli.files.table_reader import read_run
 
-    table = (read_run(run_file) or {}).get("table") if _holds(run_file) else None
-    if isinstance(table, str) and table != output.name and (output.parent / table).is_file():
+    try:
+        table = json.loads(run_file.read_bytes())["table"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
+        return
+    if table != output.name and (output.parent / str(table)).is_file():
         raise UsageError(f"{run_file} has the facts of {table}: give another name")
-
-
-def _holds(path: Path) -> bool:
-    return path.is_file() and path.stat().st_size > 0
 
 
 def _run_file(output: Path) -> Path:
