@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY, STIFFNESS, STROKE, Loss, Quantity, Rule
-from dpgcli.calibration.fits import Fit, Parameter, Watch, fit, unwatched
+from dpgcli.calibration.fits import Fit, Parameter, fit
 from dpgcli.calibration.record import (
     Record,
     alikeness,
@@ -59,7 +59,6 @@ class Choice:
     loss_scale: float | None = None
     resamples: int = 0
     seed: int = 0
-    watch: Watch = unwatched
 
 
 @dataclass(frozen=True)
@@ -181,7 +180,6 @@ def _fitted(opening: Array, observed: Array, factor: float, choice: Choice) -> F
         loss_scale=choice.loss_scale,
         resamples=choice.resamples,
         seed=choice.seed,
-        watch=choice.watch,
     )
 
 

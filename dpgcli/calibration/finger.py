@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.choices import Loss, Target
 from dpgcli.calibration.comparison import Comparison, compare
-from dpgcli.calibration.fits import Fit, Watch, fit, unwatched
+from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
 from dpgcli.errors import FitError
@@ -57,7 +57,7 @@ class FingerFit:
             if not np.isfinite(values[key]).all():
                 raise FitError(f"--free {key}: is infinite, start from a finite value")
 
-    def fit(self, resamples: int = 0, seed: int = 0, watch: Watch = unwatched) -> Fit:
+    def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.
 
         Raises FitError where the finger lacks a known state to start with, where the data have
@@ -73,7 +73,6 @@ class FingerFit:
             loss_scale=self.loss_scale,
             resamples=resamples,
             seed=seed,
-            watch=watch,
         )
         return replace(found, warnings=(*found.warnings, *self._edges(found)))
 

@@ -10,7 +10,7 @@ covariance of the values is
 equal size; a curve that the model cannot follow has neither.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,14 +22,9 @@ from dpgcli.calibration.losses import influence
 from dpgcli.calibration.search import Function, Parameter, Search
 from dpgcli.errors import FitError
 
-__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "Watch", "fit", "fit_linear", "unwatched"]
+__all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
 
 CONFIDENCE = 0.95  # of bootstrap intervals
-Watch = Callable[[int], None]  # is told how many samples are done
-
-
-def unwatched(n_done: int) -> None:
-    """Tell nobody how many samples are done."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +79,6 @@ def fit(
     loss_scale: float | None = None,
     resamples: int = 0,
     seed: int = 0,
-    watch: Watch = unwatched,
 ) -> Fit:
     """Fit the free parameters so that the residuals become small.
 
@@ -93,8 +87,7 @@ def fit(
     (point, n). `loss_scale` is the size from which a residual counts less; by default a multiple
     of the median residual.
     `resamples` asks for bootstrap intervals: points drawn anew with replacement, each time
-    fitted again; the same `seed` gives the same intervals. `watch` is told before each how
-    many are done.
+    fitted again; the same `seed` gives the same intervals.
 
     Raises FitError if there are fewer points than free parameters, if some of them cannot be
     told apart, or if the search does not converge; ValueError for a start outside its bounds.
@@ -116,7 +109,7 @@ def fit(
     found = _judged(search, values, still_free, scale, observed)
     found = replace(found, at_bound=free & ~still_free)
     found = replace(found, warnings=_warnings(found))
-    return _bootstrapped(search, found, free, resamples, seed, watch) if resamples else found
+    return _bootstrapped(search, found, free, resamples, seed) if resamples else found
 
 
 def fit_linear(
@@ -214,17 +207,14 @@ def _warnings(found: Fit) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _bootstrapped(
-    search: Search, found: Fit, free: Flags, resamples: int, seed: int, watch: Watch
-) -> Fit:
+def _bootstrapped(search: Search, found: Fit, free: Flags, resamples: int, seed: int) -> Fit:
     """The fit with percentile intervals over points drawn with replacement.
 
     Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 6.2.4.
     """
     random = np.random.default_rng(seed)
     fitted = []
-    for n_done in range(resamples):
-        watch(n_done)
+    for _ in range(resamples):
         rows = random.integers(found.n_points, size=found.n_points)
         try:
             again = replace(search, rows=rows)

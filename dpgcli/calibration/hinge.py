@@ -7,7 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import Loss
-from dpgcli.calibration.fits import Fit, Parameter, Watch, fit_linear, unwatched
+from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.errors import FitError
 
 STIFFNESS = "hinge_stiffness_N_mm_per_rad"
@@ -31,7 +31,6 @@ def fit_hinge(
     loss_scale: float | None = None,
     resamples: int = 0,
     seed: int = 0,
-    watch: Watch = unwatched,
 ) -> HingeFit:
     """Fit M = k θ through the origin to moments (N mm) over rotations (rad).
 
@@ -56,7 +55,6 @@ def fit_hinge(
         loss_scale=loss_scale,
         resamples=resamples,
         seed=seed,
-        watch=watch,
     )
     secants = _secants(moment, rotation)
     warnings = (*found.warnings, *_curvature(moment, rotation, secants))

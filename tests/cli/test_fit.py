@@ -116,16 +116,6 @@ def test_values_can_be_held(fit: Any) -> None:
     assert values(fit("bistable", PATH, *EQUAL, *freed).stdout) == found
 
 
-@pytest.mark.parametrize("command", [("bistable", PATH, *EQUAL), ("hinge", HINGE)])
-def test_a_long_bootstrap_says_how_far_it_is(
-    fit: Any, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("dpgcli.cli.progress.PLAIN_PERIOD", 0.0)
-    said = fit(*command, "--bootstrap", "7").stderr
-    assert "3 of 7 samples, " in said
-    assert "samples" not in fit(*command, "--bootstrap", "7", "-q").stderr
-
-
 def test_bootstrap_intervals_are_printed_and_written(fit: Any, folder: Path) -> None:
     options = ("--bootstrap", "50", "--seed", "3", "--format", "csv", "-o", "b.yaml", "-q")
     result = fit("bistable", PATH, *EQUAL, *options)

@@ -26,7 +26,6 @@ from dpgcli.cli.fit.common import (
     positive,
     print_fit,
     quality_line,
-    samples,
     scale_of,
     tell,
     write,
@@ -107,20 +106,18 @@ def bistable(
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, known(where))
     chosen = _quantity(measured, quantity)
-    with samples(bootstrap, quiet) as watch:
-        choice = Choice(
-            opening,
-            chosen,
-            is_quasi_static=branches is Branches.QUASI_STATIC,
-            area=_area(chosen, area),
-            fixed=fixed,
-            loss=loss,
-            loss_scale=scale_of(loss, loss_scale),
-            resamples=bootstrap,
-            seed=seed,
-            watch=watch,
-        )
-        found = fit_bistable(measured.curve, choice)
+    choice = Choice(
+        opening,
+        chosen,
+        is_quasi_static=branches is Branches.QUASI_STATIC,
+        area=_area(chosen, area),
+        fixed=fixed,
+        loss=loss,
+        loss_scale=scale_of(loss, loss_scale),
+        resamples=bootstrap,
+        seed=seed,
+    )
+    found = fit_bistable(measured.curve, choice)
     warnings = [*found.warnings, *([] if where else [NO_GEOMETRY])]
     if measured.ignored:
         warnings.append(f"columns not used: {', '.join(measured.ignored)}")

@@ -1,8 +1,7 @@
 """Options, tables and files that the fits share."""
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,12 +10,11 @@ import typer
 from dpgcli.calibration.choices import Loss
 from dpgcli.cli.options import check_plot
 from dpgcli.cli.printing import Format, printer_of
-from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import say
 from dpgcli.states.columns import Column, Group, Kind
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.fits import Fit, Watch
+    from dpgcli.calibration.fits import Fit
     from dpgcli.files.calibration import Calibration
     from dpgcli.files.sections import Geometry
 
@@ -177,16 +175,6 @@ def tell(lines: Iterable[str], warnings: Iterable[str], *files: Path | None) -> 
     for path in files:
         if path is not None:
             say(f"written: {path}")
-
-
-@contextmanager
-def samples(resamples: int, quiet: bool) -> "Iterator[Watch]":
-    """Progress of a bootstrap, for whoever draws the samples to tell."""
-    line = ProgressLine(resamples, "samples", quiet=quiet)
-    try:
-        yield line.show
-    finally:
-        line.clear()
 
 
 def method_of(what: str, fit: "Fit", resamples: int, seed: int) -> str:

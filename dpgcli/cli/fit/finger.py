@@ -20,7 +20,6 @@ from dpgcli.cli.fit.common import (
     method_of,
     print_fit,
     quality_line,
-    samples,
     scale_of,
     tell,
     write,
@@ -82,8 +81,7 @@ def finger(
     frame = frame_of(first_station, tip_offset)
     size = scale_of(loss, loss_scale)
     study = FingerFit(base, known, frame, tuple(free or [LEVER]), target, loss, size)
-    with samples(bootstrap, quiet) as watch:
-        found = study.fit(bootstrap, seed, watch)
+    found = study.fit(bootstrap, seed)
     warnings = [*_warnings(study, found), *([] if where else [NO_GEOMETRY])]
     source = DataFile(file=data.name, sha256=known.sha256, rows=known.patterns.shape[1])
     content = {

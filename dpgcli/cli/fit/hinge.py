@@ -22,7 +22,6 @@ from dpgcli.cli.fit.common import (
     method_of,
     print_fit,
     quality_line,
-    samples,
     scale_of,
     tell,
     write,
@@ -63,16 +62,14 @@ def hinge(
     check_files((curve, spec), output, plot)
     at = geometry_from(geometry, spec)
     data = read_moments(curve, where)
-    with samples(bootstrap, quiet) as watch:
-        found = fit_hinge(
-            data.moment,
-            data.rotation,
-            loss=loss,
-            loss_scale=scale_of(loss, loss_scale),
-            resamples=bootstrap,
-            seed=seed,
-            watch=watch,
-        )
+    found = fit_hinge(
+        data.moment,
+        data.rotation,
+        loss=loss,
+        loss_scale=scale_of(loss, loss_scale),
+        resamples=bootstrap,
+        seed=seed,
+    )
     warnings = [*_mixed(data), *found.fit.warnings, *([] if at else [NO_GEOMETRY])]
     if data.ignored:
         warnings.append(f"columns not used: {', '.join(data.ignored)}")
