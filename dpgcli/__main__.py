@@ -1,21 +1,40 @@
 """The program's start, with an answer to Ctrl-C before anything else is imported."""
 
 import gc
-import sys
+import os
+import signal
+from contextlib import suppress
+from types import FrameType
 
+STOPS = {  # numbers by name, since not every system has all of them
+    getattr(signal, name): end
+    for name, end in {
+        "SIGINT": ("interrupted", 130),
+        "SIGTERM": ("terminated", 143),
+        "SIGHUP": ("terminated", 143),
+    }.items()
+    if hasattr(signal, name)
+}
 SELDOM = 10**5  # objects made: what imports make stays, and to look through it takes time
 
 
 def main() -> None:
     """Run the program."""
+    for number in STOPS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
+            signal.signal(number, _end)
     gc.set_threshold(SELDOM)
-    try:
-        from dpgcli.cli.main import main as run
+    from dpgcli.cli.main import main as run  # signals are met by commands from here on
 
-        run()
-    except KeyboardInterrupt:  # while the imports are under way; later ones are met by commands
-        print("dpg: interrupted; nothing half-written is left", file=sys.stderr)
-        sys.exit(130)
+    run()
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    """End at once: nothing has begun, and modules that start make errors of what is raised."""
+    word, code = STOPS[number]
+    with suppress(OSError):
+        os.write(2, f"dpg: {word}; nothing half-written is left\n".encode())
+    os._exit(code)
 
 
 if __name__ == "__main__":

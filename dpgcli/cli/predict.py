@@ -23,7 +23,6 @@ from dpgcli.cli.options import (
     Tolerance,
     WithUncertainty,
     check_plot,
-    check_table_name,
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
@@ -107,11 +106,27 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.files.output import Mark, check_outputs, run_file
+    from dpgcli.files.output import Mark, check_outputs, check_table_name, run_file
 
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
+    if output is not None and beside is not None:
+        _check_whose(beside, output)
+
+
+def _check_whose(beside: Path, output: Path) -> None:
+    """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
+    import json
+
+    from dpgcli.errors import UsageError
+
+    try:
+        table = json.loads(beside.read_bytes())["table"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
+        return
+    if table != output.name and (output.parent / str(table)).is_file():
+        raise UsageError(f"{beside} has the facts of {table}: give another name")
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:

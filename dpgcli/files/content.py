@@ -1,9 +1,10 @@
 """Content of files as it is read: bounded, from names without control characters, UTF-8."""
 
+import os
 import re
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -33,11 +34,32 @@ def content_of(path: Path, place: Place, most: int | None = None, hint: str = ""
             return path.read_bytes()
         if is_regular and status.st_size > most:
             raise _too_large(place, most, f"{status.st_size} bytes", hint)
+        if stat.S_ISFIFO(status.st_mode):
+            return _piped(path, place, most, hint)
         with path.open("rb") as stream:
             return bounded(stream, place, most, hint)
     except (OSError, ValueError) as error:
         found = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
+
+
+def _piped(path: Path, place: Place, most: int, hint: str) -> bytes:
+    """What comes out of a pipe, as that of `<(...)`.
+
+    Raises OSError for one that nobody has open to write to: it would be waited for, in silence.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with os.fdopen(handle, "rb") as stream:
+        begin = b""
+        with suppress(BlockingIOError):  # somebody will
+            begin = os.read(handle, 1)
+            if not begin:
+                raise OSError(None, "a pipe that nobody writes to")
+        os.set_blocking(handle, True)
+        content = begin + stream.read(most)
+    if len(content) > most:
+        raise _too_large(place, most, "more", hint)
+    return content
 
 
 def opened(path: Path) -> BinaryIO:

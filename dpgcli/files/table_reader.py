@@ -1,7 +1,10 @@
 """Tables of designs and facts of runs, read back."""
 
 import json
+import os
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,7 +20,11 @@ TEXTS = ("calibration", "status", "reason", "rung")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 MOST_FACTS = 2**26  # bytes
-DAMAGED = "damaged: its bytes are not those of its SHA-256; make it again"
+DAMAGED = (
+    "damaged: its bytes are not those of its SHA-256, or it has none any more; "
+    "make it again, or, if you edited it, take its dpg.* metadata away"
+)
+NO_ROOM = "it takes more memory than there is"
 
 
 def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
@@ -28,19 +35,12 @@ def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """
     if path.is_dir():
         raise UsageError(f"{path} is a folder: name the table in it, designs.parquet")
-    return designs_in(read_undamaged(path), str(path))
+    return designs_in(read_undamaged(path, partial(_readable, str(path))), str(path))
 
 
 def designs_in(table: Any, name: str) -> tuple[pd.DataFrame, dict[str, str]]:
     """The same of a pyarrow Table; `name` is what messages call it."""
-    missing = [name for name in NEEDED if name not in table.column_names]
-    if missing:
-        raise UsageError(
-            f"{name} is no table of designs: no column {', '.join(missing)}; "
-            "dpg sweep writes one, designs.parquet"
-        )
-    if twice := sorted({name for name in table.column_names if table.column_names.count(name) > 1}):
-        raise UsageError(f"{name}: expected each column once, found {', '.join(twice)} again")
+    table = table.select(_readable(name, table.schema))
     units = {
         field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
         for field in table.schema
@@ -48,18 +48,30 @@ def designs_in(table: Any, name: str) -> tuple[pd.DataFrame, dict[str, str]]:
     return _plain(name, table), units
 
 
-def read_undamaged(path: Path) -> Any:
+def _all(described: Any) -> list[str]:
+    names: list[str] = described.names
+    return names
+
+
+def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any:
     """A Parquet file as a pyarrow Table, its bytes held against its seal if `dpg` wrote it.
 
-    Raises UsageError for what is damaged, or no Parquet file.
+    Only the columns that are `chosen` from its schema are read, their `TEXTS` as dictionaries: a
+    text that repeats is there once. Raises UsageError for what is damaged, no Parquet file, or
+    larger than memory.
     """
     try:
         with opened(path) as stream:  # pyarrow takes no name that is not text
             file = undamaged(stream)
             if file is not None:
-                table = file.read()
-                _ = table.column_names  # raises where they are no text
-                return table
+                names = chosen(file.schema_arrow)
+                _check_room(path, file.metadata, names)
+                is_text = {f.name: f.name in TEXTS and _is_text(f.type) for f in file.schema_arrow}
+                texts = [name for name in names if is_text[name] and chosen is not _all]
+                options = {"page_checksum_verification": True, "metadata": file.metadata}
+                return pq.ParquetFile(stream, read_dictionary=texts, **options).read(names)
+    except MemoryError as error:  # before those of pyarrow, of which some are this too
+        raise UsageError(f"cannot read {path}: {NO_ROOM}") from error
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
@@ -76,8 +88,69 @@ def undamaged(stream: BinaryIO) -> Any:
     if is_whole is False:  # nothing damaged is decoded
         return None
     file = pq.ParquetFile(stream, page_checksum_verification=True)
-    is_ours = b"dpg.content_sha256" in (file.metadata.metadata or {})
+    is_ours = any(key.startswith(b"dpg.") for key in file.metadata.metadata or ())
     return file if is_whole or not is_ours else None
+
+
+def _check_room(path: Path, metadata: Any, names: list[str]) -> None:
+    """Raise UsageError for columns that are larger than the machine's memory."""
+    if not hasattr(os, "sysconf"):  # Windows
+        return
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+    columns = (group.column(place) for group in groups for place in range(group.num_columns))
+    needed = sum(c.total_uncompressed_size for c in columns if c.path_in_schema in names)
+    needed += 8 * metadata.num_rows * len(names)
+    if needed > memory:
+        found = f"{needed / 1e9:,.1f} GB, and this machine has {memory / 1e9:,.1f} GB"
+        raise UsageError(f"cannot read {path}: its columns take {found} of memory")
+
+
+def _readable(source: str, described: Any) -> list[str]:
+    """Columns of a schema to read: numbers and the texts that are known.
+
+    Raises UsageError for what is no table of designs.
+    """
+    names = described.names
+    if missing := [name for name in NEEDED if name not in names]:
+        raise UsageError(
+            f"{source} is no table of designs: no column {', '.join(missing)}; "
+            "dpg sweep writes one, designs.parquet"
+        )
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
+    swept = names[names.index("design") + 1 : names.index("calibration")]
+    kept = []
+    for field in described:
+        is_readable = _is_number(field.type)
+        if field.name in TEXTS:  # empty ones come back from CSV as numbers, or as nothing
+            is_readable |= _is_text(field.type) or pa.types.is_null(field.type)
+        if is_readable:
+            kept.append(field.name)
+        elif field.name in (*NEEDED, *swept):
+            raise _wrong_type(source, field.name, field.type)
+    return kept
+
+
+def _is_number(kind: Any) -> bool:
+    """Whether values of a type may be numbers: those of an empty column are none at all."""
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    types = pa.types
+    kinds = (types.is_integer, types.is_boolean, types.is_floating, types.is_decimal)
+    return any(is_kind(kind) for is_kind in kinds)
+
+
+def _is_text(kind: Any) -> bool:
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _kind(name: str) -> str:
+    return "text" if name in TEXTS else "whole numbers" if name in COUNTS else "numbers"
+
+
+def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
+    return UsageError(f"{source}: column {name}: expected {_kind(name)}, found {kind}")
 
 
 def _plain(source: str, table: Any) -> pd.DataFrame:
@@ -87,20 +160,17 @@ def _plain(source: str, table: Any) -> pd.DataFrame:
     columns = {}
     for name in names:
         column = table.column(name)
-        if pa.types.is_dictionary(column.type):
-            column = column.cast(column.type.value_type)
-        kind = "text" if name in TEXTS else "whole numbers" if name in COUNTS else "numbers"
-        plain = READERS[kind](column)
+        plain = READERS[_kind(name)](column)
         if plain is not None:
             columns[name] = plain
         elif name in (*NEEDED, *swept):
-            raise UsageError(f"{source}: column {name}: expected {kind}, found {column.type}")
+            raise _wrong_type(source, name, column.type)
     return pd.DataFrame(columns)
 
 
 def _text(column: Any) -> Any:
     """Text, empty where there is none; None for a column of anything else."""
-    if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+    if _is_text(column.type):
         try:
             return column.to_pandas().astype(object).fillna("")
         except UnicodeDecodeError:
@@ -120,6 +190,8 @@ def _whole(column: Any) -> Any:
 
 def _numbers(column: Any) -> Any:
     """Whole numbers if all are there and fit, else numbers; None for a column of neither."""
+    if pa.types.is_dictionary(column.type):
+        column = column.cast(column.type.value_type)
     kind = column.type
     if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
         kinds = ["float64"] if column.null_count else ["int64", "float64"]

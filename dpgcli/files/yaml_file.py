@@ -4,6 +4,7 @@ import math
 import os
 import sys
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,18 @@ class Document:
         """A problem with the value at a key path, which may be missing."""
         return located(self.place(path), dotted((*self.prefix, *path)), expected, found, hint)
 
+    def empty(self) -> list[KeyPath]:
+        """Keys that stand there without a value, as the last one of a file that was cut off."""
+        return list(_empty(self.data, ()))
+
+
+def _empty(value: Any, path: KeyPath) -> Iterator[KeyPath]:
+    if value is None:
+        yield path
+    items = value.items() if isinstance(value, dict) else ()
+    for key, part in enumerate(value) if isinstance(value, list) else items:
+        yield from _empty(part, (*path, key))
+
 
 def read_document(path: str | os.PathLike[str]) -> Document:
     """Read a YAML file whose top level is a mapping; "-" reads standard input.
@@ -70,9 +83,14 @@ def read_document(path: str | os.PathLike[str]) -> Document:
     Problems that leave the rest of the file readable (repeated keys, foreign tags) are kept in the
     document, the others raise SpecError.
     """
+    return parse_document(*read_text(path))
+
+
+def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """Name of a YAML file in messages, and its text. Raises SpecError for what is none."""
     name = os.fspath(path)
     place = Place("<stdin>" if name == "-" else shortened(name, 4096))
-    return parse_document(place.file, decoded(_content(name, place), place))
+    return place.file, decoded(_content(name, place), place)
 
 
 def parse_document(file: str, text: str) -> Document:

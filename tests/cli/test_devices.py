@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,41 @@ def test_a_report_that_is_no_file_stays(run: Any, out: Path, kind: str) -> None:
     path = put(out / "report.md", kind)
     assert run(*RUN, before=LIMITED, timeout=30).returncode == ExitCode.DONE
     assert not path.is_file()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("predict", "p"),
+        ("validate", "p"),
+        ("sweep", "p", "-o", "new"),
+        ("sweep", "of_pipe.yaml", "-o", "new"),
+        ("compare", "three_unit.yaml", "p"),
+        ("fit", "hinge", "p"),
+    ],
+)
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(
+    run: Any, folder: Path, command: tuple[str, ...]
+) -> None:
+    put(folder / "p", "pipe")
+    (folder / "of_pipe.yaml").write_text(SWEEP.replace("three_unit.yaml", "p"))
+    result = run(*command, timeout=30)
+    assert result.returncode == ExitCode.USAGE
+    said = result.stdout + result.stderr
+    assert "expected a readable file, found a pipe that nobody writes to" in said
+
+
+def test_a_pipe_with_a_writer_is_read(run: Any, call: Call, folder: Path) -> None:
+    """However late the writer is, as in `dpg predict <(slow)`."""
+    for pause in (0.0, 1.0):
+        script = "import sys, time; time.sleep(float(sys.argv[1])); print(open(sys.argv[2]).read())"
+        slow = [sys.executable, "-c", script, str(pause), str(folder / "three_unit.yaml")]
+        with subprocess.Popen(slow, stdout=subprocess.PIPE) as writer:
+            assert writer.stdout is not None
+            number = writer.stdout.fileno()
+            result = run("predict", f"/dev/fd/{number}", "-q", pass_fds=(number,))
+        assert result.returncode == ExitCode.DONE, result.stderr
+        assert result.stdout == call("predict", "three_unit.yaml", "-q").stdout
 
 
 def test_a_part_that_is_no_file_is_damaged(run: Any, call: Call, out: Path, folder: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import seconds
+from dpgcli.code import sha256_of_code
 from dpgcli.errors import UsageError
 
 Call = Callable[..., Any]
@@ -65,6 +66,7 @@ def test_the_version_goes_to_standard_output(call: Call) -> None:
     result = call("--version")
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout.startswith("dpg ")
+    assert result.stdout.splitlines()[1].startswith(f"package {sha256_of_code()[:16]}, numpy ")
 
 
 @pytest.mark.parametrize(

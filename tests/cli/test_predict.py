@@ -559,3 +559,20 @@ def test_what_takes_long_is_said_before(
     said = call("predict", *columns, "--format", "csv").stderr.splitlines()
     assert said[0].startswith("262,144 states: about ") == is_long
     assert call("predict", "-q", *columns, "--format", "csv").stderr == ""
+
+
+@pytest.mark.parametrize(("first", "second"), [("t", "t.parquet"), ("t.parquet", "t")])
+def test_the_facts_of_one_table_are_not_replaced_by_those_of_another(
+    call: Call, folder: Path, first: str, second: str
+) -> None:
+    one = ("predict", "three_unit.yaml", "-q", "-o")
+    assert call(*one, first).exit_code == ExitCode.DONE
+    facts = (folder / "t.run.json").read_bytes()
+    refused = call(*one, second)
+    assert refused.exit_code == ExitCode.USAGE
+    assert refused.stderr == f"dpg: t.run.json has the facts of {first}: give another name\n"
+    assert (folder / "t.run.json").read_bytes() == facts
+    assert not (folder / second).exists()
+    assert call(*one, first).exit_code == ExitCode.DONE
+    (folder / first).unlink()
+    assert call(*one, second).exit_code == ExitCode.DONE

@@ -44,22 +44,31 @@ def is_writing(folder: Path) -> Callable[[], bool]:
     return happened
 
 
-def test_an_interrupt_while_the_program_is_still_loading(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "code", "word"), [*SIGNALS, (signal.SIGHUP, ExitCode.TERMINATED, "terminated")]
+)
+@pytest.mark.parametrize("is_ignored", [False, True], ids=["", "ignored"])
+def test_a_signal_while_the_program_is_still_loading(
+    tmp_path: Path, number: signal.Signals, code: int, word: str, is_ignored: bool
+) -> None:
     program = """
-import sys
+import os, signal, sys
 class Interrupting:
     def find_spec(self, name, path=None, target=None):
         if name == "typer":
-            raise KeyboardInterrupt
+            os.kill(os.getpid(), NUMBER)
 sys.meta_path.insert(0, Interrupting())
+if IGNORED:
+    signal.signal(NUMBER, signal.SIG_IGN)
 from dpgcli.__main__ import main
+sys.argv[1:] = ["--version"]
 main()
-"""
+""".replace("NUMBER", str(int(number))).replace("IGNORED", str(is_ignored))
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
     )
-    assert done.returncode == ExitCode.INTERRUPTED
-    assert done.stderr == "dpg: interrupted; nothing half-written is left\n"
+    said = f"dpg: {word}; nothing half-written is left\n"
+    assert (done.returncode, done.stderr) == ((0, "") if is_ignored else (code, said))
 
 
 CONVERTING = """

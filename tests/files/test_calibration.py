@@ -23,6 +23,7 @@ from dpgcli.files.calibration.results import (
     fitted,
     grid_of,
 )
+from dpgcli.files.last_line import sealed
 
 WHOLE = """\
 calibration_version: 1
@@ -60,6 +61,10 @@ def path(tmp_path: Path) -> Path:
 
 
 def read(path: Path, text: str) -> Calibration:
+    return read_as_it_is(path, sealed(text))
+
+
+def read_as_it_is(path: Path, text: str) -> Calibration:
     path.write_text(text, encoding="utf-8")
     return read_calibration(path)
 
@@ -75,6 +80,54 @@ def test_what_is_written_is_read_back(path: Path) -> None:
     again = path.with_name("again.yaml")
     write_calibration(again, found)
     assert read_calibration(again) == found
+
+
+@pytest.fixture
+def own(path: Path) -> str:
+    """The text of a file as `dpg fit` writes it."""
+    write_calibration(path, read(path, WHOLE).model_copy(update={"made_by": made_by()}))
+    return path.read_text(encoding="utf-8")
+
+
+def test_no_beginning_of_a_fitted_file_is_believed(path: Path, own: str) -> None:
+    for length in range(len(own) - 1):
+        with pytest.raises(SpecError):
+            read_as_it_is(path, own[:length])
+    assert read_as_it_is(path, own[:-1]) == read_as_it_is(path, own)  # but for its last break
+
+
+def test_a_fitted_file_may_have_other_line_breaks(path: Path, own: str) -> None:
+    found = read_calibration(path)
+    path.write_bytes(own.replace("\n", "\r\n").encode())
+    assert read_calibration(path) == found
+
+
+def test_an_edited_file_says_so(path: Path, own: str) -> None:
+    edited = own.replace("12.84", "12.85")
+    assert edited != own
+    with pytest.raises(SpecError, match="expected the text of the SHA-256 in its last line"):
+        read_as_it_is(path, edited)
+    without = edited[: edited.rindex("#")]
+    with pytest.raises(SpecError, match="expected its SHA-256 in its last line"):
+        read_as_it_is(path, without)
+    by_hand = without.replace(", SHA-256 in the last line", ", edited")
+    assert by_hand != without
+    assert read_as_it_is(path, by_hand).made_by.endswith("edited")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where"),
+    [
+        ("{value: 3.5}", "", "7:3: values.stroke_mm"),
+        ("{dome_height_mm: 6.5, elastic_modulus_MPa: 26}", "", "11:1: geometry"),
+        ("elastic_modulus_MPa: 26}", "elastic_modulus_MPa: }", "11:33: geometry.elastic_mod"),
+    ],
+)
+def test_a_key_without_a_value_is_none_that_is_absent(
+    path: Path, old: str, new: str, where: str
+) -> None:
+    found = problems(path, WHOLE.replace(old, new))
+    assert any(said.startswith(where) and "found nothing" in said for said in found), found
 
 
 def test_what_data_do_not_tell_may_have_a_huge_error(path: Path) -> None:

@@ -112,11 +112,19 @@ def test_what_is_no_table_has_no_whole_seal(tmp_path: Path, content: bytes) -> N
     assert is_whole(tmp_path / "missing") is None
 
 
-def test_tables_of_others_have_no_seal_and_are_read(table: Path) -> None:
-    """Also one that pyarrow made of ours and that keeps a part of its metadata."""
+def test_what_is_left_of_our_metadata_is_not_believed_without_a_seal(table: Path) -> None:
+    """Pyarrow keeps a part of it: it would vouch for values that somebody changed."""
     kept = pq.read_table(table).slice(1, 1)
     assert b"dpg.x" in kept.schema.metadata
     pq.write_table(kept, table)
+    assert is_whole(table) is None
+    with pytest.raises(UsageError, match=r"it has none any more; .*take its dpg\.\* metadata away"):
+        read_designs(table)
+
+
+def test_tables_of_others_have_no_seal_and_are_read(table: Path) -> None:
+    kept = pq.read_table(table).slice(1, 1)
+    pq.write_table(kept.replace_schema_metadata(None), table)
     assert is_whole(table) is None
     assert read_designs(table)[0]["design"].tolist() == [1]
 

@@ -3,6 +3,7 @@
 import datetime
 import io
 import json
+import tracemalloc
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -117,6 +118,45 @@ def test_a_table_that_went_through_csv_is_the_same(
         tmp_path / "t.parquet"
     )
     pd.testing.assert_frame_equal(read_designs(tmp_path / "t.parquet")[0], expected)
+
+
+def test_a_text_that_repeats_takes_no_room(tmp_path: Path) -> None:
+    """4 GB of it: known columns are read as dictionaries, others not at all."""
+    n_rows, text = 4_000_000, pa.array(["x" * 1000])
+    repeated = pa.DictionaryArray.from_arrays(pa.array(np.zeros(n_rows, np.int8)), text)
+    numbers = pa.array(np.zeros(n_rows, np.int8))
+    columns = {**dict.fromkeys(COLUMNS, numbers), "status": repeated, "calibration": repeated}
+    table = pa.table({**columns, "reason": repeated.slice(0, n_rows), "note": repeated})
+    pq.write_table(table, tmp_path / "t.parquet", store_schema=False)
+    assert (tmp_path / "t.parquet").stat().st_size < 1e7
+    before = pa.default_memory_pool().max_memory()
+    tracemalloc.start()
+    frame, _ = read_designs(tmp_path / "t.parquet")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak + pa.default_memory_pool().max_memory() - before < 1e9
+    assert frame["reason"].iloc[-1] == "x" * 1000
+    assert "note" not in frame
+
+
+def test_what_memory_cannot_hold_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.sysconf", lambda name: 10)
+    with pytest.raises(UsageError, match=r"t\.parquet: its columns take .* GB of memory"):
+        read(tmp_path)
+
+
+@pytest.mark.parametrize("error", [MemoryError, pa.ArrowMemoryError])
+def test_too_little_memory_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+) -> None:
+    def reading(*_: Any, **__: Any) -> None:
+        raise error("malloc of size 1234 failed")
+
+    monkeypatch.setattr(pq.ParquetFile, "read", reading)
+    with pytest.raises(UsageError, match="it takes more memory than there is"):
+        read(tmp_path)
 
 
 def test_a_column_twice(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 Written by `dpg fit`, read by specs. Keys of values and geometry are those of a spec.
 """
 
+import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -27,6 +28,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
+from dpgcli.files.last_line import is_whole_text, sealed
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import (
@@ -36,7 +38,7 @@ from dpgcli.files.sections import (
     expected_of,
     wrong_width,
 )
-from dpgcli.files.yaml_file import Document, parse_value, read_document
+from dpgcli.files.yaml_file import Document, parse_document, parse_value, read_text
 from dpgcli.text import KeyPath, dotted
 
 __all__ = [
@@ -58,6 +60,17 @@ __all__ = [
 ]
 
 VERSION = 1
+SEALED = "SHA-256 in the last line"  # how made_by ends in a file of dpg fit
+OTHER_TEXT = (
+    "the text of the SHA-256 in its last line",
+    "another",
+    "damaged or edited: make it again; an edited one has no such line, nor says so in made_by",
+)
+NO_SEAL = (
+    "its SHA-256 in its last line, as dpg fit writes it",
+    "none",
+    "cut off or edited: make it again; an edited one does not say in made_by that it has the line",
+)
 SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
 
@@ -66,7 +79,7 @@ def made_by() -> str:
     """This program and what its fits depend on, as calibration files name them."""
     import scipy
 
-    return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}"
+    return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}, {SEALED}"
 
 
 def calibration_of(sections: Mapping[str, Any]) -> Calibration:
@@ -76,7 +89,7 @@ def calibration_of(sections: Mapping[str, Any]) -> Calibration:
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Write a calibration: the same one gives the same bytes.
+    """Write a calibration, sealed by its last line: the same one gives the same bytes.
 
     Raises OutputError, and leaves no half-written file whatever happens.
     """
@@ -86,20 +99,29 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     yaml.width = 110
     yaml.allow_unicode = True
     content = calibration.model_dump(exclude_none=True)
-    with (
-        whole_file(path, Mark.CALIBRATION) as new,
-        new.open("w", encoding="utf-8", newline="\n") as stream,
-    ):
-        yaml.dump(content, stream)
+    text = io.StringIO()
+    yaml.dump(content, text)
+    with whole_file(path, Mark.CALIBRATION) as new:
+        new.write_bytes(sealed(text.getvalue()).encode())
 
 
 def read_calibration(path: str | Path) -> Calibration:
     """Read and check a calibration. Raises SpecError with every problem and its place.
 
+    What `dpg fit` wrote has its SHA-256 in the last line: values that were cut off would else be
+    taken from the next calibration, in silence. Files of an earlier version have none.
+
     >>> read_calibration("configs/calibration/push_3.5mm.yaml").has("stroke_mm")
     True
     """
-    return calibration_in(read_document(path))
+    file, text = read_text(path)
+    is_whole = is_whole_text(text)
+    if is_whole is False:
+        raise SpecError((located(Place(file), "file", *OTHER_TEXT),))
+    found = calibration_in(parse_document(file, text))
+    if found.made_by.endswith(SEALED) and not is_whole:
+        raise SpecError((located(Place(file), "file", *NO_SEAL),))
+    return found
 
 
 def calibration_in(document: Document) -> Calibration:
@@ -110,6 +132,7 @@ def calibration_in(document: Document) -> Calibration:
         problems = [_problem(document, e) for e in error.errors(include_url=False)]
         raise SpecError(in_order([*document.problems, *problems])) from None
     problems = [document.problem(*i) for i in (*_issues(found), *_order_issues(found, document))]
+    problems += [document.problem(path, _expected(path), "nothing") for path in document.empty()]
     if problems or document.problems:
         raise SpecError(in_order([*document.problems, *problems]))
     return found
@@ -148,18 +171,22 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
 def _problem(document: Document, error: Any) -> Problem:
     """One finding of the models as a problem with a place."""
     path: KeyPath = error["loc"]
-    section, description = _model_at(path)
     if error["type"] == "extra_forbidden":
+        section, _ = _model_at(path)
         known = list(section.model_fields)
         close = get_close_matches(str(path[-1]), known, n=1)
         hint = f"did you mean {close[0]}?" if close else "known here: " + ", ".join(known)
         return document.problem(path, "a known key", shown(path[-1]), hint)
-    if issubclass(section, Fitted) and path[-1] == "value":
-        description = expected_of(str(path[-2]))
-    if issubclass(section, UnitGeometry):
-        description = expected_of(str(path[-1]))
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
-    return document.problem(path, description, found)
+    return document.problem(path, _expected(path), found)
+
+
+def _expected(path: KeyPath) -> str:
+    """What the value of a key is expected to be, in words."""
+    section, description = _model_at(path)
+    if issubclass(section, Fitted) and path[-1] == "value":
+        return expected_of(str(path[-2]))
+    return expected_of(str(path[-1])) if issubclass(section, UnitGeometry) else description
 
 
 def _model_at(path: KeyPath) -> tuple[type[Section], str]:

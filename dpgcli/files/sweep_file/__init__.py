@@ -140,8 +140,11 @@ def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:
 
 
 def _validated(document: Document) -> tuple[SweepSpec | None, list[Problem]]:
+    """The sweep, None where it is none; a key without a value is a problem, not an absent one."""
     try:
-        return SweepSpec.model_validate(document.data), []
+        spec = SweepSpec.model_validate(document.data)
+        said = [(path, _model_at(path)[1] or "a value") for path in document.empty()]
+        return spec, [document.problem(path, expected, "nothing") for path, expected in said]
     except ValidationError as error:
         return None, [_problem(document, e) for e in error.errors(include_url=False)]
 

@@ -5,6 +5,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +18,10 @@ from dpgcli.files.table_reader import DAMAGED, undamaged
 
 LARGEST_WHOLE = 2**63 - 1
 PARQUET = b"PAR1"
-TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?\n)+")
-COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?\r?$", re.MULTILINE)
+TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\n)+")
+COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?$", re.MULTILINE)
+UNNAMED = re.compile(r"__index_level_[0-9]+__")  # an index of pandas, which is no column
+FIRST = 1000  # rows
 UNREADABLE = (  # what pandas and pyarrow raise for content that is no table
     OSError,
     csv.Error,
@@ -45,9 +48,41 @@ def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFra
         raise ValueError(DAMAGED)
     if not has_room(file.metadata.num_rows, file.metadata.num_columns):
         return None
-    frame: pd.DataFrame = file.read().to_pandas()
-    is_named = any(name is not None for name in frame.index.names)
-    return frame.reset_index() if is_named else frame
+    return _with_index(_parquet(file))
+
+
+def _parquet(file: Any) -> pd.DataFrame:
+    """The table in a Parquet file; of one with text, which is refused, no more than first rows.
+
+    A text that repeats takes no room in the file, and 4 GB where it is read.
+    """
+    numbers = [field.name for field in file.schema_arrow if _is_number(field.type)]
+    others = [name for name in file.schema_arrow.names if name not in numbers]
+    if not others:
+        whole: pd.DataFrame = file.read().to_pandas()
+        return whole
+    first = pa.Table.from_batches(islice(file.iter_batches(FIRST), 1), file.schema_arrow)
+    head: pd.DataFrame = first.to_pandas()
+    if _has_names(head.index) or not all(map(UNNAMED.fullmatch, others)):
+        return head
+    rest: pd.DataFrame = file.read(columns=numbers).to_pandas()
+    return rest
+
+
+def _with_index(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.reset_index() if _has_names(frame.index) else frame
+
+
+def _has_names(index: "pd.Index[Any]") -> bool:
+    return any(name is not None for name in index.names)
+
+
+def _is_number(kind: Any) -> bool:
+    """Whether a type may be read in full: one of numbers, whatever it is refused for later."""
+    types = pa.types
+    if types.is_dictionary(kind):
+        kind = kind.value_type
+    return any(is_kind(kind) for is_kind in (types.is_integer, types.is_floating, types.is_boolean))
 
 
 class NoTableError(ValueError):
@@ -55,7 +90,11 @@ class NoTableError(ValueError):
 
 
 def _csv(content: bytes) -> pd.DataFrame:
-    """Comments leave empty lines, so that the others keep their numbers."""
+    """Comments leave empty lines, so that the others keep their numbers.
+
+    Lines end as pandas ends them: where a comment went on behind a lone CR, rows would be lost.
+    """
+    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"#" in content:
         content = TOP.sub(lambda top: b"\n" * top[0].count(b"\n"), content)
         content = COMMENT.sub(b"", content)

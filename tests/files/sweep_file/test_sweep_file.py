@@ -485,9 +485,16 @@ def test_quotes_in_the_midst_of_a_cell_are_refused(read: Read, tmp_path: Path) -
 def test_comments_in_a_table_of_designs(read: Read, tmp_path: Path) -> None:
     top = "# of the lab\n\n#heights, as cut\n"
     rows = f"{HEIGHT},{SEPARATION}\n6,3\n# 7,3\n#\n8,4\n"
-    for text in (top + rows, "\ufeff" + top + rows, (top + rows).replace("\n", "\r\n")):
+    for text in (
+        top + rows,
+        "\ufeff" + top + rows,
+        (top + rows).replace("\n", "\r\n"),
+        (top + rows).replace("\n", "\r"),
+    ):
         (tmp_path / "t.csv").write_bytes(text.encode())
         assert designs(read("table: t.csv")) == {HEIGHT: [6, 8], SEPARATION: [3, 4]}
+    (tmp_path / "t.csv").write_bytes(f"{HEIGHT},{SEPARATION}\n6,3\n# note\r6.1,3\r7,3\n".encode())
+    assert designs(read("table: t.csv"))[HEIGHT] == [6, 6.1, 7], "CR alone ends a line"
     for row in ("#7,3", "#DIV/0!,3"):
         (tmp_path / "t.csv").write_text(f"{top}{rows}{row}\n")
         assert f'"{row[:-2]}" in row 3' in problems(read, "table: t.csv")[0]
@@ -684,6 +691,33 @@ def test_a_parquet_table_of_too_many_numbers_is_not_read(
     pq.write_table(pa.table({HEIGHT: values}), tmp_path / "long.parquet")
     monkeypatch.setattr(pq.ParquetFile, "read", lambda _: pytest.fail("read"))
     assert "26,000,000 numbers of 1 keys" in problems(read, "table: long.parquet")[0]
+
+
+def test_of_a_table_with_text_no_more_is_read_than_is_shown(read: Read, tmp_path: Path) -> None:
+    """4 GB of it in a file of 100 KB; an index without a name is no column."""
+    n_rows = 4_000_000
+    text = pa.DictionaryArray.from_arrays(
+        pa.array(np.zeros(n_rows, np.int8)), pa.array(["x" * 1000])
+    )
+    table = pa.table({HEIGHT: np.full(n_rows, 6.5), "note": text})
+    pq.write_table(table, tmp_path / "t.parquet", store_schema=False)
+    pool = pa.default_memory_pool()
+    before = pool.max_memory()
+    (problem, *_) = problems(read, "table: t.parquet")
+    assert pool.max_memory() - before < 1e9
+    assert 'found "xxx' in problem or "expected a known key" in problem
+    frame = pd.DataFrame({HEIGHT: np.arange(1.0, 5001.0)}, index=[f"a{i}" for i in range(5000)])
+    frame.to_parquet(tmp_path / "t.parquet")
+    assert len(designs(read("table: t.parquet"))[HEIGHT]) == 5000
+
+
+def test_a_key_without_a_value_is_not_absent(read: Read) -> None:
+    """As where a file was cut off: without its constraints a sweep has other designs."""
+    axis = f"{{key: {HEIGHT}, values: [6], table: }}"
+    rules, table = problems(read, axis, head="constraints:\nbase: base.yaml")
+    assert rules.startswith("1:1: constraints: expected ")
+    assert table.startswith("4:") and "space.0.table: expected " in table
+    assert rules.endswith("found nothing") and table.endswith("found nothing")
 
 
 def test_a_csv_table_of_too_many_bytes_is_not_read(
