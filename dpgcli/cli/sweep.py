@@ -18,8 +18,8 @@ from dpgcli.cli.options import (
     Settings,
     TargetError,
     Tolerance,
+    millimeters,
     seconds,
-    target_in_mm,
 )
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import say
@@ -95,17 +95,19 @@ def sweep(
     """Evaluate every design of a space, resumably."""
     if executor is ExecutorName.PROCESSES and jobs != 1 and not output.exists():
         _start_fork_server_early()
-    from dpgcli.api.sweep import shard_of, study_of
+    from dpgcli.api.sweep import Place, shard_of, study_of
     from dpgcli.errors import UsageError
     from dpgcli.files.output import sole_use
     from dpgcli.studies.run import run
     from dpgcli.studies.sweep import drop_half_written
 
     part = shard_of(shard)
-    place = _place(executor, jobs, scheduler, wait)
+    limit = None if wait is None else seconds("--wait", wait)
+    place = Place(executor.value, jobs, scheduler, limit)
     if part is not None and (require or summary_file):
         raise UsageError("--require and --summary-file need the whole table: give them to check")
-    study = study_of(spec, output, settings or (), tolerance, target_in_mm(target_error))
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    study = study_of(spec, output, settings or (), tolerance, target)
     _check_names(study, depfile, summary_file)
     rules = _rules(study, require or [])
     if depfile is not None:
@@ -138,15 +140,6 @@ def _start_fork_server_early() -> None:
     from dpgcli.sweeps.executors import start_fork_server
 
     start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
-
-
-def _place(
-    executor: ExecutorName, jobs: int | None, scheduler: str | None, wait: str | None
-) -> "Place":
-    from dpgcli.api.sweep import Place
-
-    limit = None if wait is None else seconds("--wait", wait)
-    return Place(executor.value, jobs, scheduler, limit)
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
