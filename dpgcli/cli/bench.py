@@ -18,7 +18,7 @@ from dpgcli.cli.options import (
     check_plot,
     check_table_name,
     frame_of,
-    millimeters,
+    target_in_mm,
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
 from dpgcli.cli.streams import say
@@ -100,13 +100,12 @@ def bench(
     sources = [path for path in (against, compare) if path is not None]
     outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_outputs([*sources, *given.files], *outputs)
-    target = None if target_error is None else millimeters("--target-error", target_error)
     frame = frame_of(first_station, tip_offset)
     with _watching(quiet) as watch:
         found = bench(
             given,
             repeats=repeats,
-            target_error=target,
+            target_error=target_in_mm(target_error),
             keep=tuple(keep or ()),
             against=against,
             first_station=frame.first_station,

@@ -93,7 +93,7 @@ def request_of(
     """The options as a request."""
     from dpgcli.api import predict
 
-    target = None if target_error is None else millimeters("--target-error", target_error)
+    target = target_in_mm(target_error)
     names = (*columns.split(","), *_groups(nodes=nodes, uncertainty=uncertainty))
     return predict.request_of(patterns or (), names, formulation.value, tolerance, target)
 
@@ -160,6 +160,11 @@ def millimeters(option: str, text: str) -> float:
     if not 0.0 < length < float("inf"):
         raise UsageError(f"{option} {text}: expected a length > 0 in mm, um, nm or m: 0.01mm")
     return length
+
+
+def target_in_mm(text: str | None) -> float | None:
+    """The target error, if there is one, as a number of mm."""
+    return None if text is None else millimeters("--target-error", text)
 
 
 def seconds(option: str, text: str) -> float:

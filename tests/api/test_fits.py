@@ -95,13 +95,23 @@ def test_data_frames_are_curves(form: Any) -> None:
     data = {name: frame[name].tolist() for name in frame} if form is dict else form(frame)
     found = dpg.fit_bistable(data, travel_to_opening="equal", geometry=SIZES)
     expected = dpg.fit_bistable(DOME, travel_to_opening="equal", geometry=SIZES)
-    assert found.values == expected.values
+    assert (found.values, found.warnings) == (expected.values, expected.warnings)
     assert found.calibration.sources[0].file == "data frame"
 
 
 def test_known_states_are_data_frames(folder: Path, study: dict[str, Any]) -> None:
     known = pd.read_csv("tips.csv", dtype={"pattern": str})
     assert dpg.fit_finger(study, known).values == dpg.fit_finger("study.yaml", "tips.csv").values
+
+
+def test_values_hold_at_the_geometry_of_the_spec(study: dict[str, Any], folder: Path) -> None:
+    study["finger"]["geometry"] = {"dome_thickness_mm": 0.75}
+    given = dpg.fit_finger(study, "tips.csv")
+    added = dpg.fit_finger(study, "tips.csv", geometry={"dome_thickness_mm": 0.5})
+    for fit, thickness in ((given, 0.75), (added, 0.5)):
+        assert fit.calibration.geometry is not None
+        assert fit.calibration.geometry.dome_thickness_mm == thickness
+        assert not any(text.startswith("no geometry") for text in fit.warnings)
 
 
 def test_wrong_data_are_named_by_row(folder: Path) -> None:

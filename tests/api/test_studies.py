@@ -34,6 +34,8 @@ def test_a_comparison_as_by_its_command(printed: Rows, folder: Path) -> None:
     asked: dict[str, Any] = {"first_station": (5.4, -0.8), "tip_offset": (4.0, -0.7)}
     found = dpg.compare("study.yaml", "tips.csv", calibration=PUSH, **asked)
     assert found.table.to_arrow().to_pylist() == rows
+    assert {"error_mm", "calibrated_error_mm"} <= set(rows[0])
+    assert any(row["error_mm"] != row["calibrated_error_mm"] for row in rows)
     read = dpg.read_calibration(PUSH)
     frame = pd.read_csv("tips.csv", dtype={"pattern": str})
     again = dpg.compare("study.yaml", frame, calibration=read, **asked)

@@ -112,6 +112,7 @@ def test_a_sweep_is_checked(space: Path) -> None:
     [
         ({"executor": "cloud"}, "^executor 'cloud': expected processes, serial, dask"),
         ({"executor": "dask"}, "^executor dask and scheduler tcp://host:port go together"),
+        ({"scheduler": "tcp://host:1"}, r"^executor dask and scheduler tcp://host:port go tog"),
         ({"executor": "dask", "scheduler": "x"}, "^scheduler x: expected tcp://host:port"),
         ({"wait": 1.0}, "^wait is for the workers of executor dask"),
         ({"shard": "3/2"}, "^shard 3/2: expected K/N with K from 1 to N"),
