@@ -23,6 +23,7 @@ from dpgcli.cli.options import (
     Tolerance,
     WithUncertainty,
     check_plot,
+    check_table_name,
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
@@ -106,7 +107,7 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.files.output import Mark, check_outputs, check_table_name, run_file
+    from dpgcli.files.output import Mark, check_outputs, run_file
 
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
