@@ -27,8 +27,8 @@ class Units:
     def are_soft(self) -> Flags:
         """Units that with rigid bars do not show what the finger does, (unit, design).
 
-        Bars turn them too far or are strained too much, or a stroke leads to where only bars that
-        give way can follow.
+        Bars turn them too far or are strained too much, or give way before a stiff hinge turns, or
+        a stroke leads to where only bars that give way can follow.
         """
         if self.finger.is_rigid:
             return np.zeros((1, 1), bool)
@@ -38,8 +38,10 @@ class Units:
         is_strained = (np.abs(known.chord) > LARGEST_STRAIN * finger.segment_length) | (
             2.0 * np.abs(known.strut) > LARGEST_STRAIN * finger.segment_height
         )
+        bars = finger.linear_stiffness * finger.segment_height**2
+        is_stiff = finger.hinge_stiffness > LARGEST_TURN * bars  # its hinge, beside the bars
         is_out_of_reach = ~self.wells.exists & (self.wells.angle > WIDE_ANGLE)
-        return is_turned | is_strained | is_out_of_reach
+        return is_turned | is_strained | is_stiff | is_out_of_reach
 
     @property
     def shortest_loop(self) -> int | None:
