@@ -1,3 +1,100 @@
-"""Stable shapes of multistable soft grippers, predicted by a lumped spring lattice."""
+"""Stable shapes of multistable soft grippers, predicted by a lumped spring lattice.
+
+Its functions do what the commands of `dpg` do, with values, paths or data frames in and values
+out. Each is loaded when it is first asked for, so that no command waits for another's libraries.
+
+>>> import dpgcli as dpg
+>>> finger = dpg.uniform_finger(
+...     3, segment_length=13.5, segment_height=10.75, stroke=3.5,
+...     bistable_stiffness=12.84, force_linearity=0.043, hinge_stiffness=24.2)
+>>> states = dpg.predict(finger, patterns="1*1").to_pandas()
+>>> states["tip_y_mm"].round(2).tolist()
+[-11.99, -17.24]
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from dpgcli.api.bench import bench
+    from dpgcli.api.check import check
+    from dpgcli.api.compare import compare
+    from dpgcli.api.fits.bistable import fit_bistable
+    from dpgcli.api.fits.finger import fit_finger
+    from dpgcli.api.fits.grid import fit_grid
+    from dpgcli.api.fits.hinge import fit_hinge
+    from dpgcli.api.predict import explain, predict
+    from dpgcli.api.report import report
+    from dpgcli.api.stress import stress
+    from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.validate import validate
+    from dpgcli.errors import (
+        DpgError,
+        FitError,
+        NothingSelectedError,
+        OutputError,
+        SpecError,
+        UsageError,
+    )
+    from dpgcli.files.calibration import read_calibration
+    from dpgcli.mechanics.finger import uniform_finger
+
+__all__ = [
+    "DpgError",
+    "FitError",
+    "NothingSelectedError",
+    "OutputError",
+    "SpecError",
+    "UsageError",
+    "__version__",
+    "bench",
+    "check",
+    "compare",
+    "explain",
+    "fit_bistable",
+    "fit_finger",
+    "fit_grid",
+    "fit_hinge",
+    "merge",
+    "predict",
+    "read_calibration",
+    "report",
+    "stress",
+    "sweep",
+    "uniform_finger",
+    "validate",
+]
+
+_HOMES = {
+    "bench": "api.bench",
+    "check": "api.check",
+    "compare": "api.compare",
+    "explain": "api.predict",
+    "fit_bistable": "api.fits.bistable",
+    "fit_finger": "api.fits.finger",
+    "fit_grid": "api.fits.grid",
+    "fit_hinge": "api.fits.hinge",
+    "merge": "api.sweep",
+    "predict": "api.predict",
+    "read_calibration": "files.calibration",
+    "report": "api.report",
+    "stress": "api.stress",
+    "sweep": "api.sweep",
+    "uniform_finger": "mechanics.finger",
+    "validate": "api.validate",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first asked for."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES.get(name, 'errors')}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,5 +1,6 @@
 """The program's start, with an answer to Ctrl-C before anything else is imported."""
 
+import gc
 import os
 import signal
 from contextlib import suppress
@@ -15,9 +16,12 @@ STOPS = {  # numbers by name, since not every system has all of them
     if hasattr(signal, name)
 }
 
+SELDOM = 10**5  # objects made: what imports make stays, and to look through it takes time
+
 
 def main() -> None:
     """Run the program."""
+    gc.set_threshold(SELDOM)
     for number in STOPS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
             signal.signal(number, _end)

@@ -1,6 +1,7 @@
 """Names for the array types that every floor speaks of."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Codes = NDArray[np.uint64]
+Columns = dict[str, NDArray[Any]]  # of a table, by name
 
 
 def total(parts: Array) -> Array:

@@ -1,8 +1,41 @@
-"""Every error raised on purpose."""
+"""Every error raised on purpose, and messages that name fields."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 from dpgcli.text import printable
+
+
+class Field(str):
+    """The name of a field in a message, as Python has it; a command line has an option for it."""
+
+    __slots__ = ()
+
+
+class Message(str):
+    """A text some of whose parts may be fields.
+
+    >>> Message("drop ", Field("target_error"))
+    'drop target_error'
+    """
+
+    parts: tuple[str, ...]
+
+    def __new__(cls, *parts: str) -> Self:
+        flat = [piece for part in parts for piece in getattr(part, "parts", (part,))]
+        message = super().__new__(cls, "".join(flat))
+        message.parts = tuple(flat)
+        return message
+
+
+def respelled(text: str, spell: Callable[[str], str]) -> str:
+    """A text with its fields spelled in another way; text that is no Message as it is.
+
+    >>> respelled(Message("drop ", Field("tolerance")), lambda field: f"--{field}")
+    'drop --tolerance'
+    """
+    return "".join(spell(p) if isinstance(p, Field) else p for p in Message(text).parts)
 
 
 @dataclass(frozen=True)
@@ -19,12 +52,27 @@ class Problem:
 
     def __str__(self) -> str:
         place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
+        return printable(f"{place}: {self.statement}")  # in one line, whatever names hold
+
+    @property
+    def statement(self) -> str:
+        """What is wrong, the place left out."""
         hint = f" ({self.hint})" if self.hint else ""
-        said = f"{place}: {self.key}: expected {self.expected}, found {self.found}{hint}"
-        return printable(said)  # in one line, whatever names and values hold
+        return f"{self.key}: expected {self.expected}, found {self.found}{hint}"
 
 
-class SpecError(Exception):
+class DpgError(Exception):
+    """Any error raised on purpose: what was wrong with the input, or went wrong outside.
+
+    The parts of its message may be fields. Any other exception is a bug.
+    """
+
+    def __init__(self, *parts: str) -> None:
+        self.message = Message(*parts)
+        super().__init__(self.message)
+
+
+class SpecError(DpgError):
     """A spec, an option that changes it, or data are wrong; carries every problem found."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
@@ -32,11 +80,11 @@ class SpecError(Exception):
         self.problems = problems
 
 
-class UsageError(Exception):
+class UsageError(DpgError):
     """What was asked for makes no sense for this scene; the message says what to do."""
 
 
-class WorkplaceError(Exception):
+class WorkplaceError(DpgError):
     """The workers that should do the work cannot, or are lost; what was done is kept."""
 
 
@@ -44,17 +92,17 @@ class NoWorkerError(WorkplaceError):
     """No worker came for as long as one waits; what was done is kept."""
 
 
-class NothingSelectedError(Exception):
+class NothingSelectedError(DpgError):
     """A selection matches no state."""
 
 
-class OutputError(Exception):
+class OutputError(DpgError):
     """A file cannot be written; nothing half-written is left behind."""
 
 
-class FitError(Exception):
+class FitError(DpgError):
     """A fit that failed; the message says why. Nothing is written."""
 
 
-class SolverError(Exception):
+class SolverError(DpgError):
     """A solver outside dpg failed, or its results make no sense; nothing is made of them."""

@@ -1,5 +1,9 @@
 """Text from outside made fit to print: nothing in it moves a cursor or ends a line."""
 
+KeyPath = tuple[str | int, ...]
+
+MAX_SHOWN = 60
+
 
 def printable(text: str) -> str:
     """Text in one line, escaped where a terminal would obey it rather than show it.
@@ -21,3 +25,18 @@ def control_character(name: str) -> str:
     ('\\\\t', '')
     """
     return next((ascii(c)[1:-1] for c in name if c < " " or "\x7f" <= c < "\xa0"), "")
+
+
+def dotted(path: KeyPath) -> str:
+    """A key path as people write it: `finger.overrides.4-5`."""
+    return ".".join(shortened(str(part)) for part in path) or "document"
+
+
+def shortened(text: str, limit: int = MAX_SHOWN) -> str:
+    """Text fit for one line of a message: printable, and cut where it is long.
+
+    >>> shortened("a" * 100, 10)
+    'aaaaaaa...'
+    """
+    head = printable(text[: limit + 1])
+    return head if len(head) <= limit else head[: limit - 3] + "..."

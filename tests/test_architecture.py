@@ -12,18 +12,21 @@ FLOORS = {
     "errors": 0,
     "arrays": 0,
     "code": 0,
+    "signals": 0,
     "temporary": 0,
     "text": 0,
     "equilibrium": 1,
     "mechanics": 2,
+    "design": 2,
     "states": 3,
     "calibration": 4,
     "reference": 4,
     "benchmark": 5,
-    "stress": 5,
+    "hard_cases": 5,
     "sweeps": 5,
     "files": 6,
-    "report": 6,
+    "reports": 6,
+    "api": 7,
     "studies": 7,
     "cli": 8,
     "__main__": 9,
@@ -61,9 +64,18 @@ def test_the_solver_knows_no_finger() -> None:
     assert {name.split(".")[1] for name in known} <= {"arrays", "equilibrium"}
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "equilibrium", "states", "calibration"])
+def test_the_room_for_designs_knows_no_files_and_no_specs() -> None:
+    paths = list((PACKAGE / "design").rglob("*.py"))
+    words = [word for path in paths for word in path.read_text(encoding="utf-8").split()]
+    assert len(paths) > 5
+    assert not {"pydantic", "pathlib", "yaml"} & set(words)
+
+
+@pytest.mark.parametrize("folder", ["mechanics", "design", "equilibrium", "states", "calibration"])
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
-    for path in (PACKAGE / folder).rglob("*.py"):
+    paths = list((PACKAGE / folder).rglob("*.py"))
+    assert len(paths) > 1
+    for path in paths:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         called = {
             node.func.id
@@ -74,8 +86,24 @@ def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
 
 
 def test_no_function_is_longer_than_sixty_lines() -> None:
+    assert len(MODULES) > 100
     for path in MODULES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 assert node.end_lineno is not None
                 assert node.end_lineno - node.lineno < 60, f"{path}: {node.name}"
+
+
+def test_text_is_written_with_the_same_line_ends_everywhere() -> None:
+    """Python would write those of Windows there, and marks and hashes would differ."""
+    written = []
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+                continue
+            modes = [arg.value for arg in node.args[:1] if isinstance(arg, ast.Constant)]
+            if node.func.attr == "write_text" or (node.func.attr == "open" and modes == ["w"]):
+                ends = [word.value for word in node.keywords if word.arg == "newline"]
+                assert [ast.literal_eval(end) for end in ends] == ["\n"], path
+                written.append(path)
+    assert len(written) >= 5

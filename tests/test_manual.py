@@ -13,7 +13,8 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
-from dpgcli.benchmark.ablation import KEEPABLE
+import dpgcli as dpg
+from dpgcli.benchmark.ablation import ABLATIONS
 from dpgcli.cli import (
     bench,
     check,
@@ -35,15 +36,15 @@ from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import app
+from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
-from dpgcli.mechanics.scene import Origin
+from dpgcli.hard_cases.families import FAMILIES, PATTERNS
+from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.stress.families import FAMILIES, PATTERNS
-from dpgcli.stress.verdicts import Verdict
-from dpgcli.studies.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
 
 ROOT = Path(__file__).parents[1]
@@ -76,8 +77,8 @@ COMMANDS = {
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def sessions() -> list[list[tuple[str, str]]]:
@@ -122,12 +123,21 @@ def test_the_sweep_shown_is_valid(tmp_path: Path) -> None:
     assert read_sweep(path).space.size == 13 * 3 * 3 * 2 * 64
 
 
-def test_the_example_in_python_runs(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_the_examples_in_python_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(ROOT)
-    exec(blocks("python")[-1], {})
-    assert "'101' '111'" in capsys.readouterr().out
+    """One after the other, in a folder of their own beside the examples."""
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    monkeypatch.chdir(tmp_path)
+    section = re.search(r"^## From Python\n(.*?)^## ", README, re.MULTILINE | re.DOTALL)
+    assert section is not None
+    names: dict[str, object] = {}
+    for example in blocks("python", section[1]):
+        exec(example, names)
+    said = capsys.readouterr().out
+    assert "101" in said
+    assert "met: n_stable == 32: all 3 designs" in said
+    assert (tmp_path / "dome.yaml").exists()
 
 
 def test_the_examples_of_reading_tables_run(
@@ -140,9 +150,17 @@ def test_the_examples_of_reading_tables_run(
     assert run(app, ["sweep", str(sweep_file), "-o", "out", "--executor", "serial"]).exit_code == 0
     spec = ROOT / "configs" / "five_unit.yaml"
     assert run(app, ["predict", str(spec), "-o", "states.parquet"]).exit_code == 0
-    for example in blocks("python")[:-1]:
+    examples = blocks("python", README.partition("## From Python\n")[0])
+    assert examples
+    for example in examples:
         exec(example, {})
     assert "tip_y_mm" in capsys.readouterr().out
+
+
+def test_every_function_is_named() -> None:
+    functions = [name for name in dpg.__all__ if inspect.isfunction(getattr(dpg, name))]
+    named = {name for name in functions if re.search(rf"(`|dpg\.){name}\b", README)}
+    assert set(functions) - named <= {"read_calibration", "uniform_finger"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -169,7 +187,7 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in README}
-    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *KEEPABLE}
+    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *ABLATIONS}
     named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

@@ -1,10 +1,10 @@
 """Temporary files and folders: apart from each other, and gone with the next run at the latest."""
 
-import fcntl
 import os
 from pathlib import Path
 from typing import Any
 
+import filelock
 import pytest
 
 from dpgcli.temporary import drop_orphans, temporary_file, temporary_folder
@@ -34,6 +34,7 @@ def test_orphans_go_and_nothing_else(tmp_path: Path) -> None:
     left += [".t.parquet.mine.tmp", ".u.parquet.dpg0.tmp", "kept"]
     with temporary_file(path) as (name, handle):
         assert name.name == ".t.parquet.dpg0.tmp"
+        assert handle is not None
         assert os.fstat(handle).st_size == 0
     assert names(tmp_path) == left
     assert names(tmp_path / ".t.parquet.dpg1.tmp") == ["inside"], "nobody makes folders for it"
@@ -49,15 +50,15 @@ def test_orphans_go_and_nothing_else(tmp_path: Path) -> None:
 def test_one_that_is_taken_before_it_is_locked_is_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: Any
 ) -> None:
-    lock, taken = fcntl.flock, []
+    lock, taken = filelock.lock_descriptor, []
 
-    def late(handle: int, operation: int) -> None:
-        if operation == fcntl.LOCK_EX and not taken:
+    def late(handle: int, *, blocking: bool) -> bool:
+        if blocking and not taken:
             taken.append(tmp_path / ".t.dpg0.tmp")
             taken[0].rename(tmp_path / "away")
-        lock(handle, operation)
+        return lock(handle, blocking=blocking)
 
-    monkeypatch.setattr("dpgcli.temporary.fcntl.flock", late)
+    monkeypatch.setattr("filelock.lock_descriptor", late)
     with kind(tmp_path / "t"):
         assert names(tmp_path) == [".t.dpg1.tmp", "away"]
     assert taken
@@ -67,10 +68,10 @@ def test_one_that_is_taken_before_it_is_locked_is_made_again(
 def test_a_file_system_without_locks_keeps_orphans_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def none(*_: object) -> None:
+    def none(*_: object, **__: object) -> None:
         raise OSError(None, "no locks here")
 
-    monkeypatch.setattr("dpgcli.temporary.fcntl.flock", none)
+    monkeypatch.setattr("filelock.lock_descriptor", none)
     (tmp_path / ".t.dpg0.tmp").write_text("somebody's")
     with temporary_file(tmp_path / "t") as (name, _):
         assert name.name == ".t.dpg1.tmp"

@@ -13,17 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, keep_freed_memory
+from dpgcli.arrays import Array, Columns, Flags, keep_freed_memory
 from dpgcli.benchmark.ablation import check_kept, kept_ways
 from dpgcli.benchmark.methods import Found, Way, other_ways, ways
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.design.scene import Scene
+from dpgcli.hard_cases.cases import check_law
+from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
@@ -31,8 +33,6 @@ from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
-from dpgcli.stress.cases import check_law
-from dpgcli.stress.families import repeated
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers

@@ -1,7 +1,7 @@
-"""Ways to the same states, from the cheapest to the most exact, and beside them what else there is.
+"""Benchmark methods: this package at each accuracy level, and third-party minimizers.
 
-Every way starts from the finger's parameters, or from one common shape where it searches, and
-gives tips and energies of given patterns; `missing` are those it found no state for.
+Every method starts from the finger's parameters, or from one common shape if it searches, and
+gives tips and energies of given patterns, NaN for those without a state.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
 
-PEERS_START = 1.0  # strokes: where the peers begin
+PEER_START_STROKES = 1.0  # opening of inverted units in the peers' starting shape
 
 
 class Found(NamedTuple):
@@ -35,7 +35,7 @@ class Found(NamedTuple):
 
 
 class Way(NamedTuple):
-    """One way; `run` gives what it finds. `n_states` are those that a run solves."""
+    """One method; `run` solves `n_states` states and returns tips and energies."""
 
     name: str
     group: str
@@ -45,7 +45,7 @@ class Way(NamedTuple):
 
 
 def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
-    """Ways of the package to these patterns, (unit, state), of one finger."""
+    """The package's methods for these patterns, (unit, state), of one finger."""
     n_states = inverted.shape[1]
 
     def way(name: str, run: Callable[[], Found], *, certifies: bool = True) -> Way:
@@ -68,9 +68,9 @@ def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
 
 
 def other_ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
-    """What one would do without the package, state by state, each prepared for the finger."""
+    """Third-party minimizers, one state at a time, each prepared for the finger."""
     lattice, network = Lattice(finger), SpringNetwork.of(finger)
-    starts = lattice.of_shape(stroke_guess(finger, inverted, PEERS_START))
+    starts = lattice.of_shape(stroke_guess(finger, inverted, PEER_START_STROKES))
     for peer in peers():
         solve_one = peer.prepare(finger)
 

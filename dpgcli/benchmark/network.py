@@ -135,7 +135,7 @@ class SpringNetwork:
         return np.asarray(self.corner_stiffness * strains.corner)
 
     def _torque(self, strains: _Strains) -> Array:
-        """What the corners do on each span, N mm, counterclockwise."""
+        """The moment of the corners on each span, N mm, counterclockwise."""
         moment, n_spans = self._moment(strains), len(strains.length)
         ahead, behind = (np.bincount(at, moment, n_spans) for at in (self.strut, self.chord))
         return np.asarray(ahead - behind, float)

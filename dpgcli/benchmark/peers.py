@@ -1,4 +1,4 @@
-"""What else finds the stable states of a finger: general minimizers, and a package for springs.
+"""Third-party methods for the stable states of a finger: minimizers, and a spring package.
 
 Each peer is set up as a competent user would, and finds one state at a time from a starting
 shape. Shapes are the free nodes (B_1x, B_1y, T_1x, T_1y, B_2x, …) in mm.
@@ -16,7 +16,7 @@ from dpgcli.arrays import Array
 from dpgcli.benchmark.network import SpringNetwork, by_unit
 from dpgcli.mechanics.finger import Finger
 
-GIVEN_UP = 1e-2  # of the forces in play: with more than that unbalanced, it is no result
+LARGEST_IMBALANCE = 1e-2  # of the forces in play: more unbalanced force is no result
 MOST_STEPS = 500  # of Newton's method
 SHORTEST_STEP = 1e-9  # mm; what remains after it is its square
 SUFFICIENT_DECREASE = 1e-4  # Nocedal and Wright, Numerical Optimization (2006), page 33
@@ -26,7 +26,7 @@ Solve = Callable[[Array], Array]
 
 
 class Peer(NamedTuple):
-    """A way to find stable states.
+    """A third-party method that finds stable states.
 
     `prepare` does what a user would do once for a finger (one design, elastic bars); what it
     returns takes a starting shape, (4 n,), to the state found, (4 n,), NaN if it gave up.
@@ -73,7 +73,7 @@ def _bfgs_by_differences(finger: Finger) -> Solve:
         found = minimize(
             network.energy, start, method="BFGS", jac="3-point", options={"gtol": 1e-5}
         )
-        return _unless_given_up(finger, network, found.x)
+        return _balanced_or_nan(finger, network, found.x)
 
     return solve
 
@@ -92,7 +92,7 @@ def _bfgs(finger: Finger) -> Solve:
         found = minimize(
             network.energy_and_gradient, start, method="BFGS", jac=True, options={"gtol": 1e-6}
         )
-        return _unless_given_up(finger, network, found.x)
+        return _balanced_or_nan(finger, network, found.x)
 
     return solve
 
@@ -108,13 +108,13 @@ def _newton(finger: Finger) -> Solve:
             nodes = nodes + step
             if not np.abs(step).max() > SHORTEST_STEP:
                 break
-        return _unless_given_up(finger, network, nodes)
+        return _balanced_or_nan(finger, network, nodes)
 
     return solve
 
 
 def _newton_step(network: SpringNetwork, nodes: Array) -> Array:
-    """The step, (4 n,), that decreases the energy enough; zero where Newton's points uphill."""
+    """Newton's step, (4 n,), shortened until the energy decreases enough; zero if uphill."""
     value, gradient = network.energy_and_gradient(nodes)
     try:
         step = np.asarray(np.linalg.solve(network.hessian(nodes), -gradient), float)
@@ -130,9 +130,9 @@ def _newton_step(network: SpringNetwork, nodes: Array) -> Array:
 
 
 def _springable(finger: Finger) -> Solve:
-    """The package springable, which relaxes an unloaded assembly by BFGS with the gradient.
+    """The package springable: BFGS with the gradient on an unloaded assembly.
 
-    Where it gives up, it prints so and leaves the starting shape.
+    If it gives up, it prints so and leaves the starting shape.
     """
     from springable.mechanics.load import LoadStep
     from springable.mechanics.model import Model
@@ -146,7 +146,7 @@ def _springable(finger: Finger) -> Solve:
         assembly.set_coordinates(np.concatenate((clamped, start)))
         with redirect_stdout(StringIO()):
             solver.guide_spring_assembly_to_natural_configuration()
-        return _unless_given_up(finger, network, assembly.get_coordinates()[4:])
+        return _balanced_or_nan(finger, network, assembly.get_coordinates()[4:])
 
     return solve
 
@@ -207,8 +207,8 @@ def _springable_domes(values: dict[str, Array]) -> list[Any]:
     ]
 
 
-def _unless_given_up(finger: Finger, network: SpringNetwork, nodes: Array) -> Array:
-    """The nodes, or NaN where forces are left that nobody would take for rounding."""
+def _balanced_or_nan(finger: Finger, network: SpringNetwork, nodes: Array) -> Array:
+    """The nodes, or NaN if the unbalanced force exceeds `LARGEST_IMBALANCE` of those in play."""
     _, gradient = network.energy_and_gradient(nodes)
-    is_balanced = np.abs(gradient).max() <= GIVEN_UP * finger.force_scale.max()
+    is_balanced = np.abs(gradient).max() <= LARGEST_IMBALANCE * finger.force_scale.max()
     return nodes if is_balanced else np.full_like(nodes, np.nan)

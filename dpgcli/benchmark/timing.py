@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-SHORTEST = 5e-3  # s: a shorter call is repeated until it takes that long
-LONGEST = 1.0  # s
+SHORTEST_ROUND = 5e-3  # s: shorter calls are repeated within a round
+LONGEST_REPEATED = 1.0  # s: longer calls are timed once
 KERNEL_SIZE = 20_000
 
 
@@ -23,9 +23,9 @@ class Times(NamedTuple):
 def measured(function: Callable[[], object], repeats: int) -> Times:
     """Time a call `repeats` times, once it is warm; a call longer than a second just once."""
     first = _round(function, 1)
-    if first[0] > LONGEST:  # warmth makes no difference to it
+    if first[0] > LONGEST_REPEATED:  # warmth makes no difference to it
         return Times(first[0], first[0], first[0], first[1])
-    calls = max(1, round(SHORTEST / max(_round(function, 1)[0], 1e-9)))
+    calls = max(1, round(SHORTEST_ROUND / max(_round(function, 1)[0], 1e-9)))
     rounds = np.array([_round(function, calls) for _ in range(repeats)]) / calls
     wall, cpu = rounds.T
     return Times(*(float(v) for v in (np.median(wall), wall.min(), wall.max(), np.median(cpu))))

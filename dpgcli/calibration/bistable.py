@@ -12,14 +12,15 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY, STIFFNESS, STROKE, Loss, Quantity, Rule
 from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import (
     Record,
-    alikeness,
     cleaned,
-    dirt,
     in_order,
     inverted_well,
+    lag1_autocorrelation,
     quasi_static,
+    record_warnings,
     rings,
     unsampled,
     work,
@@ -28,27 +29,21 @@ from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.curve import FEWEST_POINTS
 
-LIMIT = 1.0 / 9.0  # of the linearity: from here on there is one well only
-HARDLY = 0.9  # of the limit: from here on the hinge may cost the second well
-LOW = 0.95  # R² below this is said
-ALIKE = 0.5  # correlation of neighboring residuals above this is said
-SPAN = (0.01, 100.0)  # of the largest opening: bounds of the stroke
+BISTABLE_LIMIT = (
+    1.0 / 9.0
+)  # of α: from it on, the law has one well only (9β² − 8β ≤ 0 with β = 1 − α)
+NEAR_LIMIT_FRACTION = 0.9  # from it on, the hinge may cost the second well
+LOW_R_SQUARED = 0.95  # below it, a warning
+HIGH_AUTOCORRELATION = 0.5  # correlation of neighboring residuals; above it, a warning
+STROKE_BOUNDS = (0.01, 100.0)  # of the largest opening: bounds of the stroke
 
 
 UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
 
 
 @dataclass(frozen=True)
-class Opening:
-    """x = factor u: `amount` is the factor, or the opening (mm) of the inverted well."""
-
-    rule: Rule
-    amount: float = 1.0
-
-
-@dataclass(frozen=True)
 class Choice:
-    """What to fit, to which part of the record, and how; `fixed` are values by key."""
+    """Options of a fit: mapping, quantity, part of the record, loss; `fixed` are values by key."""
 
     opening: Opening
     quantity: Quantity
@@ -130,7 +125,7 @@ def fit_bistable(record: Record, choice: Choice) -> BistableFit:
     record, said = in_order(record)
     observed = _observed(record, choice)
     kept = np.ones(len(observed), bool)
-    warnings = [*said, *dirt(record, is_cut=choice.is_quasi_static)]
+    warnings = [*said, *record_warnings(record, is_cut=choice.is_quasi_static)]
     if choice.is_quasi_static:
         kept, cut = quasi_static(record)
         warnings.append(cut)
@@ -149,7 +144,7 @@ def fit_bistable(record: Record, choice: Choice) -> BistableFit:
 
 
 def _observed(record: Record, choice: Choice) -> Array:
-    """What the law is held against: energies in mJ, or forces along the travel in N."""
+    """The observations to fit: energies in mJ, or forces along the travel in N."""
     if choice.quantity is Quantity.WORK:
         return work(record)
     column = getattr(record, choice.quantity.value)
@@ -184,14 +179,16 @@ def _fitted(opening: Array, observed: Array, factor: float, choice: Choice) -> F
 
 
 def _parameters(opening: Array, observed: Array, choice: Choice) -> list[Parameter]:
-    """Where to start: the best of a few strokes and linearities, each with its best stiffness."""
+    """Parameters with starts: the best of a few strokes and linearities, at the best stiffness."""
     fixed = choice.fixed or {}
-    reach = float(np.abs(opening).max())
-    if reach == 0.0:
+    largest = float(np.abs(opening).max())
+    if largest == 0.0:
         raise FitError("the travel is 0 throughout")
-    strokes = [fixed[STROKE]] if STROKE in fixed else (reach * np.geomspace(0.2, 5.0, 60)).tolist()
+    strokes = (
+        [fixed[STROKE]] if STROKE in fixed else (largest * np.geomspace(0.2, 5.0, 60)).tolist()
+    )
     linearities = [fixed[LINEARITY]] if LINEARITY in fixed else [0.005, 0.02, 0.05, 0.1, 0.3, 0.9]
-    best = (np.inf, 1.0, 0.05, reach)
+    best = (np.inf, 1.0, 0.05, largest)
     for stroke in strokes:
         for linearity in linearities:
             unit = law(opening, np.array([1.0, linearity, stroke]), choice.quantity)
@@ -205,18 +202,18 @@ def _parameters(opening: Array, observed: Array, choice: Choice) -> list[Paramet
     return [
         Parameter(STIFFNESS, stiffness, 1e-6 * stiffness, np.inf, STIFFNESS not in fixed),
         Parameter(LINEARITY, linearity, 0.0, 1.0, LINEARITY not in fixed),
-        _stroke(stroke, reach, is_free=STROKE not in fixed),
+        _stroke(stroke, largest, is_free=STROKE not in fixed),
     ]
 
 
-def _stroke(start: float, reach: float, *, is_free: bool) -> Parameter:
+def _stroke(start: float, largest: float, *, is_free: bool) -> Parameter:
     if not is_free:
         return Parameter(STROKE, start, is_free=False)
-    return Parameter(STROKE, start, SPAN[0] * reach, SPAN[1] * reach)
+    return Parameter(STROKE, start, STROKE_BOUNDS[0] * largest, STROKE_BOUNDS[1] * largest)
 
 
 def _energies(record: Record, observed: Array, choice: Choice) -> tuple[Array, Array]:
-    """The dome's energy by travel. Raises FitError where it is not known."""
+    """The dome's energy by travel. Raises FitError if it is not known."""
     if not choice.is_quasi_static and rings(record):
         raise FitError("its energies are those of a ringing dome")
     if UNITS[choice.quantity] == "mJ":
@@ -232,18 +229,18 @@ def _energies(record: Record, observed: Array, choice: Choice) -> tuple[Array, A
 
 
 def _judgments(found: BistableFit) -> Iterator[str]:
-    """What a user should know about the values."""
+    """Warnings about the fitted values."""
     linearity = float(found.fit.values[1])
     hinge = "the hinge takes another 8/9 k_theta/(k_b H^2) off that limit"
-    if linearity >= LIMIT:
+    if linearity >= BISTABLE_LIMIT:
         yield f"not bistable: force_linearity {linearity:.4g} is not below 1/9, and {hinge}"
-    elif linearity >= HARDLY * LIMIT:
+    elif linearity >= NEAR_LIMIT_FRACTION * BISTABLE_LIMIT:
         yield f"hardly bistable: force_linearity {linearity:.4g} is close to 1/9, and {hinge}"
     yield from _unsampled_points(found)
-    if found.fit.r_squared < LOW:
+    if found.fit.r_squared < LOW_R_SQUARED:
         yield f"the law does not follow the curve: R^2 = {found.fit.r_squared:.3f}"
-    rho = alikeness(found.fit.residuals[np.argsort(found.travel, kind="stable")])
-    if rho > ALIKE and found.fit.rms > 1e-6 * np.abs(found.observed).max():
+    rho = lag1_autocorrelation(found.fit.residuals[np.argsort(found.travel, kind="stable")])
+    if rho > HIGH_AUTOCORRELATION and found.fit.rms > 1e-6 * np.abs(found.observed).max():
         factor = np.sqrt((1.0 + rho) / (1.0 - rho))
         yield (
             f"neighboring residuals are alike (correlation {rho:.2f}): the law has another shape "
@@ -254,9 +251,9 @@ def _judgments(found: BistableFit) -> Iterator[str]:
 def _unsampled_points(found: BistableFit) -> Iterator[str]:
     at_rest = rests(found.fit.values)
     top, well = (float(opening) / found.factor for opening in at_rest)
-    reach = float(found.travel.max())
+    largest = float(found.travel.max())
     if found.well is None:
-        said = f"the inverted well is not sampled (travel up to {reach:.4g} mm)"
+        said = f"the inverted well is not sampled (travel up to {largest:.4g} mm)"
         where = f"; the fitted one, at {well:.4g} mm, is an extrapolation"
         yield said if np.isnan(well) else said + where
     if np.isnan(top):
@@ -266,5 +263,5 @@ def _unsampled_points(found: BistableFit) -> Iterator[str]:
     for start, end in found.gaps:
         if start < top < end:
             yield f"nothing is sampled from {start:.4g} to {end:.4g} mm: {barrier}"
-    if top > reach:
-        yield f"nothing is sampled beyond {reach:.4g} mm: {barrier}"
+    if top > largest:
+        yield f"nothing is sampled beyond {largest:.4g} mm: {barrier}"

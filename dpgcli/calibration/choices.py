@@ -1,4 +1,4 @@
-"""What a fit can be asked for; names only, so that a command line can offer them at once."""
+"""Options of fits, by name; imports nothing heavy, so that `--help` stays fast."""
 
 from enum import StrEnum
 
@@ -8,9 +8,11 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
     "stroke_mm",
 )
 
+LEVER = "segment_height_mm"  # fitted to known states by default
+
 
 class Loss(StrEnum):
-    """How a residual counts: linear is plain least squares, the others limit outliers."""
+    """Loss functions: linear is plain least squares, the others limit outliers."""
 
     LINEAR = "linear"
     SOFT_L1 = "soft_l1"
@@ -19,7 +21,7 @@ class Loss(StrEnum):
 
 
 class Quantity(StrEnum):
-    """What the law is fitted to."""
+    """The measured quantity that a bistable law is fitted to."""
 
     ENERGY = "energy"
     FORCE = "force"
@@ -28,14 +30,14 @@ class Quantity(StrEnum):
 
 
 class Branches(StrEnum):
-    """Which part of a record counts."""
+    """The part of a record that is fitted: all of it, or its slow pieces."""
 
     ALL = "all"
     QUASI_STATIC = "quasi-static"
 
 
 class Rule(StrEnum):
-    """How the opening follows from the travel."""
+    """The mapping from a dome's travel to its opening."""
 
     EQUAL = "equal"
     PROPORTIONAL = "proportional"
@@ -43,14 +45,14 @@ class Rule(StrEnum):
 
 
 class Method(StrEnum):
-    """The way between geometries."""
+    """The method between the geometries of a grid."""
 
     SCALING = "scaling"
     INTERPOLATION = "interpolation"
 
 
 class Target(StrEnum):
-    """What of known states is met."""
+    """The quantity of known states that a finger is fitted to."""
 
     TIPS = "tips"
     ANGLES = "angles"

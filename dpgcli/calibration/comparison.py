@@ -4,19 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 
 POINTS_AT_ONCE = 2**12
-STRAIGHT = 1e-2  # of the largest deflection: what moves less is the straight finger
+SMALLEST_DEFLECTION = 1e-2  # of the largest: a smaller one counts as the straight finger
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Errors of predicted states, (state,), NaN where the lattice or the data have nothing.
+    """Errors of predicted states, (state,), NaN if missing in the lattice or in the data.
 
     `distance` (mm) between the tips, `deflection` (mm) of the known tip from where the straight
     finger's is, `tip_angle` the difference of the tip angles (rad), and largest differences over
@@ -38,7 +38,7 @@ class Comparison:
     def relative(self) -> Array:
         """Distance over deflection; NaN for a tip that hardly moves."""
         largest = np.max(self.deflection, initial=0.0, where=np.isfinite(self.deflection))
-        moved = self.deflection > STRAIGHT * largest
+        moved = self.deflection > SMALLEST_DEFLECTION * largest
         return np.where(moved, self.distance / np.where(moved, self.deflection, 1.0), np.nan)
 
 
@@ -71,7 +71,7 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
 
 
 def _largest(errors: Array) -> Array:
-    """Over units, of those that are known; NaN where none is."""
+    """The largest known error over units, (state,); NaN if none is known."""
     is_known = np.isfinite(errors)
     largest = np.max(errors, axis=0, initial=0.0, where=is_known)
     return np.where(is_known.any(axis=0), largest, np.nan)
@@ -110,33 +110,33 @@ def distances(points: Array, line: Array) -> Array:
     return np.asarray(np.hypot(*nearest).min(axis=0))
 
 
-def _number(name: str, unit: str, description: str) -> Column:
+def _number_column(name: str, unit: str, description: str) -> Column:
     return Column(name, unit, description, Group.STATES)
 
 
 COLUMNS = (
     Column("pattern", "", "activation pattern", Group.STATES, Kind.PATTERN),
     Column("status", "", "stable where certified, else why not", Group.STATES, Kind.STATUS),
-    _number("tip_x_mm", "mm", "predicted tip"),
-    _number("tip_y_mm", "mm", "predicted tip"),
-    _number("known_x_mm", "mm", "known tip"),
-    _number("known_y_mm", "mm", "known tip"),
+    _number_column("tip_x_mm", "mm", "predicted tip"),
+    _number_column("tip_y_mm", "mm", "predicted tip"),
+    _number_column("known_x_mm", "mm", "known tip"),
+    _number_column("known_y_mm", "mm", "known tip"),
 )
 ERRORS = (
-    _number("error_mm", "mm", "distance between the tips"),
-    _number("error_percent", "%", "the same over the deflection of the known tip"),
-    _number("angle_error_rad", "rad", "difference of the tip angles"),
-    _number("max_angle_error_rad", "rad", "largest difference of the phalanges' angles"),
-    _number("max_opening_error_mm", "mm", "largest difference of the openings"),
-    _number("max_push_error_N", "N", "largest difference of the domes' pushes"),
-    _number("max_shape_error_mm", "mm", "largest distance of a known point from the layer"),
-    _number("rms_shape_error_mm", "mm", "root mean square of these distances"),
+    _number_column("error_mm", "mm", "distance between the tips"),
+    _number_column("error_percent", "%", "the same over the deflection of the known tip"),
+    _number_column("angle_error_rad", "rad", "difference of the tip angles"),
+    _number_column("max_angle_error_rad", "rad", "largest difference of the phalanges' angles"),
+    _number_column("max_opening_error_mm", "mm", "largest difference of the openings"),
+    _number_column("max_push_error_N", "N", "largest difference of the domes' pushes"),
+    _number_column("max_shape_error_mm", "mm", "largest distance of a known point from the layer"),
+    _number_column("rms_shape_error_mm", "mm", "root mean square of these distances"),
 )
 CALIBRATED = "calibrated_"
 
 
 def rows(known: KnownStates, found: Comparison, calibrated: Comparison | None = None) -> Columns:
-    """Columns by name: what is predicted and known, and errors of what the data have.
+    """Columns by name: predicted and known tips, and the errors of quantities in the data.
 
     With a calibrated comparison its errors stand beside the others'.
     """
@@ -171,6 +171,6 @@ def _errors(found: Comparison) -> Columns:
 def columns(table: Columns) -> tuple[Column, ...]:
     """The columns that a comparison has."""
     calibrated = (
-        _number(CALIBRATED + c.name, c.unit, f"{c.description}, calibrated") for c in ERRORS
+        _number_column(CALIBRATED + c.name, c.unit, f"{c.description}, calibrated") for c in ERRORS
     )
     return tuple(c for c in (*COLUMNS, *ERRORS, *calibrated) if c.name in table)

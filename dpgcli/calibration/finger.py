@@ -19,15 +19,26 @@ from dpgcli.calibration.comparison import Comparison, compare
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
-from dpgcli.errors import FitError
+from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
-from dpgcli.states.sensitivities import STEP, sensitivities
+from dpgcli.states.sensitivities import COMPLEX_STEP, sensitivities
 
-EDGE = 1e-3  # of a value: a fit that ends closer than this to where states end is none
-WIDEST = 5.0  # times the start, up and down: beyond it a value has lost its meaning
-BARS = (1.0, 1e11)  # times the stiffest bistable spring: bounds of the bars' stiffness
+EDGE_FRACTION = 1e-3  # of a value: ending so close to where a state ceases to exist is no fit
+LARGEST_FACTOR = 5.0  # between the start and a bound: beyond it a value means nothing
+LARGE_ERROR = 0.3  # of the deflection
+LARGE_ERROR_WARNING = Message(
+    "tips are still off by more than 30 % of the deflection: look at ",
+    Field("first_station"),
+    ", ",
+    Field("tip_offset"),
+    ", units, and the sign of y (inverted units curl towards -y)",
+)
+BAR_STIFFNESS_RATIOS = (
+    1.0,
+    1e11,
+)  # times the stiffest bistable spring: bounds of the bars' stiffness
 
 
 @dataclass(frozen=True)
@@ -51,11 +62,13 @@ class FingerFit:
         for key in self.free:
             if key not in values or not self._has(key):
                 known = ", ".join(filter(self._has, values))
-                raise FitError(f"--free {key}: expected one of {known}")
+                raise FitError(Field("free"), f" {key}: expected one of {known}")
             if values[key].size > 1:
-                raise FitError(f"--free {key}: units differ in it, expected one value for all")
+                raise FitError(
+                    Field("free"), f" {key}: units differ in it, expected one value for all"
+                )
             if not np.isfinite(values[key]).all():
-                raise FitError(f"--free {key}: is infinite, start from a finite value")
+                raise FitError(Field("free"), f" {key}: is infinite, start from a finite value")
 
     def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.
@@ -77,9 +90,9 @@ class FingerFit:
         return replace(found, warnings=(*found.warnings, *self._edges(found)))
 
     def _edges(self, found: Fit) -> Iterator[str]:
-        """Values next to which known states cease to exist: the search can go no further."""
+        """Warnings of values at the edge of existence of a known state."""
         for place, parameter in enumerate(found.parameters):
-            for step in (1.0 - EDGE, 1.0 + EDGE) if parameter.is_free else ():
+            for step in (1.0 - EDGE_FRACTION, 1.0 + EDGE_FRACTION) if parameter.is_free else ():
                 values = found.values.copy()
                 values[place] *= step
                 if lost := _missing(self.known.patterns, self._states(values).status):
@@ -88,6 +101,14 @@ class FingerFit:
                         f"states cease to exist ({', '.join(lost)}): the search can go no "
                         "further, and its standard error may mean nothing"
                     )
+
+    def judgments(self, found: Fit) -> Iterator[str]:
+        """Warnings about a fit and its data."""
+        yield from found.warnings
+        if np.nanmax(self.compared(found).relative, initial=0.0) > LARGE_ERROR:
+            yield LARGE_ERROR_WARNING
+        if self.known.unused:
+            yield f"columns not used: {', '.join(self.known.unused)}"
 
     def compared(self, found: Fit | None) -> Comparison:
         """The states beside the known ones: as the finger is, or as it was fitted."""
@@ -113,7 +134,7 @@ class FingerFit:
 
     @cached_property
     def _straight(self) -> Array:
-        """What the straight finger would have, (…, 1): R² is of the deflections."""
+        """The observations of the straight finger, (…, 1): R² is that of the deflections."""
         if self.target == Target.ANGLES:
             return np.zeros((1, 1))
         return self.frame.tips(np.array([self.finger.straight_length, [0.0], [0.0]]))
@@ -158,15 +179,15 @@ class FingerFit:
         return np.asarray((found - self._observed)[self._given])
 
     def _jacobian(self, values: Array) -> Array:
-        """Derivatives of what is fitted, (point, value)."""
+        """Derivatives of the fitted observations by the values, (point, value)."""
         states = self._states(values)
         free = [place for place, p in enumerate(self._parameters) if p.is_free]
         steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
         found = sensitivities(states.settled, steps)
         slopes = found.strut_angles
         if self.target == Target.TIPS:
-            moved = states.pose[:, None] + 1j * STEP * found.pose
-            slopes = self.frame.tips(moved).imag / STEP
+            moved = states.pose[:, None] + 1j * COMPLEX_STEP * found.pose
+            slopes = self.frame.tips(moved).imag / COMPLEX_STEP
         jacobian = np.zeros((int(self._given.sum()), len(self._parameters)))
         jacobian[:, free] = slopes.transpose(0, 2, 1)[self._given]
         return jacobian
@@ -192,7 +213,10 @@ def _missing(patterns: Flags, status: NDArray[np.uint8]) -> list[str]:
 def _parameter(key: str, start: float, is_free: bool, stiffest: float) -> Parameter:
     bounds = {
         "force_linearity": (0.0, 1.0),
-        "linear_stiffness_N_per_mm": (BARS[0] * stiffest, BARS[1] * stiffest),
+        "linear_stiffness_N_per_mm": (
+            BAR_STIFFNESS_RATIOS[0] * stiffest,
+            BAR_STIFFNESS_RATIOS[1] * stiffest,
+        ),
     }
-    lower, upper = bounds.get(key, (start / WIDEST, start * WIDEST))
+    lower, upper = bounds.get(key, (start / LARGEST_FACTOR, start * LARGEST_FACTOR))
     return Parameter(key, start, min(lower, start), max(upper, start), is_free)

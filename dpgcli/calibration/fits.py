@@ -1,4 +1,4 @@
-"""Least squares with free, fixed and bounded parameters, and how far to trust what comes out.
+"""Least squares with free, fixed and bounded parameters, and the errors of fitted values.
 
 With residuals r (point,), the cost is ½ Σ C² ρ((r/C)²), see `losses`. With ψ = ρ' r, ψ' its
 derivative by r, J the Jacobian of m points by n free parameters and H = Jᵀ diag(ψ') J, the
@@ -60,7 +60,7 @@ class Fit:
 
     @property
     def correlation(self) -> Array:
-        """Correlation of the values (n, n): 1 on the diagonal, 0 where an error is missing."""
+        """Correlation matrix of the values, (n, n): 1 on the diagonal, 0 for missing errors."""
         deviation = np.sqrt(np.diag(self.covariance))
         scale = np.outer(deviation, deviation)
         known = np.isfinite(scale) & (scale > 0.0)
@@ -162,7 +162,7 @@ def _judged(search: Search, values: Array, free: Flags, scale: float, observed: 
 
 
 def _covariance(search: Search, values: Array, free: Flags, scale: float) -> Array:
-    """Covariance of the free values; NaN where the points leave no freedom, or no curvature."""
+    """Covariance of the free values; NaN without spare points or positive curvature."""
     slopes = search.jacobian(values)[:, free]
     pull, curvature = influence(search.loss, search.residual(values), scale)
     n_spare = len(pull) - slopes.shape[1]

@@ -2,40 +2,29 @@
 
 Both work on logarithms, so that products of powers are straight: ln q over ln g. A scaling law is
 their least-squares plane, ln q = a + Σ b_i ln(g_i/r_i); an interpolation meets the points, by
-thin-plate splines (scipy's RBFInterpolator, exact for products of powers) or, where the points
-fill a grid, linear between its nodes (RegularGridInterpolator).
+thin-plate splines (exact for products of powers) or, where the points fill a grid, linear between
+its nodes. Each geometry has its values by itself, whatever others are asked for with it; complex
+ones have them too, so that a complex step differentiates a law.
 """
 
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
 from scipy.spatial import Delaunay, QhullError
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, total
 from dpgcli.calibration.choices import Method
 from dpgcli.calibration.fits import Fit, Parameter, fit_linear
+from dpgcli.calibration.interpolants import Multilinear, ThinPlates
+from dpgcli.design.calibrations import Estimate
 from dpgcli.errors import FitError
 
-SLACK = 1e-9  # of the ranges: how far outside the hull rounding may put its corners
+HULL_TOLERANCE = 1e-9  # of the ranges: rounding may put the hull's own corners outside it
 CONSTANT = "ln(value at reference)"
-
-
-class Estimate(NamedTuple):
-    """Values, their relative standard errors, and whether they lie inside the hull; (design,).
-
-    Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an
-    interpolation the root mean square of the leave-one-out errors, the same everywhere. NaN where
-    there are too few points to know.
-    """
-
-    value: Array
-    relative_error: Array
-    is_inside: Flags
 
 
 @dataclass(frozen=True)
@@ -54,7 +43,7 @@ class Points:
 
     @cached_property
     def reference(self) -> Array:
-        """The point nearest to the middle: where a scaling law's errors are small (key,)."""
+        """The point nearest to the middle, (key,), where a scaling law's errors are small."""
         away = np.log(self.geometry)
         size = np.ptp(away, axis=0)
         away = (away - away.mean(axis=0)) / np.where(size > 0.0, size, 1.0)
@@ -67,14 +56,16 @@ class Points:
 
     def are_inside(self, geometry: Array) -> Flags:
         """Whether geometries (design, key) lie in the convex hull of the points, edges included."""
-        scaled, own = self._scaled(geometry), self._scaled(self.geometry)
-        in_range = ((scaled >= -SLACK) & (scaled <= own.max(axis=0) + SLACK)).all(axis=1)
+        scaled, own = self._scaled(np.real(geometry)), self._scaled(self.geometry)
+        in_range = ((scaled >= -HULL_TOLERANCE) & (scaled <= own.max(axis=0) + HULL_TOLERANCE)).all(
+            axis=1
+        )
         if len(self.over) == 1:
             return np.asarray(in_range)
-        return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=SLACK) >= 0))
+        return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=HULL_TOLERANCE) >= 0))
 
     def _scaled(self, geometry: Array) -> Array:
-        """Geometries (design, key) over the ranges of the points, which begin at 0."""
+        """Geometries (design, key) mapped so that the points range from 0 to 1 in each key."""
         size = np.ptp(self.geometry, axis=0)
         return np.asarray((geometry - self.geometry.min(axis=0)) / np.where(size > 0.0, size, 1.0))
 
@@ -98,6 +89,10 @@ class Law:
 
     def at(self, key: str, geometry: Array) -> Estimate:
         """A quantity at geometries (design, key), in the order of `points.over`.
+
+        Of a scaling law the error is that of one more point, s √(1 + xᵀ(XᵀX)⁻¹x); of an
+        interpolation the root mean square of the leave-one-out errors, the same everywhere. NaN
+        where there are too few points to know.
 
         >>> heights = np.array([[1.0], [2.0], [4.0]])
         >>> points = Points(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})
@@ -149,19 +144,21 @@ class Law:
 
     def _value(self, key: str, geometry: Array) -> Array:
         if self.method is Method.SCALING:
-            return np.exp(self._design(geometry) @ self.scaling(key).values)
+            terms = self.scaling(key).values[:, None] * self._design(geometry).T
+            return np.asarray(np.exp(total(terms)))
         return np.asarray(np.exp(self._interpolants[key](np.log(geometry))))
 
     def _relative_error(self, key: str, geometry: Array) -> Array:
         if self.method is Method.INTERPOLATION:
             return np.full(len(geometry), self.leave_one_out(key)[1])
-        found, design = self.scaling(key), self._design(geometry)
+        found, terms = self.scaling(key), self._design(np.real(geometry)).T
         n_spare = found.n_points - len(found.values)
         noise = (found.residuals**2).sum() / n_spare if n_spare else np.nan
-        return np.asarray(np.sqrt(noise + ((design @ found.covariance) * design).sum(axis=1)))
+        spread = total(found.covariance[:, :, None] * terms[:, None])
+        return np.asarray(np.sqrt(noise + total(spread * terms)))
 
     @cached_property
-    def _interpolants(self) -> dict[str, Any]:
+    def _interpolants(self) -> dict[str, Multilinear | ThinPlates]:
         known = self.points.quantities.items()
         return {key: _interpolant(self.points, np.log(values)) for key, values in known}
 
@@ -170,19 +167,17 @@ class Law:
         return np.concatenate((np.ones((len(logs), 1)), logs), axis=1)
 
 
-def _interpolant(points: Points, logs: Array) -> Any:
+def _interpolant(points: Points, logs: Array) -> Multilinear | ThinPlates:
     """A function of ln geometry (design, key) through the points."""
     axes = [np.unique(column) for column in points.geometry.T]
     if np.prod([len(axis) for axis in axes]) == len(logs) and min(map(len, axes)) > 1:
         order = np.lexsort(points.geometry.T[::-1])
         shape = tuple(len(axis) for axis in axes)
         nodes = tuple(np.log(axis) for axis in axes)
-        return RegularGridInterpolator(
-            nodes, logs[order].reshape(shape), bounds_error=False, fill_value=None
-        )
+        return Multilinear(nodes, logs[order].reshape(shape))
     try:
-        return RBFInterpolator(np.log(points.geometry), logs, kernel="thin_plate_spline", degree=1)
-    except (ValueError, np.linalg.LinAlgError):
+        return ThinPlates.through(np.log(points.geometry), logs)
+    except np.linalg.LinAlgError:
         raise FitError(
             f"no interpolation over {', '.join(points.over)} through {len(logs)} points: expected "
             f"at least {len(points.over) + 1} that are not in one line or plane"

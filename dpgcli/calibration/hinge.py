@@ -1,4 +1,4 @@
-"""The stiffness of a hinge from moments over rotations, and whether it is one."""
+"""The stiffness of a hinge from moments over rotations, and tests of its linearity."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.errors import FitError
 
 STIFFNESS = "hinge_stiffness_N_mm_per_rad"
-SIGNIFICANT = 3.0  # standard errors
+SIGNIFICANT_ERRORS = 3.0  # standard errors
 LARGEST_CHANGE = 0.05  # of the secant stiffness over the range
 
 
@@ -74,26 +74,26 @@ def _secants(moment: Array, rotation: Array) -> tuple[float, float]:
 
 
 def _curvature(moment: Array, rotation: Array, secants: tuple[float, float]) -> Iterator[str]:
-    """What speaks against M = k θ."""
-    reach = float(np.abs(rotation).max())
-    powers = rotation / reach
+    """Warnings of nonlinearity: quadratic or cubic terms, and a changing secant stiffness."""
+    widest = float(np.abs(rotation).max())
+    powers = rotation / widest
     is_known = len(np.unique(np.abs(powers[powers != 0.0]))) >= 3 and len(rotation) >= 4
     for name, power in (("quadratic", 2), ("cubic", 3)) if is_known else ():
         shape = np.stack((powers, powers**power), axis=1)
-        terms = (Parameter("linear", secants[0] * reach), Parameter(name, 0.0))
+        terms = (Parameter("linear", secants[0] * widest), Parameter(name, 0.0))
         try:
             found = fit_linear(terms, shape, moment)
         except FitError:  # the rotations hardly differ: nothing to be said of a curvature
             continue
         size, error = float(found.values[1]), float(found.standard_errors[1])
-        if abs(size) > SIGNIFICANT * error and abs(size) > 1e-6 * abs(found.values[0]):
+        if abs(size) > SIGNIFICANT_ERRORS * error and abs(size) > 1e-6 * abs(found.values[0]):
             yield (
-                f"not linear: a {name} term of {size:.3g} +- {error:.2g} N mm at {reach:.3g} rad, "
+                f"not linear: a {name} term of {size:.3g} +- {error:.2g} N mm at {widest:.3g} rad, "
                 f"beside a linear one of {found.values[0]:.3g} N mm"
             )
     near, far = secants
     if abs(far - near) > LARGEST_CHANGE * abs(near):
         yield (
             f"not linear: moment over rotation changes from {near:.4g} to {far:.4g} N mm/rad "
-            f"towards {reach:.3g} rad"
+            f"towards {widest:.3g} rad"
         )

@@ -17,7 +17,7 @@ from dpgcli.states.units import Units
 
 @dataclass(frozen=True)
 class KnownStates:
-    """What is known of some states; arrays (…, state), NaN where nothing is.
+    """Known states, from finite elements or tests; arrays (…, state), NaN if not known.
 
     `patterns` (unit, state), `tip` x and y (2, state) in mm, by unit (unit, state) the `angles` of
     the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
@@ -50,7 +50,7 @@ class KnownStates:
 
     @classmethod
     def of_tips(cls, patterns: Flags, tip: Array, tip_angle: Array | None = None) -> "KnownStates":
-        """States of which nothing but tips, (2, state) in mm, and their angles are known."""
+        """Known states by their tips, (2, state) in mm, and tip angles, (state,) in rad, alone."""
         unknown = np.full(patterns.shape, np.nan)
         angles = unknown.copy()
         if tip_angle is not None:
@@ -60,9 +60,9 @@ class KnownStates:
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the lattice lies in the data's frame.
+    """The position of the lattice in the data's frame.
 
-    `first_station` is B_0 (mm); `tip` is what the data calls the tip, from the last station B_n,
+    `first_station` is B_0 (mm); `tip` is the data's tip as seen from the last station B_n,
     along the end phalanx and to its left (mm).
     """
 
@@ -84,7 +84,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class LatticeStates:
-    """Some states of a finger's lattice, arrays (…, state), NaN where there is no such state.
+    """Some states of a finger's lattice, arrays (…, state), NaN for states that do not exist.
 
     `pose` (3, state) of the last station in the lattice's own frame; `tip` (2, state) and `layer`
     (2, n + 2, state), the layer's line from the first station to the tip, in the data's;

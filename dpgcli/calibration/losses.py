@@ -1,4 +1,4 @@
-"""Loss functions of least squares: how much a residual counts.
+"""Loss functions of least squares: plain, and three that limit outliers.
 
 The cost is ½ Σ C² ρ((r/C)²). ρ(z) = z is plain least squares; soft_l1 2(√(1+z) − 1), huber (z up to
 one, then 2√z − 1) and cauchy ln(1 + z) grow more slowly, so that outliers count less.

@@ -1,4 +1,4 @@
-"""A dome's curve as it was simulated or measured, and what is wrong with it.
+"""A dome's curve as it was simulated or measured, and warnings about its faults.
 
 Travel u of the dome's pole in mm, positive towards inversion, with any of: energy (mJ), force (N),
 pressure (MPa), enclosed volume (mm³), time. Data with time are ordered by it, others by travel.
@@ -13,18 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.errors import FitError
+from dpgcli.errors import Field, FitError, Message
 
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
 BEYOND_REST = 0.4  # of the largest travel: where an inverted well may be
-FAST = 10.0  # times the speed that three quarters of the moving time stay below
-RESTING = 0.01  # of the mean speed, range over duration: slower is not moving
+FAST_RATIO = 10.0  # times the speed that three quarters of the moving time stay below
+RESTING_SPEED = 0.01  # of the mean speed, range over duration: slower is not moving
 SHORTEST_PIECE = 0.01  # of the record's duration: slower for less than that is a turning point
 SMALLEST_SWING = 0.02  # of the range of travels: smaller ones do not count as a reversal
 AT_REST = 0.01  # of the largest travel: closer to 0 a dome is at rest
 MOST_REVERSALS = 2  # of a fast travel: those of a cycle
-CELLS = 100
+N_CELLS = 100
 DISAGREEMENT = 0.02  # of the range of energies: standard deviation at one travel
 MOST_POINTS = 200
 
@@ -46,13 +46,13 @@ class Record:
         return replace(self, **chosen)
 
     @property
-    def reach(self) -> float:
+    def largest_travel(self) -> float:
         """The largest travel, in mm."""
         return float(self.travel.max())
 
 
 def in_order(record: Record) -> tuple[Record, tuple[str, ...]]:
-    """The curve by time, else by travel, without repeated points; and what had to be done.
+    """The curve sorted by time, else by travel, without repeated points; and the changes made.
 
     >>> record, said = in_order(Record(np.array([1.0, 0.0, 1.0]), energy=np.array([2.0, 0.0, 2.0])))
     >>> record.travel.tolist(), said
@@ -73,7 +73,7 @@ def in_order(record: Record) -> tuple[Record, tuple[str, ...]]:
 
 
 def unsampled(travel: Array) -> list[tuple[float, float]]:
-    """Stretches of the travel (mm), from rest on, longer than 15 % of its reach without a point.
+    """Stretches of the travel (mm), from rest on, longer than 15 % of the largest without a point.
 
     >>> unsampled(np.array([2.0, 3.0, 9.0, 10.0]))
     [(0.0, 2.0), (3.0, 9.0)]
@@ -93,7 +93,7 @@ def integral(values: Array, along: Array) -> Array:
 
 
 def work(record: Record) -> Array:
-    """Energy by integrating ∫F du, or ∫p dV where there is no force (mJ, trapezoids), from rest on.
+    """The work done from rest on, ∫F du, or ∫p dV without a force, by trapezoids, mJ, (point,).
 
     Raises FitError where neither is known, where a static record has an unsampled stretch, or
     where it is not known how much was done up to the first point.
@@ -108,7 +108,7 @@ def work(record: Record) -> Array:
     start = float(record.travel[0])
     near_rest = LARGEST_STEP if record.force is not None else AT_REST
     gaps = unsampled(record.travel) if record.time is None else []
-    if abs(start) > near_rest * record.reach:
+    if abs(start) > near_rest * record.largest_travel:
         gaps = [(0.0, start)]
     if gaps:
         raise FitError("no work across {:g} to {:g} mm, where nothing is known".format(*gaps[0]))
@@ -117,7 +117,7 @@ def work(record: Record) -> Array:
 
 
 def inverted_well(record: Record) -> float | None:
-    """Travel (mm) at which the inverted dome rests, None if the curve does not show it.
+    """The travel (mm) of the inverted dome at rest, None if the curve does not show it.
 
     The minimum of a cubic through the energies (without them, the integrated force) around the
     lowest one in the last 60 % of the travel, if it is near the points.
@@ -127,19 +127,19 @@ def inverted_well(record: Record) -> float | None:
     2.5
     """
     record = record.points(np.argsort(record.travel, kind="stable"))
-    energy, reach = record.energy, record.reach
+    energy, largest = record.energy, record.largest_travel
     if energy is None:
         push = record.force if record.force is not None else record.pressure
         if push is None:
             return None
         energy = integral(push, record.travel)
-    late = record.travel > BEYOND_REST * reach
+    late = record.travel > BEYOND_REST * largest
     if not late.any():
         return None
     lowest = record.travel[late][np.argmin(energy[late])]
     away = np.where(late, np.abs(record.travel - lowest), np.inf)
     enough = np.unique(away)[:5][-1]  # at least five points, if they are not far
-    near = away <= max(NEAR_WELL * reach, min(enough, LARGEST_STEP * reach))
+    near = away <= max(NEAR_WELL * largest, min(enough, LARGEST_STEP * largest))
     if len(np.unique(record.travel[near])) < 4:
         return None
     cubic = np.polynomial.Polynomial.fit(record.travel[near], energy[near], 3)
@@ -149,30 +149,30 @@ def inverted_well(record: Record) -> float | None:
     if not len(wells):
         return None
     well = float(wells[0])
-    is_near = np.abs(record.travel[late] - well).min() <= NEAR_WELL * reach
-    return well if is_near and well > BEYOND_REST * reach else None
+    is_near = np.abs(record.travel[late] - well).min() <= NEAR_WELL * largest
+    return well if is_near and well > BEYOND_REST * largest else None
 
 
 def speeds(record: Record) -> tuple[Array, float]:
-    """Speed between points (point − 1,), and the limit above which the dome snaps or rings."""
+    """Speeds between points, (point − 1,), and the speed above which the dome snaps or rings."""
     assert record.time is not None, "speed needs time"
     duration = float(np.ptp(record.time)) or 1.0
     lasting = np.maximum(np.diff(record.time), np.finfo(float).eps * duration)
     speed = np.abs(np.diff(record.travel)) / lasting
-    moving = speed > RESTING * np.ptp(record.travel) / duration
+    moving = speed > RESTING_SPEED * np.ptp(record.travel) / duration
     if not moving.any():
         return speed, np.inf
     ascending = np.flatnonzero(moving)[np.argsort(speed[moving], kind="stable")]
     elapsed = np.cumsum(lasting[ascending])
     usual = speed[ascending][np.searchsorted(elapsed, 0.75 * elapsed[-1])]
-    return speed, FAST * float(usual)
+    return speed, FAST_RATIO * float(usual)
 
 
 class Pieces(NamedTuple):
-    """Points that belong to slow pieces of a record, and how they were told, in words."""
+    """Flags of the points in slow pieces of a record, (point,), and a message about the choice."""
 
     kept: Flags
-    said: str
+    message: str
 
 
 def quasi_static(record: Record) -> Pieces:
@@ -203,19 +203,20 @@ def quasi_static(record: Record) -> Pieces:
     return Pieces(kept, f"quasi-static pieces, time {times}: {dropped} {why}")
 
 
-def dirt(record: Record, *, is_cut: bool) -> Iterator[str]:
-    """What is wrong with a record, in words; `is_cut` where only slow pieces are used."""
+def record_warnings(record: Record, *, is_cut: bool) -> Iterator[str]:
+    """Warnings about faults of a record; `is_cut` if only its slow pieces are used."""
     if not is_cut and rings(record):
-        yield (
-            f"ringing: the travel reverses {_reversals(record)} times while it is fast; "
-            "--branches quasi-static leaves that out"
+        yield Message(
+            f"ringing: the travel reverses {_reversals(record)} times while it is fast; ",
+            Field("branches"),
+            " quasi-static leaves that out",
         )
     if record.energy is None:
         return
     yield from _disagreement(record.travel, record.energy)
     with suppress(FitError):  # no work is known
         yield from _departure(record.energy, work(record))
-    at_rest = np.abs(record.travel) <= AT_REST * record.reach
+    at_rest = np.abs(record.travel) <= AT_REST * record.largest_travel
     if at_rest.any():
         offset = float(record.energy[at_rest][0])
         if abs(offset) > 0.01 * np.ptp(record.energy):
@@ -223,12 +224,12 @@ def dirt(record: Record, *, is_cut: bool) -> Iterator[str]:
 
 
 def rings(record: Record) -> bool:
-    """Whether the travel swings while it is fast; without time nothing is known of that."""
+    """Whether the travel swings while it is fast; False without time."""
     return _reversals(record) > MOST_REVERSALS
 
 
 def _reversals(record: Record) -> int:
-    """How often the travel turns back while it is fast."""
+    """The number of reversals of the travel in its fast part."""
     if record.time is None:
         return 0
     from scipy.signal import find_peaks  # half of a fit's start, for records with time only
@@ -244,7 +245,7 @@ def _reversals(record: Record) -> int:
 
 def _disagreement(travel: Array, energy: Array) -> Iterator[str]:
     """Energies that differ at the same travel: the record drifts, dissipates or is noisy."""
-    width = np.ptp(travel) / CELLS
+    width = np.ptp(travel) / N_CELLS
     cell = np.floor((travel - travel.min()) / width).astype(int) if width > 0.0 else travel * 0
     most, place = 3, -1
     for number in np.unique(cell):
@@ -270,9 +271,11 @@ def _departure(energy: Array, done: Array) -> Iterator[str]:
     away = np.abs(energy - energy[0] - done)
     worst = int(away.argmax())
     if away[worst] > 0.05 * np.ptp(energy):
-        yield (
+        yield Message(
             f"the energy is not the work done: {energy[worst]:.4g} mJ where the work is "
-            f"{energy[0] + done[worst]:.4g} mJ; --quantity work integrates it"
+            f"{energy[0] + done[worst]:.4g} mJ; ",
+            Field("quantity"),
+            " work integrates it",
         )
 
 
@@ -297,10 +300,12 @@ def cleaned(travel: Array, energy: Array) -> tuple[Array, Array]:
     return travel, energy
 
 
-def alikeness(residuals: Array) -> float:
-    """Correlation of neighboring residuals, in their order: 0 if independent, towards 1 if alike.
+def lag1_autocorrelation(residuals: Array) -> float:
+    """Lag-1 autocorrelation of residuals: 0 if independent, towards 1 if neighbors agree.
 
-    >>> round(alikeness(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])), 3)
+    Σ r_i r_(i+1) / Σ r_i², without the mean, since residuals of a fit are about zero.
+
+    >>> round(lag1_autocorrelation(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])), 3)
     0.5
     """
     squares = float((residuals**2).sum())

@@ -12,8 +12,10 @@ from dpgcli.calibration.losses import TUNING, growth
 from dpgcli.errors import FitError
 
 NEAR_BOUND = 1e-3  # of a parameter's size: closer than this, the bound itself is tried
-ALIKE = 1e-9  # smallest singular value of the Jacobian's unit columns that tells them apart
-IDLE = 1e-12  # of the largest effect that a parameter has: below it there is but rounding
+SMALLEST_SINGULAR_VALUE = (
+    1e-9  # of the Jacobian's unit columns; below it, they depend on each other
+)
+SMALLEST_EFFECT = 1e-12  # of the largest parameter's effect on the data; below it is rounding
 TOLERANCE = 1e-14
 MOST_STEPS = 500
 NORMAL_DEVIATION = 1.4826  # of normal errors, over their median absolute value
@@ -23,7 +25,7 @@ Function = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value to fit: its key (unit in the name), where to start, and bounds; or held at start."""
+    """A value to fit, or held at its start: key (unit in the name), start and bounds."""
 
     key: str
     start: float
@@ -43,7 +45,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Search:
-    """What is minimized: the rows that count, of a residual, under a loss."""
+    """The cost to minimize: a residual's `rows` under a loss, by the parameters."""
 
     parameters: tuple[Parameter, ...]
     residual: Function
@@ -52,7 +54,7 @@ class Search:
     rows: Indices
 
     def scaled(self, start: Array, free: Flags, given: float | None) -> tuple[Array, float]:
-        """Where to start and the scale of the loss, from fits that each refine the scale."""
+        """A better start and the scale of the loss, from fits that each refine the scale."""
         if given is not None or self.loss is Loss.LINEAR:
             return start, 1.0 if given is None else given
         plain = replace(self, loss=Loss.LINEAR)
@@ -67,7 +69,7 @@ class Search:
         return values, scale
 
     def solved(self, start: Array, free: Flags, scale: float) -> tuple[Array, Flags]:
-        """Values at the smallest cost, and which are free; those that end at a bound are held."""
+        """Values at the smallest cost, and flags of the free ones; values at a bound are held."""
         values = self.searched(start, free, scale)
         for place in np.flatnonzero(free):
             parameter = self.parameters[place]
@@ -84,7 +86,7 @@ class Search:
         return values, free
 
     def searched(self, start: Array, free: Flags, scale: float) -> Array:
-        """The minimum over the free parameters. Raises FitError where there is none to be found."""
+        """The minimum over the free parameters. Raises FitError if the search finds none."""
         if not free.any():
             return start
         at_start = self.residual(start)[self.rows]
@@ -125,10 +127,10 @@ class Search:
         slopes = self.jacobian(values)[np.ix_(self.rows, free)]
         length = np.sqrt((slopes**2).sum(axis=0))
         effect = length * np.array([p.size for p in self.parameters])[free]
-        length = np.where(effect > IDLE * effect.max(initial=0.0), length, 0.0)
+        length = np.where(effect > SMALLEST_EFFECT * effect.max(initial=0.0), length, 0.0)
         columns = slopes / np.where(length > 0.0, length, np.inf)
         _, singular, directions = np.linalg.svd(columns, full_matrices=False)
-        if singular[-1] > ALIKE:
+        if singular[-1] > SMALLEST_SINGULAR_VALUE:
             return
         keys = [p.key for p, is_free in zip(self.parameters, free, strict=True) if is_free]
         if idle := [key for key, size in zip(keys, length, strict=True) if size == 0.0]:

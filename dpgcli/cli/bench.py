@@ -1,12 +1,10 @@
 """`dpg bench`: error against run time, on the user's own finger."""
 
-import json
 import sys
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,12 +15,12 @@ from dpgcli.cli.options import (
     SpecPath,
     TargetError,
     TipOffset,
-    check_installed,
     check_plot,
+    check_table_name,
     frame_of,
     millimeters,
 )
-from dpgcli.cli.printing import Format, print_grid, printer_of
+from dpgcli.cli.printing import Format, print_grid, print_rows
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -48,7 +46,6 @@ SHOWN = {
     "stiffness": ("stiffness_ratio", "n_missing", "max_tip_error_mm", "µs_per_state", "peak_MiB"),
     "kept": ("seconds", "µs_per_state", "peak_MiB", "tips_move_mm", "bound_mm"),
 }  # fmt: skip
-SLOWER = 2.0  # times its recorded ratio: more than the noise of a shared machine
 
 
 Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
@@ -91,67 +88,54 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
-    from dpgcli.benchmark.bench import Bench
-    from dpgcli.files.known_states import states_of
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
-    from dpgcli.files.scene_file import canonical_json, checked, read_scene, scene_of
-    from dpgcli.files.table_writer import write_states
-    from dpgcli.report.precision import cheapest_way, draw_precision
+    from dpgcli.api.bench import bench
+    from dpgcli.api.inputs import check_installed, scene_input
+    from dpgcli.files.output import Mark, check_outputs
 
     check_installed("dpg bench", "mpmath")
     if plot is not None:
         check_plot(plot)
-    sources = [path for path in (spec, against, compare) if path is not None]
-    outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_table_name(output)
-    document = read_scene(spec, settings or ())
-    check_outputs([*sources, *document.files], *outputs)
-    content = checked(document)
-    scene, said = scene_of(content), canonical_json(content)
+    given = scene_input(spec, settings or ())
+    sources = [path for path in (against, compare) if path is not None]
+    outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
+    check_outputs([*sources, *given.files], *outputs)
     target = None if target_error is None else millimeters("--target-error", target_error)
-    known = None if against is None else states_of(scene.finger, against)
-    then = None if compare is None else _recorded(compare, said)
-    study = Bench(
-        scene,
-        repeats,
-        tuple(keep or ()),
-        target,
-        known,
-        frame_of(first_station, tip_offset),
-        partial(write_states, spec_json="{}"),
-    )
-    study.check()
-    rows = list(_watched(study.rows(), quiet))
-    _write(rows, said, output, record)
+    frame = frame_of(first_station, tip_offset)
+    with _watching(quiet) as watch:
+        found = bench(
+            given,
+            repeats=repeats,
+            target_error=target,
+            keep=tuple(keep or ()),
+            against=against,
+            first_station=frame.first_station,
+            tip_offset=frame.tip,
+            compare=compare,
+            watch=watch,
+        )
+    command = ("dpg", *sys.argv[1:])
+    if output is not None:
+        found.save(output, command)
+    if record is not None:
+        found.record(record, command)
     if plot is not None:
-        draw_precision(rows, str(spec), plot)
-    _print(printed_as, rows)
-    findings = [] if target is None else [cheapest_way(rows, target)]
-    for line in findings + ([] if then is None else _changes(then, rows)):
+        found.draw(plot)
+    _print(printed_as, found.rows)
+    for line in found.findings:
         _tell(printed_as, line)
 
 
-def _recorded(path: Path, said: str) -> "Sequence[Row]":
-    """The rows of a record of the same finger."""
-    from dpgcli.errors import UsageError
-    from dpgcli.files.table_reader import read_record
-    from dpgcli.studies.differences import differences
-
-    facts = read_record(path)
-    changed = differences({"spec": str(facts.get("spec"))}, {"spec": said})
-    if changed:
-        raise UsageError(f"--compare {path}: of another finger, differs in {', '.join(changed)}")
-    rows: Sequence[Row] = facts["rows"]
-    return rows
-
-
-def _watched(rows: "Iterable[Row]", quiet: bool) -> "Iterable[Row]":
+@contextmanager
+def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
     """Name each row on a terminal as it is measured."""
     interactive = sys.stderr.isatty() and not quiet
-    for row in rows:
+
+    def show(row: "Row") -> None:
         if interactive:
             print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
-        yield row
+
+    yield show
     if interactive:
         print(" " * 71, end="\r", file=sys.stderr)
 
@@ -170,12 +154,11 @@ def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
     if printed_as is Format.TABLE:
         _print_tables(rows)
         return
-    for _ in printer_of(printed_as)(COLUMNS, [as_columns(rows)]):
-        pass
+    print_rows(COLUMNS, as_columns(rows), printed_as)
 
 
 def _print_tables(rows: "Sequence[Row]") -> None:
-    from dpgcli.report.precision import text_figure
+    from dpgcli.reports.precision import text_figure
 
     for group, title in GROUPS.items():
         own = [row for row in rows if row["group"] == group]
@@ -207,75 +190,3 @@ def _cell(row: "Row", name: str) -> str:
     if name.endswith(("_mm", "_rad", "_mJ")):
         return f"{value:.1e}"
     return f"{value:.3g}"
-
-
-def _write(rows: "Sequence[Row]", said: str, output: Path | None, record: Path | None) -> None:
-    from dpgcli.benchmark.bench import COLUMNS, as_columns
-    from dpgcli.files.table_writer import record_batch, schema, write_run, write_table
-
-    if output is not None:
-        batch = record_batch(COLUMNS, as_columns(rows))
-        metadata = {"dpg.bench": json.dumps(_machine()), "dpg.spec": said}
-        write_table(output, schema(COLUMNS), [batch], metadata)
-    if record is not None:
-        plain = [{key: _plain(value) for key, value in row.items()} for row in rows]
-        write_run(record, {**_machine(), "spec": said, "rows": plain})
-
-
-def _plain(value: Any) -> Any:
-    """As JSON can say it: null for what was not measured, and .inf as in a spec."""
-    from dpgcli.files.scene_file import spelled
-
-    if not isinstance(value, float):
-        return value
-    return None if value != value else spelled(value)
-
-
-def _machine() -> dict[str, Any]:
-    import os
-    import platform
-
-    import numpy as np
-
-    return {
-        "machine": platform.machine(),
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "command": ["dpg", *sys.argv[1:]],
-    }
-
-
-def _processor() -> str:
-    """The processor's name, where the system tells it."""
-    import platform
-
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor()
-
-
-def _which(row: "Row") -> str:
-    """The row of a group that varies something."""
-    ratio = f"k_L/k_b {row['stiffness_ratio']:.3g}"
-    return f"{row['n_units']} units, {row['n_designs']:,} designs, {ratio}"
-
-
-def _changes(then: "Sequence[Row]", now: "Sequence[Row]") -> list[str]:
-    """What takes a larger multiple of the NumPy kernel's time than it took when recorded."""
-    key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
-    before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
-    slower, n_compared = [], 0
-    for row in now:
-        old = before.get(tuple(_plain(row[name]) for name in key))
-        if not old or not row["relative_time"] > 0.0:
-            continue
-        n_compared += 1
-        ratio = row["relative_time"] / old
-        if ratio > SLOWER:
-            slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, {_which(row)}")
-    verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWER}"
-    return [verdict, *slower]

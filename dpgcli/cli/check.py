@@ -36,14 +36,13 @@ def check(
     """Check that every design of a table meets requirements."""
     from dpgcli.files.output import check_appendable
     from dpgcli.files.table_reader import read_designs
-    from dpgcli.report.page import verdicts_markdown
-    from dpgcli.sweeps.gate import check_requirements, number_columns, requirement
+    from dpgcli.reports.page import verdicts_markdown
+    from dpgcli.sweeps.gate import check_designs
 
     designs, _ = read_designs(table)
     if summary_file is not None:
         check_appendable(summary_file, (table,))
-    columns = number_columns(designs)
-    verdicts = check_requirements(designs, [requirement(text, columns) for text in require])
+    verdicts = check_designs(designs, require)
     print_verdicts(verdicts, listed_as)
     is_written = summary_file is None or append_summary(summary_file, verdicts_markdown(verdicts))
     if code := code_of(verdicts, is_written=is_written):

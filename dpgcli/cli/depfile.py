@@ -2,15 +2,17 @@
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 # What no spelling brings past Make: characters, places where more of them have a meaning (users'
 # homes, libraries, special targets, grouped targets, members of archives), patterns of both kinds.
 UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f=;|\\]|^~|^-l|^\.[A-Z_]+$|[ &]$|\(.*\)$|%.*[*?[]|[*?[].*%")
 SPECIAL = re.compile(r"([ #:*?[])")
 HERE = re.compile(r"^(\./+)+")  # Make drops it before it looks at the rest
+T = TypeVar("T")
 HEAD = "# dpg sweep: what its tables are made from"
 
 
@@ -35,14 +37,26 @@ class Depfile:
     path: Path
     text: str
 
-    def check(self) -> None:
-        """Fail before the work. Raises OutputError for a file that is there and no depfile."""
+    def beside(self, carry_out: Callable[[Callable[[], T]], bool], work: Callable[[], T]) -> bool:
+        """Carry out work, and write the depfile after it but before its tables.
+
+        New tables beside an old one would stay for good. Where there was nothing to do it is
+        written all the same. Raises OutputError, before the work, for a file that is no depfile.
+        """
         from dpgcli.files.output import Mark, check_writable
 
-        check_writable(self.path, Mark.DEPFILE)
+        def with_depfile() -> T:
+            done = work()
+            self._write()
+            return done
 
-    def write(self) -> None:
-        """Write it. Raises OutputError where that fails."""
+        check_writable(self.path, Mark.DEPFILE)
+        if carry_out(with_depfile):
+            return True
+        self._write()
+        return False
+
+    def _write(self) -> None:
         from dpgcli.files.output import Mark, whole_file
 
         with whole_file(self.path, Mark.DEPFILE) as temporary:

@@ -1,8 +1,10 @@
 """How a command ends: exit codes, and what becomes of each kind of error."""
 
 import functools
+import gc
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable
 from enum import IntEnum
@@ -11,6 +13,7 @@ from typing import NoReturn, ParamSpec
 
 import typer
 
+from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.errors import (
     FitError,
@@ -22,10 +25,10 @@ from dpgcli.errors import (
     UsageError,
     WorkplaceError,
 )
+from dpgcli.signals import STOP_SIGNALS
 
 P = ParamSpec("P")
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
 
@@ -58,15 +61,16 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
-            say(str(error))  # each problem starts with its place
+            for problem in map(problem_with_options, error.problems):
+                say(str(problem))  # which starts with its place
             count = len(error.problems)
             fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
         except NoWorkerError as error:
-            fail(ExitCode.FAILED_CASES, str(error))
+            fail(ExitCode.FAILED_CASES, error.message)
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
-            fail(ExitCode.USAGE, str(error))
+            fail(ExitCode.USAGE, error.message)
         except NothingSelectedError as error:
-            fail(ExitCode.NOTHING_SELECTED, str(error))
+            fail(ExitCode.NOTHING_SELECTED, error.message)
         except KeyboardInterrupt as stop:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
@@ -79,9 +83,16 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
 def fail(code: ExitCode, message: str) -> NoReturn:
     """Say why on standard error and end."""
-    for line in message.split("\n") if message else ():
+    for line in with_options(message).split("\n") if message else ():
         say(f"dpg: {line}")
     raise typer.Exit(code)
+
+
+def check_failed(n_failed: int, max_failed: int) -> None:
+    """End the command with its exit code if more designs failed than may."""
+    if n_failed > max_failed:
+        designs = "design" if n_failed == 1 else "designs"
+        fail(ExitCode.FAILED_CASES, f"{n_failed:,} {designs} failed; --max-failed is {max_failed}")
 
 
 def run_and_exit(app: Callable[..., object]) -> NoReturn:
@@ -99,6 +110,7 @@ def run_and_exit(app: Callable[..., object]) -> NoReturn:
     if OUTPUT.error is not None and not isinstance(OUTPUT.error, ConnectionError):
         say(f"dpg: cannot write the output: {OUTPUT.error.strerror}")
         code = code or ExitCode.USAGE
+    gc.freeze()  # nobody needs the garbage that would be looked for at the end
     sys.exit(code)
 
 
@@ -132,8 +144,11 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 def _send_again(number: int) -> None:
     signal.signal(number, _stop)
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
-    signal.setitimer(signal.ITIMER_REAL, SOON)
+    if hasattr(signal, "SIGALRM"):
+        signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
+        signal.setitimer(signal.ITIMER_REAL, SOON)
+    else:  # Windows
+        threading.Timer(SOON, signal.raise_signal, (number,)).start()
 
 
 def _unraisable(lost: "sys.UnraisableHookArgs") -> None:

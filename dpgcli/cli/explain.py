@@ -18,11 +18,12 @@ from dpgcli.cli.options import (
     WithUncertainty,
     request_of,
 )
+from dpgcli.cli.spelling import with_options
 from dpgcli.cli.streams import put
 
 if TYPE_CHECKING:
-    from dpgcli.mechanics.scene import Source
-    from dpgcli.states.plan import Plan
+    from dpgcli.design.scene import Source
+    from dpgcli.states.plan import Omission, Plan
 
 
 class PlanFormat(StrEnum):
@@ -47,14 +48,14 @@ def explain(
     ] = PlanFormat.TEXT,
 ) -> None:
     """Say what predict will do, and leave out, and why."""
-    from dpgcli.files.scene_file import read_spec, scene_of
+    from dpgcli.api.inputs import scene_input
     from dpgcli.states import plan
 
-    scene = scene_of(read_spec(spec, settings or ()))
+    given = scene_input(spec, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
-    made = plan.explain(scene, request)
+    made = plan.explain(given.scene, request)
     if printed_as is PlanFormat.JSON:
         import json
 
@@ -82,7 +83,9 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "rung": plan.rung and plan.rung.name,
         "error_bound_mm": spelled(plan.error_bound),
         "columns": [column.name for column in plan.columns],
-        "left_out": [{"what": o.what, "why": o.why, "keep": o.keep} for o in plan.omissions],
+        "left_out": [
+            {"what": o.what, "why": with_options(o.why), "keep": o.keep} for o in plan.omissions
+        ],
         "expected_seconds": plan.expected_seconds,
         "expected_bytes": plan.expected_bytes,
         "sources": [
@@ -121,7 +124,10 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  columns         {_column_names(plan)}",
         "",
         "Left out",
-        *(f"  {o.what}: {o.why}" + (f" [{o.keep}]" if o.keep else "") for o in plan.omissions),
+        *(
+            f"  {o.what}: {with_options(o.why)}" + (f" [{o.keep}]" if o.keep else "")
+            for o in plan.omissions
+        ),
         "  [names] are what dpg bench --keep puts back, to show what it costs and changes",
         "",
         "Error and cost",
@@ -129,6 +135,11 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  {_bound(plan)}",
         f"  {expected(plan)}",
     ]
+
+
+def _omission(left_out: "Omission") -> str:
+    keep = f" [{left_out.keep}]" if left_out.keep else ""
+    return f"  {left_out.what}: {with_options(left_out.why)}{keep}"
 
 
 def expected(plan: "Plan") -> str:

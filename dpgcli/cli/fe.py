@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dpgcli.cli.exits import command
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
 from dpgcli.cli.streams import put, say
 
@@ -117,8 +118,8 @@ def hinge(
 
 def _check_positive(lengths: dict[str, float | None]) -> None:
     """Options that are neither zero nor negative, nor no number, nor beyond reason."""
+    from dpgcli.design.dimensions import LARGEST, SMALLEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST, SMALLEST
 
     for option, value in lengths.items():
         if value is not None and not SMALLEST <= value <= LARGEST:
@@ -181,3 +182,7 @@ def _carry_out(
     if not quiet:
         sys.stdout.flush()
         say(f"{finding} ({time.monotonic() - start:.3g} s)")
+
+
+for _function in (dome, hinge):
+    app.command()(command(_function))

@@ -28,5 +28,5 @@ def init(
     if os.path.lexists(path) and not force:
         raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
     with whole_file(path, Mark.ANY) as temporary:
-        temporary.write_text(starter(), encoding="utf-8")
+        temporary.write_text(starter(), encoding="utf-8", newline="\n")
     say(f"wrote {path}; next: dpg predict {path}")

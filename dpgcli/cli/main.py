@@ -1,35 +1,57 @@
 """The `dpg` program."""
 
 import os
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from dpgcli import __version__
-from dpgcli.cli import (
-    bench,
-    check,
-    compare,
-    explain,
-    fe,
-    fit,
-    init,
-    merge,
-    predict,
-    report,
-    schema,
-    stress,
-    sweep,
-    validate,
-)
 from dpgcli.cli.exits import command, run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
 for _library in ("OPENBLAS", "MKL", "OMP"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# Pydantic would look for plugins among everything that is installed.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+
+NAMES = (
+    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
+    *("stress", "validate", "init", "schema", "fit", "fe"),
+)
+
+
+class Commands(Mapping[str, Any]):
+    """Commands by name, each imported when it is asked for: one of them is, and help asks all."""
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in NAMES:
+            raise KeyError(name)
+        module = import_module(f"dpgcli.cli.{name}")
+        app = typer.Typer(add_completion=False, rich_markup_mode=None)
+        if hasattr(module, "app"):  # commands of its own
+            app.add_typer(module.app, name=name)
+        else:
+            app.command()(command(getattr(module, name)))
+        return typer.main.get_group(app).commands[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(NAMES)
+
+    def __len__(self) -> int:
+        return len(NAMES)
+
+
+class _Program(TyperGroup):
+    def __init__(self, **named: Any) -> None:
+        super().__init__(**{**named, "commands": Commands()})
+
 
 app = typer.Typer(
     name="dpg",
+    cls=_Program,
     help="Stable shapes of multistable soft grippers, predicted by a lumped spring lattice.",
     epilog="Exit codes: 0 done, 1 a requirement is not met or a hard case fails, 2 usage or spec, "
     "3 internal error, 4 more failed cases than --max-failed, or no worker, 5 nothing selected, "
@@ -39,25 +61,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for _function in (
-    predict.predict,
-    explain.explain,
-    sweep.sweep,
-    merge.merge,
-    check.check,
-    report.report,
-    bench.bench,
-    compare.compare,
-    stress.stress,
-    validate.validate,
-    init.init,
-    schema.schema,
-):
-    app.command()(command(_function))
-app.add_typer(fit.app, name="fit")
-fe.app.command()(command(fe.dome))
-fe.app.command()(command(fe.hinge))
-app.add_typer(fe.app, name="fe")
 
 
 def _version(wanted: bool) -> None:

@@ -91,17 +91,11 @@ def request_of(
     target_error: str | None = None,
 ) -> "Request":
     """The options as a request."""
-    from dpgcli.states.plan import Request
-    from dpgcli.states.rungs import DEFAULT_TOLERANCE
+    from dpgcli.api import predict
 
-    names = tuple(name.strip() for name in columns.split(",") if name.strip())
-    return Request(
-        patterns=tuple(patterns or ()),
-        columns=(*names, *_groups(nodes=nodes, uncertainty=uncertainty)),
-        formulation=formulation.value,
-        tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
-        target_error=None if target_error is None else millimeters("--target-error", target_error),
-    )
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    names = (*columns.split(","), *_groups(nodes=nodes, uncertainty=uncertainty))
+    return predict.request_of(patterns or (), names, formulation.value, tolerance, target)
 
 
 def _groups(**wanted: bool) -> list[str]:
@@ -109,23 +103,25 @@ def _groups(**wanted: bool) -> list[str]:
     return [group for group, is_wanted in wanted.items() if is_wanted]
 
 
-def check_installed(what: str, package: str) -> None:
-    """Raise UsageError if what is asked for needs a package that is not there."""
-    from importlib.util import find_spec
-
-    from dpgcli.errors import UsageError
-
-    if find_spec(package) is None:
-        raise UsageError(f"{what} needs {package}: pip install {package}")
-
-
 def check_plot(path: Path) -> None:
     """Before any work: a suffix that can be drawn, and what draws it."""
+    from dpgcli.api.inputs import check_installed
     from dpgcli.errors import UsageError
 
     if path.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"--plot {path}: expected a name that ends in .svg or .png")
     check_installed("--plot", "matplotlib")
+
+
+def check_table_name(path: Path | None) -> None:
+    """Refuse a name that promises another format than Parquet; raises UsageError."""
+    from dpgcli.errors import UsageError
+
+    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
+        raise UsageError(
+            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
+            "or --plot for figures"
+        )
 
 
 def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
@@ -139,8 +135,8 @@ def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
 
 
 def _point(option: str, text: str) -> tuple[float, float]:
+    from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
-    from dpgcli.files.sections import LARGEST
 
     try:
         x, y = map(float, text.split(","))

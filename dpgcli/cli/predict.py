@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +23,7 @@ from dpgcli.cli.options import (
     Tolerance,
     WithUncertainty,
     check_plot,
+    check_table_name,
     request_of,
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
@@ -30,8 +31,7 @@ from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
-    from dpgcli.mechanics.scene import Scene
-    from dpgcli.states.columns import Columns
+    from dpgcli.arrays import Columns
     from dpgcli.states.predict import Prediction, Summary
     from dpgcli.states.rungs import Rung
 
@@ -59,20 +59,19 @@ def predict(
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
-    from dpgcli.files import scene_file
+    from dpgcli.api.inputs import scene_input
+    from dpgcli.api.predict import check_drawable, draw
     from dpgcli.states import predict as states
 
-    document = scene_file.read_scene(spec, settings or ())
-    checked = scene_file.checked(document)
-    scene = scene_file.scene_of(checked)
+    given = scene_input(spec, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
-    prediction = states.predict(scene, request)
+    prediction = states.predict(given.scene, request)
     if plot is not None:
         check_plot(plot)
-        _check_drawable(prediction.plan.n_states)
-    _check_outputs((spec, *document.files), output, plot)
+        check_drawable(prediction.plan.n_states)
+    _check_outputs(given.files, output, plot)
     if prediction.plan.expected_seconds > LONG and not quiet:
         say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
     rows = _progress(prediction, quiet)
@@ -82,12 +81,14 @@ def predict(
         rows = printer(prediction.plan.columns, rows)
     only_prints = output is None and plot is None
     if output is not None:
-        _write(prediction, output, scene_file.canonical_json(checked), rows)
+        from dpgcli.files.prediction import write_prediction
+
+        write_prediction(prediction, output, given.json, rows, sys.argv)
     for _ in rows:
         if only_prints and not is_read():  # the work is for nobody
             break
     if plot is not None:
-        _draw(scene, request.patterns, plot)
+        draw(given.scene, request.patterns, plot)
     sys.stdout.flush()
     if not quiet and (is_read() or not only_prints):
         say("\n".join(_summary(prediction)))
@@ -106,61 +107,27 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
+    from dpgcli.files.output import Mark, check_outputs, run_file
 
-    run_file = None if output is None else _run_file(output)
-    outputs = ((output, Mark.TABLE), (plot, Mark.FIGURE), (run_file, Mark.FACTS))
-    check_outputs(sources, *outputs)
+    beside = None if output is None else run_file(output)
+    check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
-    if output is not None and run_file is not None:
-        _check_whose(run_file, output)
+    if output is not None and beside is not None:
+        _check_whose(beside, output)
 
 
-def _check_whose(run_file: Path, output: Path) -> None:
+def _check_whose(beside: Path, output: Path) -> None:
     """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
     import json
 
     from dpgcli.errors import UsageError
 
     try:
-        table = json.loads(run_file.read_bytes())["table"]
+        table = json.loads(beside.read_bytes())["table"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
         return
     if table != output.name and (output.parent / str(table)).is_file():
-        raise UsageError(f"{run_file} has the facts of {table}: give another name")
-
-
-def _run_file(output: Path) -> Path:
-    """What differs between runs stands beside the table: states.parquet, states.run.json."""
-    stem = output.stem if output.suffix == ".parquet" else output.name
-    return output.parent / f"{stem}.run.json"
-
-
-def _write(
-    prediction: "Prediction", output: Path, spec_json: str, rows: Iterable["Columns"]
-) -> None:
-    import platform
-
-    from dpgcli.files.table_writer import write_run, write_states
-
-    write_states(prediction, output, spec_json, rows)
-    summary = prediction.summary
-    write_run(
-        _run_file(output),
-        {
-            "table": output.name,
-            "states": {status.text: n for status, n in summary.statuses.items()},
-            "finger_solves": summary.n_finger_solves,
-            "worst_residual_N": summary.residual,
-            "worst_tip_error_mm": summary.tip_error,
-            "seconds": summary.seconds,
-            "cpu_seconds": summary.cpu_seconds,
-            "machine": platform.machine(),
-            "host": platform.node(),
-            "python": platform.python_version(),
-            "command": sys.argv,
-        },
-    )
+        raise UsageError(f"{beside} has the facts of {table}: give another name")
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
@@ -195,22 +162,3 @@ def _chosen(rung: "Rung", bound: float, target: float) -> str:
 
 def _rate(summary: "Summary") -> str:
     return f"{summary.n_states / max(summary.seconds, 1e-9):,.0f} states/s"
-
-
-def _check_drawable(n_states: int) -> None:
-    """Not more shapes than one can see."""
-    from dpgcli.errors import UsageError
-
-    if n_states > ROWS_SHOWN:
-        raise UsageError(
-            f"--plot draws at most {ROWS_SHOWN} states, not {n_states:,}: select with --pattern"
-        )
-
-
-def _draw(scene: "Scene", patterns: tuple[str, ...], path: Path) -> None:
-    from dpgcli.report.figures import draw_states
-    from dpgcli.states.plan import Request
-    from dpgcli.states.predict import predict as predict_states
-
-    request = Request(patterns, columns=("pattern", "status", "nodes"))
-    draw_states(predict_states(scene, request), path)

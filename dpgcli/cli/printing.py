@@ -1,7 +1,6 @@
 """Rows on standard output, as they come: a table for people, CSV and JSON for programs."""
 
 import csv
-import io
 import json
 import math
 import shutil
@@ -14,7 +13,7 @@ from dpgcli.states.columns import Column, Kind
 from dpgcli.text import printable
 
 if TYPE_CHECKING:
-    from dpgcli.states.columns import Columns
+    from dpgcli.arrays import Columns
 
 ROWS_SHOWN = 64
 PRINCIPAL = (
@@ -121,6 +120,12 @@ def printer_of(printed_as: Format, *, principal: bool = False) -> Printer:
     return printers.get(printed_as) or table_printer(principal=principal)
 
 
+def print_rows(columns: tuple[Column, ...], rows: "Columns", printed_as: Format) -> None:
+    """Print one block of rows."""
+    for _ in printer_of(printed_as)(columns, [rows]):
+        pass
+
+
 def _rows(
     columns: tuple[Column, ...], block: "Columns", limit: int | None = None
 ) -> list[list[Any]]:
@@ -135,30 +140,37 @@ def print_grid(
     texts: dict[str, list[str]], *, left: Container[str], may_drop: bool = False
 ) -> None:
     """Aligned columns; on a terminal with folded heads, and without some if it is narrow."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     interactive = sys.stdout.isatty()
     heads = {name: name.replace("_", "_\n") if interactive else name for name in texts}
     if interactive and may_drop:
         _drop_to_fit(heads, texts)
-    table = Table(
-        box=box.SIMPLE_HEAD if interactive else None,
-        padding=(0, 1 if interactive else 2, 0, 0),
-        pad_edge=False,
-        show_edge=False,
-    )
+    n_folds = max(head.count("\n") for head in heads.values())
+    columns = []
     for name, head in heads.items():
-        table.add_column(head, justify="left" if name in left else "right", no_wrap=True)
-    for row in zip(*(texts[name] for name in heads), strict=True):
-        table.add_row(*map(printable, row))
-    lines = io.StringIO()
-    plain = Console(
-        file=lines, width=10_000, color_system=None, force_terminal=False, markup=False, emoji=False
-    )
-    plain.print(table)  # never cropped
-    print("\n".join(line.rstrip() for line in lines.getvalue().splitlines()))
+        above = "\n" * (n_folds - head.count("\n"))
+        cells = [*(above + head).split("\n"), *map(printable, texts[name])]
+        columns.append(_aligned(cells, left=name in left))
+    lines = ["  ".join(row) for row in zip(*columns, strict=True)]
+    if interactive:
+        lines.insert(n_folds + 1, "─" * _width(lines[0]))
+    print("\n".join(line.rstrip() for line in lines))
+
+
+def _aligned(cells: list[str], *, left: bool) -> list[str]:
+    """Cells filled with spaces to one width."""
+    widths = [_width(cell) for cell in cells]
+    spaces = [" " * (max(widths) - width) for width in widths]
+    pairs = zip(cells, spaces, strict=True)
+    return [cell + space if left else space + cell for cell, space in pairs]
+
+
+def _width(text: str) -> int:
+    """How many places of a terminal a text takes."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len
+
+    return cell_len(text)
 
 
 def _drop_to_fit(heads: dict[str, str], texts: dict[str, list[str]]) -> None:

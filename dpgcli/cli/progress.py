@@ -1,7 +1,12 @@
-"""Progress on standard error: one line that moves on a terminal, a line now and then elsewhere."""
+"""Progress on standard error: a bar that moves on a terminal, a line now and then elsewhere."""
 
 import sys
+from functools import cached_property
 from time import monotonic
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 FIRST_SHOWN = 1.0  # s: what is over sooner needs no progress
 TERMINAL_PERIOD, PLAIN_PERIOD = 0.2, 5.0  # s
@@ -16,7 +21,6 @@ class ProgressLine:
         self.began = monotonic()
         self.start = 0
         self.due = self.began + (FIRST_SHOWN if self.interactive else PLAIN_PERIOD)
-        self.is_shown = False
 
     def resume_at(self, done: int) -> None:
         """What was there before does not count as progress."""
@@ -31,13 +35,32 @@ class ProgressLine:
         left = f", {(self.total - done) / rate:,.0f} s left" if rate > 0 else ""
         line = f"{done:,} of {self.total:,} {self.things}, {rate:,.0f}/s{left}"
         if self.interactive:
-            print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
+            (task,) = self._bar.task_ids
+            self._bar.update(task, description=line, completed=done, total=self.total, refresh=True)
         else:
             print(line, file=sys.stderr, flush=True)
-        self.is_shown = self.interactive
         self.due = now + (TERMINAL_PERIOD if self.interactive else PLAIN_PERIOD)
 
     def clear(self) -> None:
-        """Take the moving line away."""
-        if self.is_shown:
-            print("\r" + " " * 70, end="\r", file=sys.stderr, flush=True)
+        """Take the bar away."""
+        if "_bar" in vars(self):
+            self._bar.stop()
+
+    @cached_property
+    def _bar(self) -> "Progress":
+        """Drawn when it is told to, by no thread, and past nothing that others print."""
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        bar = Progress(
+            BarColumn(),
+            TextColumn("{task.description}", markup=False),
+            console=Console(stderr=True, highlight=False),
+            auto_refresh=False,
+            transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
+        )
+        bar.add_task("")
+        bar.start()
+        return bar

@@ -6,6 +6,7 @@ import sys
 from select import select
 from typing import Any, TextIO
 
+from dpgcli.cli.spelling import with_options
 from dpgcli.text import printable
 
 
@@ -87,7 +88,7 @@ def _text(stream: Stream, before: TextIO | None, *, by_line: bool) -> TextIO:
 
 def say(message: str) -> None:
     """Print on standard error; where that cannot be, the exit code has to do."""
-    print(_shown(message), file=sys.stderr, flush=True)
+    print(_shown(with_options(message)), file=sys.stderr, flush=True)
 
 
 def put(text: str) -> None:

@@ -3,7 +3,7 @@
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.options import Quiet, Settings, check_installed
+from dpgcli.cli.options import Quiet, Settings, check_table_name
 from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
-    from dpgcli.files.scene_file import Spec
+    from dpgcli.api.stress import HardCases, StressResult
+    from dpgcli.arrays import Columns
+    from dpgcli.hard_cases.table import FamilySummary
+    from dpgcli.hard_cases.verdicts import Outcome
     from dpgcli.mechanics.finger import Finger
-    from dpgcli.states.columns import Columns
-    from dpgcli.stress.cases import Case
-    from dpgcli.stress.table import FamilySummary
-    from dpgcli.stress.verdicts import Outcome
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
 MARGINS = (
@@ -51,56 +50,28 @@ def stress(
     quiet: Quiet = False,
 ) -> None:
     """Hold stiff and extreme cases against extended precision."""
-    from dpgcli.files.output import Mark, check_outputs, check_table_name
-    from dpgcli.files.scene_file import scene_of
+    from dpgcli.api.stress import hard_cases
+    from dpgcli.files.output import Mark, check_outputs
 
-    check_installed("dpg stress", "mpmath")
-    checked, sources = _spec(spec, settings or ())
-    finger = None if checked is None else scene_of(checked).finger
-    cases = _cases(finger, only or ())
-    check_outputs(sources, (output, Mark.TABLE))
+    cases = hard_cases(spec, only or (), settings or ())
+    check_outputs(cases.given.files if cases.given else (), (output, Mark.TABLE))
     check_table_name(output)
     began = perf_counter()
-    outcomes = _printed(printed_as, _progress(cases, quiet), finger)
+    finger = cases.given.scene.finger if cases.given else None
+    found = cases.result(_printed(printed_as, _progress(cases, quiet), finger))
     if output is not None:
-        _write(output, outcomes, checked)
+        found.save(output)
     if not quiet:
         sys.stdout.flush()
-        say(_summary(outcomes, perf_counter() - began))
-    if any(outcome.is_failure for outcome in outcomes):
+        say(_summary(found, perf_counter() - began))
+    if found.failures:
         raise typer.Exit(ExitCode.REQUIREMENT)
 
 
-def _spec(spec: Path | None, settings: Sequence[str]) -> tuple["Spec | None", tuple[Path, ...]]:
-    """The spec, if there is one, and the files it is read from."""
-    from dpgcli.errors import UsageError
-    from dpgcli.files.scene_file import checked, read_scene
-
-    if spec is None and settings:
-        raise UsageError("--set changes a spec: give one")
-    if spec is None:
-        return None, ()
-    document = read_scene(spec, settings)
-    return checked(document), (spec, *document.files)
-
-
-def _cases(finger: "Finger | None", only: Sequence[str]) -> list["Case"]:
-    from dpgcli.errors import NothingSelectedError
-    from dpgcli.stress.cases import all_cases, check_families
-
-    check_families(only)
-    cases = all_cases(finger, only)
-    if not cases:
-        raise NothingSelectedError(f"--only {', '.join(only)}: there are none without a spec")
-    return cases
-
-
-def _progress(cases: Sequence["Case"], quiet: bool) -> Iterator["Outcome"]:
+def _progress(cases: "HardCases", quiet: bool) -> Iterator["Outcome"]:
     """Outcomes as they come, with progress."""
-    from dpgcli.stress import verdicts
-
-    line = ProgressLine(len(cases), "cases", quiet=quiet)
-    for done, outcome in enumerate(verdicts.stress(cases), start=1):
+    line = ProgressLine(len(cases.cases), "cases", quiet=quiet)
+    for done, outcome in enumerate(cases.outcomes(), start=1):
         yield outcome
         line.show(done)
     line.clear()
@@ -110,7 +81,7 @@ def _printed(
     printed_as: Format, coming: Iterator["Outcome"], finger: "Finger | None"
 ) -> list["Outcome"]:
     """All outcomes: printed one by one as they come, or in tables at the end."""
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
+    from dpgcli.hard_cases.table import STRESS_COLUMNS, rows
 
     outcomes: list[Outcome] = []
 
@@ -130,7 +101,7 @@ def _printed(
 
 def _print_tables(outcomes: list["Outcome"], finger: "Finger | None") -> None:
     """Families by whose finger it is, cases that matter in full, and the finger's margins."""
-    from dpgcli.stress.table import summarized
+    from dpgcli.hard_cases.table import summarized
 
     summaries = summarized(outcomes)
     titles = {"spec": "The spec's finger", "built-in": "The study's finger"}
@@ -173,9 +144,9 @@ def _family(summary: "FamilySummary") -> dict[str, str]:
 
 def _in_full(outcomes: list["Outcome"]) -> list[dict[str, str]]:
     """All that is known of some cases."""
+    from dpgcli.hard_cases.table import STRESS_COLUMNS, rows
     from dpgcli.states.columns import Kind
     from dpgcli.states.rows import as_text
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
 
     values = rows(outcomes)
     texts = {
@@ -219,27 +190,10 @@ def _rounded(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.1e}"
 
 
-def _write(output: Path, outcomes: list["Outcome"], spec: "Spec | None") -> None:
-    from dpgcli.files.scene_file import canonical_json
-    from dpgcli.files.table_writer import (
-        SCHEMA_VERSION,
-        record_batch,
-        schema,
-        versions,
-        write_table,
-    )
-    from dpgcli.stress.table import STRESS_COLUMNS, rows
-
-    metadata = {"dpg.schema_version": str(SCHEMA_VERSION), "dpg.versions": versions()}
-    if spec is not None:
-        metadata["dpg.spec"] = canonical_json(spec)
-    batch = record_batch(STRESS_COLUMNS, rows(outcomes))
-    write_table(output, schema(STRESS_COLUMNS), [batch], metadata)
-
-
-def _summary(outcomes: list["Outcome"], seconds: float) -> str:
+def _summary(found: "StressResult", seconds: float) -> str:
+    outcomes = found.outcomes
     counts = Counter(outcome.verdict.value for outcome in outcomes)
     verdicts = ", ".join(f"{n:,} {verdict}" for verdict, n in counts.most_common())
-    n_failures = sum(outcome.is_failure for outcome in outcomes)
+    n_failures = len(found.failures)
     failures = f"{n_failures} failure{'s' * (n_failures != 1)}"
     return f"{len(outcomes):,} cases in {seconds:.0f} s: {verdicts}; {failures}"

@@ -1,20 +1,18 @@
 """`dpg sweep`: the design space, into two tables."""
 
-import os
-import re
+import sys
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dpgcli.cli.check import append_summary, code_of, print_verdicts
 from dpgcli.cli.depfile import Depfile, depfile_text
-from dpgcli.cli.exits import ExitCode, Terminated
+from dpgcli.cli.exits import ExitCode, Terminated, check_failed
 from dpgcli.cli.options import (
-    LONG,
     MOST_PROCESSES,
     MaxFailed,
     Quiet,
@@ -25,22 +23,16 @@ from dpgcli.cli.options import (
     seconds,
 )
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.report import summarize
 from dpgcli.cli.streams import say
-from dpgcli.cli.sweep_summary import check_failed, run_facts, run_summary
 from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from dpgcli.api.sweep import Place
     from dpgcli.studies.sweep import Progress, Shard, Study
-    from dpgcli.sweeps.executors import Workplace
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import Verdict
-
-MOST_NAMED = 20
-WAIT = "5m"
-ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 
 class ExecutorName(StrEnum):
@@ -107,37 +99,38 @@ def sweep(
 ) -> None:
     """Evaluate every design of a space, resumably."""
     folder = Path(output)
-    if executor is ExecutorName.PROCESSES and jobs != 1 and not folder.exists():
-        _start_fork_server_early()
+    _start_fork_server_early(executor, jobs, folder)
+    from dpgcli.api.sweep import Place, shard_of, study_of
     from dpgcli.files.output import sole_use
+    from dpgcli.studies.run import run
     from dpgcli.studies.sweep import drop_half_written
 
-    part = _shard(shard)
-    limit = _patience(executor, scheduler, wait)
-    if part is not None:
-        _check_part(require, summary_file, depfile)
-    study = _study(spec, settings or (), folder, tolerance, target_error)
+    part = shard_of(shard)
+    limit = None if wait is None else seconds("--wait", wait)
+    place = Place(executor.value, jobs, scheduler, limit)
+    _check_part(part, require, summary_file, depfile)
+    target = None if target_error is None else millimeters("--target-error", target_error)
+    study = study_of(spec, folder, settings or (), tolerance, target)
     _check_names(study, depfile, summary_file)
     rules = _rules(study, require or [])
     described = None if depfile is None else _described(study, output, depfile)
+
+    work = partial(_computed, study, place, part, quiet)
+    carry_out = partial(
+        run,
+        study,
+        part,
+        restart=restart,
+        force=force,
+        is_sent=place.is_sent,
+        settings=settings or (),
+        command=sys.argv,
+        warn=say,
+        tell=(lambda line: None) if quiet else say,
+    )
     with sole_use(folder):
         drop_half_written(folder)
-        if described is not None:
-            described.check()
-        is_new = restart or not study.is_up_to_date
-        if is_new:
-            study.extent.check(study.chunk_size, is_sent=executor is ExecutorName.DASK)
-            _check_folder(study, part, restart=restart, force=force)
-            if not quiet:
-                _say_before(study)
-            progress = _computed(study, _workplace(executor, jobs, scheduler, limit), part, quiet)
-            if described is not None:  # first: new tables beside an old one would stay for good
-                described.write()
-            _conclude(study, progress, part, settings or (), quiet)
-        else:
-            if described is not None:
-                described.write()
-            _leave(study, part, quiet)
+        is_new = carry_out(work) if described is None else described.beside(carry_out, work)
         if part is None:
             n_failed, code = _judge(study, rules, summary_file, is_new, quiet)
         else:
@@ -147,10 +140,17 @@ def sweep(
         raise typer.Exit(code)
 
 
-def _check_part(require: list[str] | None, summary_file: Path | None, depfile: Path | None) -> None:
+def _check_part(
+    part: "Shard | None",
+    require: list[str] | None,
+    summary_file: Path | None,
+    depfile: Path | None,
+) -> None:
     """Raise UsageError for options that are about tables, which a shard does not make."""
     from dpgcli.errors import UsageError
 
+    if part is None:
+        return
     if require or summary_file:
         raise UsageError("--require and --summary-file need the whole table: give them to check")
     if depfile:
@@ -163,43 +163,13 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
     return Depfile(depfile, depfile_text(output, (STATES, DESIGNS), study.sweep.files))
 
 
-def _start_fork_server_early() -> None:
+def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
+    if executor is not ExecutorName.PROCESSES or jobs == 1 or folder.exists():
+        return
     from dpgcli.sweeps.executors import start_fork_server
 
-    start_fork_server("dpgcli.cli.main", "dpgcli.studies.sweep")
-
-
-def _study(
-    spec: Path,
-    settings: Sequence[str],
-    output: Path,
-    tolerance: float | None,
-    target_error: str | None,
-) -> "Study":
-    from dpgcli.files.sweep_file import read_sweep
-    from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
-    from dpgcli.studies.sweep import Study
-
-    target = None if target_error is None else millimeters("--target-error", target_error)
-    exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
-    check_exactness(exactness, target)
-    return Study(read_sweep(spec, settings), output, exactness, target)
-
-
-def _say_before(study: "Study") -> None:
-    """What a long sweep takes."""
-    from dpgcli.studies.extent import size_text
-
-    extent = study.extent
-    if extent.seconds > LONG:
-        less = ", less what constraints exclude" if study.sweep.constraints else ""
-        say(
-            f"{study.folder}: {study.sweep.space.size:,} designs, {extent.n_states:,} states"
-            f"{less}: about {extent.seconds / 60:,.1f} min of one core, "
-            f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
-            "memory (rough: a factor of two either way)"
-        )
+    start_fork_server("dpgcli.studies.sweep", "filelock", "shapely")
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
@@ -215,27 +185,6 @@ def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None
         check_appendable(summary_file, study.sweep.files)
 
 
-def _check_tables(study: "Study") -> None:
-    """Refuse what cannot be replaced, and say what is damaged."""
-    from dpgcli.files.output import check_outputs
-    from dpgcli.studies.sweep import outputs
-
-    for path in study.damaged:
-        say(f"{path} is damaged: made again")
-    check_outputs(study.sweep.files, *outputs(study.folder))
-
-
-def _check_folder(study: "Study", part: "Shard | None", *, restart: bool, force: bool) -> None:
-    """Refuse what is in the way there, unfinished unless it is to go, and what has no room."""
-    if part is None:
-        _check_tables(study)
-    if restart:
-        study.drop_unfinished()
-    study.check_unfinished()
-    if not force:
-        study.check_room()
-
-
 def _rules(study: "Study", require: list[str]) -> "list[Expression]":
     """Requirements over the columns of designs, checked before any work."""
     if not require:
@@ -248,48 +197,15 @@ def _rules(study: "Study", require: list[str]) -> "list[Expression]":
     return [requirement(text, numbers) for text in require]
 
 
-def _conclude(
-    study: "Study",
-    progress: "Progress",
-    part: "Shard | None",
-    settings: Sequence[str],
-    quiet: bool,
-) -> None:
-    """Write the tables unless this is a part of them, and say what the run came to."""
-    from dpgcli.files.table_writer import write_run
-    from dpgcli.studies.sweep import RUN
-
-    replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]
-    if part is None:
-        write_run(study.folder / RUN, run_facts(study, progress, replays))
-        began = perf_counter()
-        study.assemble()  # last but for its own time: finished tables say that all is there
-        progress.tables_seconds = perf_counter() - began
-        write_run(study.folder / RUN, run_facts(study, progress, replays))
-    if not quiet:
-        say(run_summary(study.folder, progress, part))
-    for replay in replays:
-        say(f"failed, its worker died twice; alone: {replay}")
-
-
-def _leave(study: "Study", part: "Shard | None", quiet: bool) -> None:
-    """Say that there is nothing to do; remove what a run left that was stopped at its end."""
-    from dpgcli.studies.sweep import drop_parts
-
-    if part is None and study.owns_all_parts:
-        drop_parts(study.folder)
-    if not quiet:
-        say(f"{study.folder}: up to date")
-
-
 def _judge(
     study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
 ) -> tuple[int, ExitCode]:
     """Report; how many designs failed, and how the command ends if they may."""
-    from dpgcli.report.page import verdicts_markdown
+    from dpgcli.api.report import summarize
+    from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements
 
-    designs, text = summarize(study.folder, is_new=is_new)
+    designs, text = summarize(study.folder, is_new=is_new, say=say)
     if is_new and not quiet:
         print(text, end="")
         if study.target_error is not None:
@@ -309,9 +225,8 @@ def _chosen(designs: "pd.DataFrame") -> str:
     return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 
 
-def _computed(
-    study: "Study", workplace: "Workplace", part: "Shard | None", quiet: bool
-) -> "Progress":
+def _computed(study: "Study", place: "Place", part: "Shard | None", quiet: bool) -> "Progress":
+    workplace = place.workplace(say)
     line = ProgressLine(study.sweep.space.size, "designs", quiet=quiet)
 
     def watch(progress: "Progress") -> None:
@@ -325,48 +240,3 @@ def _computed(
         raise type(stop)("what is done is kept, and the same command goes on from there") from None
     finally:
         line.clear()
-
-
-def _shard(text: str | None) -> "Shard | None":
-    from dpgcli.errors import UsageError
-    from dpgcli.studies.sweep import Shard
-
-    if text is None:
-        return None
-    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-    if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise UsageError(f"--shard {text}: expected K/N with K from 1 to N, such as 3/16")
-    return Shard(int(match[1]), int(match[2]))
-
-
-def _patience(executor: ExecutorName, scheduler: str | None, wait: str | None) -> float:
-    """How long a worker of Dask may be waited for, in s."""
-    from dpgcli.errors import UsageError
-
-    if (executor is ExecutorName.DASK) != (scheduler is not None):
-        raise UsageError("--executor dask and --scheduler tcp://host:port go together")
-    if scheduler is not None and re.fullmatch(ADDRESS, scheduler) is None:
-        raise UsageError(f"--scheduler {scheduler}: expected tcp://host:port")
-    if scheduler is None and wait is not None:
-        raise UsageError("--wait is for the workers of --executor dask")
-    return seconds("--wait", wait or WAIT)
-
-
-def _workplace(
-    executor: ExecutorName, jobs: int | None, scheduler: str | None, limit: float
-) -> "Workplace":
-    from dpgcli.errors import UsageError
-    from dpgcli.sweeps import cluster, executors
-
-    if scheduler is not None:
-        try:
-            return cluster.dask_cluster(scheduler, limit, say)
-        except ImportError as error:
-            raise UsageError("--executor dask needs Dask: pip install distributed") from error
-        except (OSError, ValueError) as error:
-            what = f"--scheduler {scheduler}: no scheduler or no worker answers"
-            raise UsageError(f"{what}: {str(error) or 'time is up'}") from error
-    n_workers = jobs or os.cpu_count() or 1
-    if executor is ExecutorName.SERIAL or n_workers == 1:
-        return executors.serial()
-    return executors.processes(n_workers)

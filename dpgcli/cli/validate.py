@@ -8,6 +8,7 @@ import typer
 
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Settings
+from dpgcli.cli.spelling import problem_with_options
 from dpgcli.cli.streams import put
 from dpgcli.errors import Problem
 from dpgcli.text import printable
@@ -31,18 +32,14 @@ def validate(
     ] = ProblemFormat.TEXT,
 ) -> None:
     """Check specs without solving."""
-    from dpgcli.errors import SpecError
-    from dpgcli.files.scene_file import read_spec
+    from dpgcli.api.validate import validate
 
     problems: list[Problem] = []
     for path in specs:
-        try:
-            read_spec(path, settings or ())
-        except SpecError as error:
-            problems.extend(error.problems)
-        else:
-            if listed_as is ProblemFormat.TEXT:
-                put(f"{path}: ok")
+        found = validate(path, settings=settings or ())
+        problems.extend(map(problem_with_options, found))
+        if not found and listed_as is ProblemFormat.TEXT:
+            put(f"{path}: ok")
     _PRINTERS[listed_as](problems)
     if problems:
         raise typer.Exit(ExitCode.USAGE)

@@ -14,12 +14,17 @@ import numpy as np
 
 from dpgcli.arrays import Array
 
-in_lanes = np.errstate(divide="ignore", invalid="ignore", over="ignore")  # a lane's own trouble
+in_lanes = np.errstate(
+    divide="ignore", invalid="ignore", over="ignore"
+)  # one lane's division by zero is its own
 
 
 @dataclass(frozen=True)
 class Factorization:
-    """L (strictly below the diagonal, as a band) and the pivots D, shape (size, batch)."""
+    """A = L D Lᵀ: `lower` is L strictly below its diagonal, as a band (bandwidth, size, batch).
+
+    `pivots` are D, (size, batch); all are positive where A is positive definite.
+    """
 
     lower: Array
     pivots: Array
@@ -28,7 +33,9 @@ class Factorization:
 
 @in_lanes
 def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
-    """Factorize in place; `band` is used up.
+    """Factorize a symmetric band, (bandwidth + 1, size, batch), in place; `band` is used up.
+
+    Golub and Van Loan, Matrix Computations, 4th ed., 2013, sections 4.1.2 and 4.3.
 
     >>> band = np.array([[[4.0], [3.0]], [[2.0], [0.0]]])  # [[4, 2], [2, 3]]
     >>> factorize(band, (1, 0)).pivots.ravel()
@@ -46,7 +53,12 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
 
 @in_lanes
 def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
-    """Overwrite b with y = L⁻¹ b; shape (size, batch) or (size, number, batch)."""
+    """Overwrite b with y = L⁻¹ b; shape (size, batch) or (size, number, batch).
+
+    >>> band = np.array([[[4.0], [3.0]], [[2.0], [0.0]]])  # [[4, 2], [2, 3]], L_21 = 1/2
+    >>> forward(factorize(band, (1, 0)), np.array([[8.0], [8.0]])).ravel()
+    array([8., 4.])
+    """
     y = right_hand_sides
     lower = factorization.lower
     for column, depth in enumerate(factorization.column_depths):
@@ -60,7 +72,13 @@ def forward(factorization: Factorization, right_hand_sides: Array) -> Array:
 
 @in_lanes
 def backward(factorization: Factorization, y: Array) -> Array:
-    """Overwrite y with x = L⁻ᵀ y, shape (size, batch)."""
+    """Overwrite y with x = L⁻ᵀ y, shape (size, batch).
+
+    >>> factorization = factorize(np.array([[[4.0], [3.0]], [[2.0], [0.0]]]), (1, 0))
+    >>> y = forward(factorization, np.array([[8.0], [8.0]])) / factorization.pivots
+    >>> backward(factorization, y).ravel()  # 4 + 2·2 = 8, 2 + 3·2 = 8
+    array([1., 2.])
+    """
     lower = factorization.lower
     for column in range(len(factorization.column_depths) - 1, -1, -1):
         for k in range(factorization.column_depths[column]):

@@ -1,4 +1,4 @@
-"""What an energy is made of: scalars of a shape (measures), each under a law; terms add up.
+"""The parts of an energy: measures (scalars of a shape), laws and coordinates; terms add up.
 
 A term is a measure times a law. The measure gives a scalar q for each of its cells, with ∇q
 and ∇²q by the few coordinates that q depends on; the law gives energy, force and stiffness of
@@ -27,9 +27,9 @@ class Response(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Where one coordinate of a measure stands: of cell c in row `offset + stride · c`.
+    """The rows of one of a measure's coordinates: for cell c, row `offset + stride · c`.
 
-    With a negative offset the first cell has none: what it would move is clamped.
+    With a negative offset the first cell has none: its coordinate is clamped.
     """
 
     stride: int
@@ -88,7 +88,13 @@ class ScalarLaw(Protocol):
 
 @dataclass(frozen=True)
 class Term:
-    """A measure under a law; `kind` is the name by which energies are listed."""
+    """A measure under a law, Σ E(q) over cells; energies are listed by `kind`.
+
+    >>> from dpgcli.mechanics.terms import Quadratic
+    >>> spring = Term("spring", OwnCoordinate(Row(1, 0), 1), Quadratic(np.array([[3.0]])))
+    >>> float(spring.law(spring.measure(np.array([[2.0]])).value).energy[0, 0])  # ½ k q²
+    6.0
+    """
 
     kind: str
     measure: Measure
@@ -121,7 +127,7 @@ class OwnCoordinate:
 
 
 class Coordinates(Protocol):
-    """A system of coordinates (size, batch): their number, their scales, and how steps lead on.
+    """A system of coordinates (size, batch): number, scales, and the update by a step.
 
     `force_unit` (size, batch or 1) turns a component of the gradient into a force in N: 1 for a
     length, a lever for an angle. `gradient_scale` is the force in play at each coordinate, in the
@@ -144,9 +150,13 @@ class Coordinates(Protocol):
         """The same coordinates for some lanes of the batch."""
 
     def moved(self, coordinates: Array, step: Array) -> Array:
-        """Where a step leads: coordinates + step, or better where that would strain bars."""
+        """The coordinates after a step: their sum, or a curved update that strains bars less."""
 
 
 def take_lanes(values: Array, index: Indices) -> Array:
-    """The lanes of an array (…, batch) at `index`; an array that is the same for all stays."""
+    """The lanes of an array (…, batch) at `index`; an array with one lane for all stays.
+
+    >>> take_lanes(np.array([[1.0, 2.0, 3.0]]), np.array([2, 0]))
+    array([[3., 1.]])
+    """
     return values if values.shape[-1] == 1 else np.take(values, index, axis=-1)

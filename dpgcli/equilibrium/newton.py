@@ -16,22 +16,23 @@ from dpgcli.equilibrium.banded import Factorization, backward, factorize, forwar
 from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.potential import Evaluation, Potential
 
-SUFFICIENT_DECREASE = 1e-4
+SUFFICIENT_DECREASE = 1e-4  # Nocedal and Wright (2006), page 33
 SMALLEST_FRACTION = 2.0**-40  # of a step; below it a lane has stalled
-SETTLED = 1e-6  # of the step cap: the next step of a regular minimum is then at rounding
-LEFT_BEHIND = 0.25  # finished share of a batch from which on it is worth leaving
+SETTLED_STEP = 1e-6  # of the step cap; Newton squares it: the next step would be rounding
+COMPACTING_SHARE = 0.25  # of finished lanes: from it on, dropping them pays for the copy
 PIVOT_ROUNDING = 32 * np.finfo(float).eps  # of the diagonal it came from
 ROUNDING = 64 * np.finfo(float).eps  # of the energies added up
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Where each lane stopped, evaluated and factorized there.
+    """The points at which the lanes stopped, with energy, gradient and factorization there.
 
     `residual` is the max-norm of the gradient as a force, N; `relative_residual` the same
     over the forces in play; `curvature` the smallest pivot over the stiffness it is measured
     by, positive where the Hessian is positive definite and no pivot's sign in doubt. `energies`
-    are by kind. Shapes (batch,) but for `coordinates` and `gradient`, (size, batch).
+    are by kind, `iterations` counts steps. Shapes (batch,) but for `coordinates` and `gradient`,
+    (size, batch).
     """
 
     coordinates: Array
@@ -44,7 +45,7 @@ class Equilibrium:
     iterations: Indices
 
     def with_lanes(self, lanes: Indices, others: "Equilibrium", taken: Indices) -> "Equilibrium":
-        """These lanes replaced by those at `taken` of other equilibria of the same potential."""
+        """The equilibria with `lanes` replaced by those at `taken` of others of this potential."""
 
         def put(own: Any, other: Any) -> Any:
             if isinstance(own, dict):
@@ -69,6 +70,13 @@ def minimize(
     The last step must have been small as well: where stiff directions settle before soft
     ones, the residual alone stops too early. A lane that has not converged after
     `max_iterations` evaluations is returned where the walk was; its `relative_residual` tells.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> potential = chain_potential(uniform_finger(1, **STUDY))
+    >>> found = minimize(potential, np.array([[0.05], [0.02]]), 1e-12)  # corners, rad
+    >>> bool(np.abs(found.coordinates).max() < 1e-12), bool(found.curvature[0] > 0.0)  # straight
+    (True, True)
     """
     n_lanes = guess.shape[1]
     final = np.ascontiguousarray(guess)
@@ -84,7 +92,7 @@ def minimize(
             if len(lanes) == n_lanes and walk.accepted.all():
                 return _equilibrium(potential, walk.here, evaluation, iterations)
             break
-        if walk.finished.mean() > LEFT_BEHIND:
+        if walk.finished.mean() > COMPACTING_SHARE:
             final[:, lanes] = walk.here
             keep = np.flatnonzero(~walk.finished)
             lanes = lanes[keep]
@@ -96,7 +104,7 @@ def minimize(
 
 @dataclass
 class _Walk:
-    """Lanes on their way: where each stands, its energy there, and the point it tries next.
+    """The lanes of a search: the present point of each, its energy, and the next trial point.
 
     `fraction` of `step` is what is tried; `settled` says that the last accepted step was small.
     """
@@ -114,7 +122,7 @@ class _Walk:
 
     @classmethod
     def at(cls, potential: Potential[Coordinates], guess: Array) -> "_Walk":
-        """Lanes at their guesses, about to be looked at for the first time."""
+        """Lanes at their guesses, before the first evaluation."""
         n = guess.shape[1]
         yes, no = np.ones(n, bool), np.zeros(n, bool)
         infinite, zero, one = np.full(n, np.inf), np.zeros(n), np.ones(n)
@@ -136,16 +144,16 @@ class _Walk:
         return newly
 
     def step_from(self, evaluation: Evaluation) -> None:
-        """Choose the next trial: a new step where the last was accepted, else half of it."""
+        """Choose the next trial: a new step after an accepted one, else half of the last."""
         step, slope, length = _downhill(self.potential, evaluation)
         if self.accepted.all():
             self.step, self.slope = step, slope
-            self.fraction, self.settled = np.ones(len(slope)), length <= SETTLED
+            self.fraction, self.settled = np.ones(len(slope)), length <= SETTLED_STEP
         else:
             self.step = np.where(self.accepted, step, self.step)
             self.slope = np.where(self.accepted, slope, self.slope)
             self.fraction = np.where(self.accepted, 1.0, 0.5 * self.fraction)
-            self.settled = self.accepted & (length <= SETTLED)
+            self.settled = self.accepted & (length <= SETTLED_STEP)
         self.trial = self.potential.coordinates.moved(self.here, self.fraction * self.step)
         if self.finished.any():
             self.trial = np.where(self.finished, self.here, self.trial)
@@ -218,7 +226,7 @@ def _equilibrium(
 
 
 def _curvature(pivots: Array, diagonal: Array, scale: Array) -> Array:
-    """Smallest pivot over its scale; zero at best where rounding may have made its sign."""
+    """Smallest pivot over its scale, (batch,); at most zero if a pivot may be rounding."""
     certain = pivots > PIVOT_ROUNDING * np.abs(diagonal)
     curvature = np.min(pivots / scale, axis=0)
     return np.asarray(np.where(certain.all(axis=0), curvature, np.minimum(curvature, 0.0)))

@@ -26,6 +26,7 @@ class Evaluation:
 
     @property
     def energy(self) -> Array:
+        """The sum over terms, (batch,)."""
         first, *rest = self.energies
         return sum(rest, start=first)
 
@@ -48,7 +49,7 @@ class Potential(Generic[System]):
 
     @cached_property
     def column_depths(self) -> tuple[int, ...]:
-        """How far down each column of the Hessian, and of its factorization, may be nonzero."""
+        """The depth to which each column of the Hessian, and of L, may be nonzero."""
         cells = tuple((term.measure.rows, term.measure.n_cells) for term in self.terms)
         return _column_depths(self.coordinates.size, cells)
 
@@ -61,6 +62,14 @@ class Potential(Generic[System]):
         """Whether it is the sum of two potentials that share the coordinates in these rows only.
 
         No term then couples a coordinate before these rows with one behind them.
+
+        >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+        >>> from dpgcli.mechanics.terms import chain_potential
+        >>> chain = chain_potential(uniform_finger(2, **STUDY, linear_stiffness=1e4))
+        >>> chain.is_separable(slice(3, 4)), chain.is_separable(slice(2, 3))
+        (True, False)
+
+        Cells share their struts (row 3 is s_1), but not their corners (row 2 is b_1).
         """
         return not any(
             min(rows) < shared.start and max(rows) >= shared.stop
@@ -74,7 +83,10 @@ class Potential(Generic[System]):
         return Potential(self.coordinates.take_lanes(index), taken)
 
     def evaluate(self, coordinates: Array) -> Evaluation:
-        """Add up the terms at `coordinates`, shape (size, batch)."""
+        """Σ E, Σ F ∇q and Σ K ∇q ∇qᵀ + F ∇²q over terms at `coordinates`, shape (size, batch).
+
+        Complex coordinates are allowed: the derivatives by complex steps need them.
+        """
         gradient = np.zeros_like(coordinates)
         bandwidth = max(self.column_depths)
         hessian = np.zeros((bandwidth + 1, *coordinates.shape), coordinates.dtype)
@@ -87,7 +99,7 @@ class Potential(Generic[System]):
         return Evaluation(tuple(energies), gradient, hessian)
 
     def by_kind(self, energies: tuple[Array, ...]) -> dict[str, Array]:
-        """Energies of the terms, added up by their kinds."""
+        """Energies of the terms, (batch,) each, added up by kind."""
         added: dict[str, Array] = {}
         for term, energy in zip(self.terms, energies, strict=True):
             added[term.kind] = added[term.kind] + energy if term.kind in added else energy
@@ -137,7 +149,7 @@ def _rows_by_cell(rows: tuple[Row, ...], n_cells: int) -> list[list[int]]:
 
 @cache  # the same few for every batch
 def _column_depths(size: int, cells: Cells) -> tuple[int, ...]:
-    """The maximum over terms, and what elimination fills in: column j reaches as far as it ties."""
+    """Depths of the Hessian's columns: the maximum over terms, and the fill-in of elimination."""
     depths = [0] * size
     for rows, n_cells in cells:
         for placed in _rows_by_cell(rows, n_cells):

@@ -1,23 +1,31 @@
-"""CSV read strictly: what each cell says, where it stands, and all problems at once."""
+"""CSV and data frames read strictly: what each cell says, where it stands, all problems at once."""
 
 import csv
 import hashlib
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.design.dimensions import LARGEST
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of, decoded
 from dpgcli.files.places import Place, in_order, located, shown
-from dpgcli.files.sections import LARGEST
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+Tabular: TypeAlias = Union[str, Path, "pd.DataFrame", Mapping[str, Any]]
+"""A CSV file, a data frame (of pandas, or what has `to_pandas`), or columns by name."""
+
+FRAME = "data frame"
 MAX_BYTES = 64 * 1024 * 1024
 COMMENT = re.compile(r"#+\s|#$")
 TO_COMMENT = "behind the # of a comment stands a space"
@@ -81,15 +89,37 @@ class Sheet:
         return located(Place(self.file), "header", expected, found, hint)
 
 
-def read_sheet(path: Path) -> Sheet:
+def name_of(source: Tabular) -> str:
+    """The name of the file, or what stands for one.
+
+    >>> name_of("curves/dome.csv"), name_of({"travel_mm": [0.0]})
+    ('dome.csv', 'data frame')
+    """
+    return Path(source).name if isinstance(source, str | Path) else FRAME
+
+
+def _content(source: Tabular) -> tuple[str, bytes]:
+    """What the source is called in messages, and its text as CSV."""
+    if isinstance(source, str | Path):
+        hint = "a curve or a table of states is short"
+        return str(source), content_of(Path(source), Place(str(source)), MAX_BYTES, hint)
+    import pandas as pd
+
+    convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
+    frame = convert() if convert is not None else pd.DataFrame(source)
+    return FRAME, frame.to_csv(index=False).encode()
+
+
+def read_sheet(source: Tabular) -> Sheet:
     """Read a CSV file with a header; lines that start with # are comments.
+
+    A data frame is read as the CSV that it would be written to, header in line 1.
 
     Below the header a comment has a space behind the #: spreadsheets write #DIV/0!, and of a row
     such as #5,0.2 nobody knows whether it is meant.
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
-    file = str(path)
-    content = content_of(path, Place(file), MAX_BYTES, "a curve or a table of states is short")
+    file, content = _content(source)
     rows: list[list[str]] = []
     lines, problems = [], []
     text = io.StringIO(decoded(content, Place(file)), newline=None)

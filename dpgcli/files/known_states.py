@@ -1,4 +1,4 @@
-"""Known states from CSV: tips, angles, openings and pushes by pattern, shapes by their points."""
+"""Known states from tables: tips, angles, openings and pushes by pattern; shapes as points."""
 
 import re
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.csv_file import Sheet, read_sheet
+from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
 from dpgcli.files.places import Place, in_order, located
 from dpgcli.mechanics.finger import Finger
 
@@ -22,7 +22,7 @@ MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
 FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
-def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownStates:
+def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) -> KnownStates:
     """Known states of a finger of n units; empty cells are not known.
 
     Columns: `pattern`; `tip_x_mm` and `tip_y_mm`; `tip_angle_rad`; `chamber2_angle_rad` …, of the
@@ -30,7 +30,7 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
     points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Raises SpecError
     with every problem of a file.
     """
-    sheet = read_sheet(path)
+    sheet = read_sheet(source)
     sheet.check_names(("pattern",))
     if len(sheet.rows) * n_units > MOST_UNITS:
         expected = f"at most {MOST_UNITS // n_units:,} states of {n_units} units"
@@ -69,19 +69,20 @@ def read_states(path: Path, n_units: int, shapes: Path | None = None) -> KnownSt
     return known
 
 
-def states_of(finger: Finger, path: Path, shapes: Path | None = None) -> KnownStates:
+def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
     """Known states that can be those of this finger, in mm and rad.
 
     Raises SpecError as `read_states` and `check_scale` do.
     """
-    known = read_states(path, finger.n_units, shapes)
-    check_scale(path, known, float(finger.straight_length[0]))
+    known = read_states(source, finger.n_units, shapes)
+    check_scale(source, known, float(finger.straight_length[0]))
     return known
 
 
-def check_scale(file: Path, known: KnownStates, length: float) -> None:
+def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
     """Raise SpecError for what cannot be a finger this long (mm): tips, shapes and angles."""
-    place, problems = Place(str(file)), []
+    place = Place(str(source) if isinstance(source, str | Path) else FRAME)
+    problems = []
     points = [shape for shape in known.shapes if shape.size]
     shapes = np.concatenate(points, axis=1) if points else np.zeros((2, 0))
     for key, what, places in (("tip_x_mm", "tips", known.tip), ("x_mm", "shapes", shapes)):
@@ -157,9 +158,9 @@ def _angles(sheet: Sheet, n_units: int) -> Array:
     return angles
 
 
-def _read_shapes(path: Path, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
+def _read_shapes(source: Tabular, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
     """Points by state, in the order of the file; none for a state that is not in it."""
-    sheet = read_sheet(path)
+    sheet = read_sheet(source)
     sheet.check_names(("pattern", *POINT))
     problems = _pattern_problems(sheet, n_units)
     points = sheet.numbers(POINT)

@@ -1,21 +1,21 @@
-"""Curves of domes and hinges and tables of geometries, read from CSV with units in column names."""
+"""Curves of domes and hinges and tables of geometries, read with units in column names."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
-from dpgcli.errors import Problem, SpecError
+from dpgcli.design.dimensions import SMALLEST, unit_of
+from dpgcli.design.geometry import snap_pressure
+from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.calibration.models import Values
-from dpgcli.files.csv_file import Sheet, read_sheet
+from dpgcli.files.csv_file import Sheet, Tabular, read_sheet
 from dpgcli.files.places import in_order
-from dpgcli.files.sections import SMALLEST, Geometry, expected_of, unit_of
+from dpgcli.files.sections import Geometry, expected_of
 from dpgcli.files.yaml_file import MAX_NODES
-from dpgcli.mechanics.geometry import snap_pressure
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}
@@ -71,9 +71,22 @@ class Moments:
     ignored: tuple[str, ...]
     sha256: str
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Columns whose texts tell rows of different hinges apart, in words."""
+        return tuple(
+            Message(
+                f"rows of {n} different {name} are fitted as one hinge: choose with ",
+                Field("where"),
+                f" '{name}=...'",
+            )
+            for name, texts in self.texts.items()
+            if (n := len(set(texts))) > 1
+        )
+
 
 @dataclass(frozen=True)
-class Table:
+class GridTable:
     """Geometries (point, key) by `over`, and positive quantities (point,) by key.
 
     `constant` holds geometry that is the same in all points. `doubts` are what no soft finger has,
@@ -89,12 +102,12 @@ class Table:
     sha256: str
 
 
-def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measured:
-    """A dome's curve from CSV; the geometry tells units that are a thousand times off.
+def read_curve(source: Tabular, geometry: Mapping[str, float] | None = None) -> Measured:
+    """A dome's curve; the geometry tells units that are a thousand times off.
 
     Raises SpecError with every problem at once.
     """
-    sheet = read_sheet(path)
+    sheet = read_sheet(source)
     headless = list(_one_of(sheet, TRAVELS))
     if not set(QUANTITIES) & set(sheet.names):
         headless.append(sheet.missing(*QUANTITIES))
@@ -110,12 +123,12 @@ def read_curve(path: Path, geometry: Mapping[str, float] | None = None) -> Measu
     return Measured(Record(**arrays), _unused(sheet, known), sheet.sha256)
 
 
-def read_moments(path: Path, where: str | None = None) -> Moments:
-    """Moments and rotations of a hinge from CSV; `where` "COLUMN=TEXT" chooses rows.
+def read_moments(source: Tabular, where: str | None = None) -> Moments:
+    """Moments and rotations of a hinge; `where` "COLUMN=TEXT" chooses rows.
 
     Raises SpecError with every problem at once.
     """
-    sheet = read_sheet(path)
+    sheet = read_sheet(source)
     headless = list(_one_of(sheet, ROTATIONS))
     if MOMENT not in sheet.names:
         headless.append(sheet.missing(MOMENT))
@@ -134,12 +147,12 @@ def read_moments(path: Path, where: str | None = None) -> Moments:
     return Moments(columns[MOMENT], columns[rotation], texts, unused, sheet.sha256)
 
 
-def read_table(path: Path) -> Table:
-    """Quantities over geometries from CSV: columns that are keys of the geometry, and the others.
+def read_table(source: Tabular) -> GridTable:
+    """Quantities over geometries: columns that are keys of the geometry, and the others.
 
     Columns of text are left out. Raises SpecError with every problem at once.
     """
-    sheet = read_sheet(path)
+    sheet = read_sheet(source)
     keys = [name for name in sheet.names if name in Geometry.model_fields]
     others = [
         name
@@ -170,7 +183,7 @@ def read_table(path: Path) -> Table:
         problems.append(sheet.problem(None, "file", "geometries that differ", "one and the same"))
     if problems:
         raise SpecError(in_order(problems))
-    return Table(
+    return GridTable(
         over,
         np.stack([columns[key] for key in over], axis=1),
         {name: columns[name] for name in others},
@@ -216,13 +229,14 @@ def _is_numeric(sheet: Sheet, name: str) -> bool:
 def _chosen(sheet: Sheet, where: str) -> Sheet:
     name, equals, text = where.partition("=")
     if not equals:
-        raise SpecError((sheet.problem(None, "--where", "COLUMN=TEXT", repr(where)),))
+        raise SpecError((sheet.problem(None, Field("where"), "COLUMN=TEXT", repr(where)),))
     sheet.check_names([name.strip()])
     cells = sheet.cells(name.strip())
     kept = [row for row, cell in enumerate(cells) if cell == text.strip()]
     if not kept:
         there = "; ".join(dict.fromkeys(cells))
-        raise SpecError((sheet.problem(None, "--where", f"a text of {name}", repr(text), there),))
+        expected = f"a text of {name}"
+        raise SpecError((sheet.problem(None, Field("where"), expected, repr(text), there),))
     return sheet.chosen(kept)
 
 
@@ -259,8 +273,9 @@ def _scales(
             hint = GUESSES[kind][largest > high]
             needed = BEHIND.get(kind, ())
             if missing := [key for key in needed if key not in (geometry or {})]:
-                hint += f" if it is right, say how large the dome is: --geometry {missing[0]}=..."
-                hint += "".join(f" --geometry {key}=..." for key in missing[1:])
+                hint = Message(hint, " if it is right, say how large the dome is:")
+                for key in missing:
+                    hint = Message(hint, " ", Field("geometry"), f" {key}=...")
             expected = f"a largest value of {low:.3g} to {high:.3g}"
             yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
 

@@ -1,6 +1,5 @@
 """Files appear whole or not at all, and never in the place of what somebody else wrote."""
 
-import fcntl
 import os
 import re
 import stat
@@ -11,9 +10,10 @@ from enum import Enum
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
-from dpgcli.temporary import temporary_file
+from dpgcli.temporary import lock, temporary_file
 from dpgcli.text import control_character
 
+OPENS_FOLDERS = hasattr(os, "O_DIRECTORY")  # not Windows
 ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
 NO_TEXT = (".parquet", ".csv", ".yaml", ".yml", ".json", ".html", ".svg", ".png", ".pdf")
 
@@ -59,7 +59,8 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
             _sync(temporary, os.O_RDWR)
             _check_replaceable(target, mark)
             temporary.replace(target)
-            _sync(target.parent, os.O_RDONLY)
+            if OPENS_FOLDERS:
+                _sync(target.parent, os.O_RDONLY)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -113,13 +114,14 @@ def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
             raise UsageError(f"{path} is the spec or data that is read: give another name")
 
 
-def check_table_name(path: Path | None) -> None:
-    """Refuse a name that promises another format than Parquet; raises UsageError."""
-    if path is not None and path.suffix.lower() in (".csv", ".json", ".svg", ".png"):
-        raise UsageError(
-            f"--output {path}: writes Parquet; for {path.suffix} use --format with > FILE, "
-            "or --plot for figures"
-        )
+def run_file(table: Path) -> Path:
+    """The file of what differs between runs: states.parquet, states.run.json.
+
+    >>> run_file(Path("out/states.parquet")).as_posix()
+    'out/states.run.json'
+    """
+    stem = table.stem if table.suffix == ".parquet" else table.name
+    return table.parent / f"{stem}.run.json"
 
 
 def check_appendable(path: Path, sources: Iterable[Path]) -> None:
@@ -174,25 +176,24 @@ def sole_use(folder: Path) -> Iterator[None]:
     """Make a folder if need be, and keep every other process that asks out of it.
 
     Raises UsageError where another is at work there, OutputError where there can be no such
-    folder. A folder that was made and stayed empty is removed.
+    folder. A folder that was made and stayed empty is removed, but not on Windows.
     """
     if control := control_character(str(folder)):
         raise OutputError(f"cannot write {folder}: {control} in it")
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
+        handle = _handle(folder)
     except FileExistsError as error:
         raise OutputError(f"cannot write {folder}: it is no folder") from error
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror}") from error
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+    is_free = True
+    with suppress(OSError):  # a file system without locks
+        is_free = lock(handle, blocking=False)
+    if not is_free:
         os.close(handle)
-        raise UsageError(f"another dpg is at work in {folder}: wait, or name another") from error
-    except OSError:
-        pass  # a file system without locks
+        raise UsageError(f"another dpg is at work in {folder}: wait, or name another")
     try:
         yield
     finally:
@@ -200,6 +201,13 @@ def sole_use(folder: Path) -> Iterator[None]:
             with suppress(OSError):
                 folder.rmdir()
         os.close(handle)
+
+
+def _handle(folder: Path) -> int:
+    """What is locked for a folder: itself, on Windows a file in it that goes when it is closed."""
+    if OPENS_FOLDERS:
+        return os.open(folder, os.O_RDONLY)
+    return os.open(folder / ".dpg.lock", os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0))
 
 
 def _check_replaceable(target: Path, mark: Mark) -> None:
@@ -230,8 +238,10 @@ def _beside(path: Path) -> Iterator[Path]:
         yield temporary
 
 
-def _permit(handle: int, old: Path) -> None:
+def _permit(handle: int | None, old: Path) -> None:
     """Give a new file the permissions and, as far as one may, the owners of an old one."""
+    if handle is None:  # Windows, where a file has those of its folder
+        return
     if not old.exists():
         mask = os.umask(0)
         os.umask(mask)

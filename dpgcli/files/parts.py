@@ -1,15 +1,15 @@
 """Results of chunks on disk, so that an interrupted sweep can go on.
 
-A part holds the states and the designs of a range of designs as two Arrow streams, and at its end
-where the second begins. Its name is its range and the SHA-256 of its bytes: a part that does not
-match its name does not count.
+A part is a Parquet file of a range of designs, with a row for each block of work: the list of its
+states and the list of its designs. Its name is its range and a SHA-256 of its bytes and of its
+sweep, by the name of the folder: a part that does not match its name, damaged or of another sweep,
+does not count.
 """
 
 import hashlib
 import json
 import os
 import re
-import struct
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -17,17 +17,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 
+from dpgcli.arrays import Columns
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_writer import record_batch, schema
-from dpgcli.states.columns import Column, Columns
+from dpgcli.states.columns import Column
 from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
-LENGTH = struct.Struct("<Q")
+LISTS = ("states", "designs")
+LAYOUT = {"compression": "lz4", "use_dictionary": False, "write_statistics": False}
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT = "dpg.fingerprint"
@@ -45,29 +49,26 @@ def write_part(
     design_columns: tuple[Column, ...],
     blocks: Iterable[tuple[Columns, Columns]],
 ) -> int:
-    """Write a part as its blocks of states and of designs come; the number of its states.
-
-    At its end stands where the designs begin: known only when all states are written.
-    """
-    designs = []
+    """Write a part as its blocks of states and of designs come; the number of its states."""
+    both = (state_columns, design_columns)
+    described = pa.schema(
+        {name: pa.list_(pa.struct(list(schema(c)))) for name, c in zip(LISTS, both, strict=True)}
+    )
     n_states = 0
-    with _stream(sink, state_columns) as stream:
-        for of_states, of_designs in blocks:
-            batch = record_batch(state_columns, of_states)
-            n_states += batch.num_rows
-            stream.write_batch(batch)
-            designs.append(record_batch(design_columns, of_designs))
-    middle = sink.tell()
-    with _stream(sink, design_columns) as stream:
-        for batch in designs:
-            stream.write_batch(batch)
-    sink.write(LENGTH.pack(middle))
+    with pq.ParquetWriter(sink, described, **LAYOUT) as writer:
+        for block in blocks:
+            states, designs = (record_batch(*table) for table in zip(both, block, strict=True))
+            row = [_as_list(states), _as_list(designs)]
+            writer.write_batch(pa.RecordBatch.from_arrays(row, schema=described))
+            n_states += states.num_rows
     return n_states
 
 
-def _stream(sink: IO[bytes], columns: tuple[Column, ...]) -> Any:
-    options = pa.ipc.IpcWriteOptions(compression="zstd")
-    return pa.ipc.new_stream(sink, schema(columns), options=options)
+def _as_list(batch: Any) -> Any:
+    """Rows as one list of them."""
+    rows = batch.to_struct_array()
+    ends = pa.py_buffer(np.array([0, len(rows)], np.int32))
+    return pa.Array.from_buffers(pa.list_(rows.type), 1, [None, ends], children=[rows])
 
 
 class Part(NamedTuple):
@@ -78,25 +79,20 @@ class Part(NamedTuple):
     path: Path
 
     def batches(self, which: int) -> Iterator[Any]:
-        """Record batches of its states (0) or designs (1)."""
-        yield from self._stream(which)
+        """Record batches of its states (0) or designs (1), a block each."""
+        with self.path.open("rb") as stream:
+            for row in pq.ParquetFile(stream).iter_batches(1, columns=[LISTS[which]]):
+                yield pa.RecordBatch.from_struct_array(row.column(0).flatten())
 
     def schema(self, which: int) -> Any:
         """Columns of its states (0) or designs (1)."""
-        return self._stream(which).schema
-
-    def _stream(self, which: int) -> Any:
-        file = pa.OSFile(os.fspath(self.path))
-        if which == 1:
-            file.seek(file.size() - LENGTH.size)
-            (middle,) = LENGTH.unpack(file.read(LENGTH.size))
-            file.seek(middle)
-        return pa.ipc.open_stream(file)
+        with self.path.open("rb") as stream:
+            return pa.schema(pq.read_schema(stream).field(LISTS[which]).type.value_type)
 
     @property
     def is_damaged(self) -> bool:
-        """Whether its bytes do not match its name."""
-        return not self.path.is_file() or _digest(self.path) not in self.path.name
+        """Whether its bytes and its sweep do not match its name."""
+        return not self.path.is_file() or _digest(self.path, self.path.parent) not in self.path.name
 
 
 @dataclass(frozen=True)
@@ -113,7 +109,7 @@ class PartStore:
             with temporary_file(place) as (scratch, _):
                 with scratch.open("wb") as file:
                     yield file
-                name = f"{place.name}-{_digest(scratch)}.part"
+                name = f"{place.name}-{_digest(scratch, self.folder)}.part"
                 with whole_file(self.folder / name, Mark.ANY) as temporary:
                     scratch.replace(temporary)
         except OSError as error:
@@ -137,7 +133,7 @@ class PartStore:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
             with whole_file(self.folder / SAID, Mark.ANY) as temporary:
-                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8")
+                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8", newline="\n")
 
     def said(self) -> dict[str, str]:
         """What the sweep is about; empty where that is not said, or is damaged.
@@ -174,7 +170,7 @@ class PartStore:
         return sorted(Part(int(m[1]), int(m[2]), path) for m, path in matches if m)
 
     def damaged(self) -> list[Part]:
-        """Parts whose bytes do not match their name."""
+        """Parts that do not match their name: damaged, or of another sweep."""
         return [part for part in self.parts() if part.is_damaged]
 
     def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -199,6 +195,9 @@ def _is_description(path: Path) -> bool:
     return path.is_file() and not path.is_symlink() and is_own(path, Mark.PARTS)
 
 
-def _digest(path: Path) -> str:
+def _digest(path: Path, sweep: Path) -> str:
+    """Of a part's bytes, as one of the sweep that a folder is of."""
+    digest = hashlib.sha256(sweep.name.encode())
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        hashlib.file_digest(file, lambda: digest)
+    return digest.hexdigest()[:16]

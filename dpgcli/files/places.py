@@ -6,11 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dpgcli.errors import Problem
-from dpgcli.text import printable
-
-KeyPath = tuple[str | int, ...]
-
-MAX_SHOWN = 60
+from dpgcli.text import MAX_SHOWN, shortened
 
 
 @dataclass(frozen=True)
@@ -38,21 +34,6 @@ def in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
         return p.line is None, files.index(p.file), p.line or 0, p.column or 0
 
     return tuple(sorted(first.values(), key=order))
-
-
-def dotted(path: KeyPath) -> str:
-    """A key path as people write it: `finger.overrides.4-5`."""
-    return ".".join(shortened(str(part)) for part in path) or "document"
-
-
-def shortened(text: str, limit: int = MAX_SHOWN) -> str:
-    """Text fit for one line of a message: printable, and cut where it is long.
-
-    >>> shortened("a" * 100, 10)
-    'aaaaaaa...'
-    """
-    head = printable(text[: limit + 1])
-    return head if len(head) <= limit else head[: limit - 3] + "..."
 
 
 def shown(value: object) -> str:

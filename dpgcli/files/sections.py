@@ -1,20 +1,17 @@
 """Sections that specs and calibration files share: a finger's geometry and its lattice.
 
-Units are part of each key's name. Lengths, moduli and stiffnesses lie within 1e-12 to 1e12, so
-that any power of them that the model takes stays far from overflow; the linear stiffness, a stiff
-limit, may reach 1e18.
+Units are part of each key's name.
 """
 
 import math
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
-from dpgcli.mechanics.geometry import chamber_width
-
-SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
-AGREEMENT = 1e-6  # of a value given twice
+from dpgcli.design.dimensions import LARGEST, SMALLEST, STIFFEST, check_widths
+from dpgcli.design.problems import Issue, Problems
 
 EXPECTED = {  # where it is not a length
     "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
@@ -23,42 +20,18 @@ EXPECTED = {  # where it is not a length
     "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",
     "elastic_modulus_MPa": "a modulus > 0 in MPa",
 }
-UNITS = {
-    "_N_mm_per_rad": "N mm/rad",
-    "_N_per_mm": "N/mm",
-    "_mm": "mm",
-    "_MPa": "MPa",
-    "_deg": "°",
-}
 
 
-def wrong_width(sizes: Mapping[str, float]) -> tuple[str, str, str, str] | None:
-    """Key, what is expected, found and why, where the widths of cell and chamber disagree."""
-    if "unit_cell_mm" not in sizes:
-        return None
-    cell = sizes["unit_cell_mm"]
-    derived = chamber_width(cell)
-    rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
-    if derived <= 0:
-        return "unit_cell_mm", "a length > 2 mm", f"{cell:.10g}", rule
-    given = sizes.get("chamber_width_mm", derived)
-    if math.isclose(given, derived, rel_tol=AGREEMENT):
-        return None
-    return "chamber_width_mm", f"{derived:.10g} as unit_cell_mm has it", f"{given:.10g}", rule
+def wrong_width(sizes: Mapping[str, float]) -> Issue | None:
+    """What is wrong where the widths of cell and chamber disagree."""
+    problems = Problems()
+    check_widths({key: np.array([size]) for key, size in sizes.items()}, problems)
+    return next(iter(problems.of(0)), None)
 
 
 def expected_of(key: str) -> str:
     """What a key of the geometry or the lattice expects, in words."""
     return EXPECTED.get(key, "a length > 0 in mm")
-
-
-def unit_of(key: str) -> str:
-    """The unit in a key's name, none where it has none.
-
-    >>> unit_of("finger.lattice.segment_height_mm")
-    'mm'
-    """
-    return next((unit for suffix, unit in UNITS.items() if key.endswith(suffix)), "")
 
 
 def _spelled_out(value: object) -> object:
@@ -86,7 +59,14 @@ BarStiffness = Annotated[
 class Section(BaseModel):
     """A mapping whose keys are all known."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        strict=True, frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True
+    )
+
+    def given(self) -> dict[str, Any]:
+        """The values that there are, by key."""
+        fields = type(self).model_fields
+        return {key: value for key in fields if (value := getattr(self, key)) is not None}
 
 
 class UnitGeometry(Section):

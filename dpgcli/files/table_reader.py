@@ -35,12 +35,17 @@ def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """
     if path.is_dir():
         raise UsageError(f"{path} is a folder: name the table in it, designs.parquet")
-    table = read_undamaged(path, partial(_readable, path))
+    return designs_in(read_undamaged(path, partial(_readable, str(path))), str(path))
+
+
+def designs_in(table: Any, name: str) -> tuple[pd.DataFrame, dict[str, str]]:
+    """The same of a pyarrow Table; `name` is what messages call it."""
+    table = table.select(_readable(name, table.schema))
     units = {
         field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
         for field in table.schema
     }
-    return _plain(path, table), units
+    return _plain(name, table), units
 
 
 def _all(described: Any) -> list[str]:
@@ -88,6 +93,8 @@ def undamaged(stream: BinaryIO) -> Any:
 
 def _check_room(path: Path, metadata: Any, names: list[str]) -> None:
     """Raise UsageError for columns that are larger than the machine's memory."""
+    if not hasattr(os, "sysconf"):  # Windows
+        return
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
     columns = (group.column(place) for group in groups for place in range(group.num_columns))
@@ -98,7 +105,7 @@ def _check_room(path: Path, metadata: Any, names: list[str]) -> None:
         raise UsageError(f"cannot read {path}: its columns take {found} of memory")
 
 
-def _readable(path: Path, described: Any) -> list[str]:
+def _readable(source: str, described: Any) -> list[str]:
     """Columns of a schema to read: numbers and the texts that are known.
 
     Raises UsageError for what is no table of designs.
@@ -106,11 +113,11 @@ def _readable(path: Path, described: Any) -> list[str]:
     names = described.names
     if missing := [name for name in NEEDED if name not in names]:
         raise UsageError(
-            f"{path} is no table of designs: no column {', '.join(missing)}; "
+            f"{source} is no table of designs: no column {', '.join(missing)}; "
             "dpg sweep writes one, designs.parquet"
         )
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise UsageError(f"{path}: expected each column once, found {', '.join(twice)} again")
+        raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
     swept = names[names.index("design") + 1 : names.index("calibration")]
     kept = []
     for field in described:
@@ -120,7 +127,7 @@ def _readable(path: Path, described: Any) -> list[str]:
         if is_readable:
             kept.append(field.name)
         elif field.name in (*NEEDED, *swept):
-            raise _wrong_type(path, field.name, field.type)
+            raise _wrong_type(source, field.name, field.type)
     return kept
 
 
@@ -141,11 +148,11 @@ def _kind(name: str) -> str:
     return "text" if name in TEXTS else "whole numbers" if name in COUNTS else "numbers"
 
 
-def _wrong_type(path: Path, name: str, kind: Any) -> UsageError:
-    return UsageError(f"{path}: column {name}: expected {_kind(name)}, found {kind}")
+def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
+    return UsageError(f"{source}: column {name}: expected {_kind(name)}, found {kind}")
 
 
-def _plain(path: Path, table: Any) -> pd.DataFrame:
+def _plain(source: str, table: Any) -> pd.DataFrame:
     """The columns of three plain types."""
     names = table.column_names
     swept = names[names.index("design") + 1 : names.index("calibration")]
@@ -156,7 +163,7 @@ def _plain(path: Path, table: Any) -> pd.DataFrame:
         if plain is not None:
             columns[name] = plain
         elif name in (*NEEDED, *swept):
-            raise _wrong_type(path, name, column.type)
+            raise _wrong_type(source, name, column.type)
     return pd.DataFrame(columns)
 
 

@@ -16,12 +16,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dpgcli import __version__
+from dpgcli.arrays import Columns
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Kind
+from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
@@ -130,7 +131,7 @@ def write_run(path: Path, facts: dict[str, Any]) -> None:
     """Write what differs between runs (times, host) beside a table."""
     text = json.dumps({"written_by": f"dpg {__version__}", **facts}, indent=2)
     with whole_file(path, Mark.FACTS) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
 def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
@@ -227,11 +228,8 @@ def _strings(values: NDArray[Any]) -> Any:
 
 
 def _statuses(codes: NDArray[Any]) -> Any:
-    names = [status.text.encode() for status in Status]
-    ends = np.cumsum([0, *map(len, names)], dtype=np.int32)
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(names))]
-    texts = pa.Array.from_buffers(pa.string(), len(names), buffers)
-    indices = pa.Array.from_buffers(
-        pa.int8(), len(codes), [None, pa.py_buffer(codes.astype(np.int8))]
-    )
-    return pa.DictionaryArray.from_arrays(indices, texts).dictionary_decode()
+    found = np.unique(codes)
+    texts = np.array(
+        [list(Status)[code].text.encode() for code in found], "S"
+    )  # as long as need be
+    return _strings(texts[np.searchsorted(found, codes)])

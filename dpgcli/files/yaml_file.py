@@ -15,18 +15,10 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import Field, Problem, SpecError
 from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
-from dpgcli.files.places import (
-    MAX_SHOWN,
-    KeyPath,
-    Place,
-    dotted,
-    in_order,
-    located,
-    shortened,
-    shown,
-)
+from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.text import MAX_SHOWN, KeyPath, dotted, shortened
 
 MAX_NODES = 10_000
 MAX_DEPTH = 20
@@ -112,7 +104,7 @@ def parse_document(file: str, text: str) -> Document:
 
 
 def parse_value(text: str, place: Place) -> Any:
-    """One value, such as the right side of `--set key=value`, by the rules of the files."""
+    """One value, such as the right side of a setting, by the rules of the files."""
     walk = _Walk(place)
     _, data = walk.read(text)
     if walk.problems:
@@ -156,7 +148,7 @@ class _Walk:
 
     def at(self, line: int, column: int) -> Place:
         """A place in the text from line and column counted from 0."""
-        if self.start.file == "--set":
+        if isinstance(self.start.file, Field):  # which has no lines
             return self.start
         return Place(self.start.file, line + 1, column + 1)
 

@@ -1,1 +1,1 @@
-"""What the energy is: spring laws, the finger, and its two formulations. NumPy only."""
+"""The energy: spring laws, the finger, and its two systems of coordinates. NumPy only."""

@@ -61,11 +61,13 @@ class Chain:
 
     @cached_property
     def force_unit(self) -> Array:
+        """1 for lengths, H (mm) for angles, (size, batch or 1)."""
         height = self.finger.segment_height
         return self._rowwise(np.ones_like(height), height)
 
     @cached_property
     def gradient_scale(self) -> Array:
+        """Forces in play: N for lengths, N mm for angles; a strut feels the stronger unit."""
         scale = self.finger.force_scale
         shared = scale.copy()  # a strut feels the stronger of its two units
         shared[:-1] = np.maximum(scale[:-1], scale[1:])
@@ -73,6 +75,7 @@ class Chain:
 
     @cached_property
     def stiffness_scale(self) -> Array:
+        """k_b + k_θ/H² plus k_L for lengths, N/mm; (k_b + k_θ/H²) H² for angles, N mm/rad."""
         finger = self.finger
         soft = finger.force_scale / finger.stroke
         stiff = soft if finger.is_rigid else soft + finger.linear_stiffness
@@ -80,16 +83,20 @@ class Chain:
 
     @cached_property
     def step_cap(self) -> Array:
+        """0.2 d for lengths, mm; 0.2 d/H, at most 0.3 rad, for angles."""
         stroke = 0.2 * self.finger.stroke
         return self._rowwise(stroke, np.minimum(stroke / self.finger.segment_height, 0.3))
 
     def take_lanes(self, index: Indices) -> "Chain":
+        """The chains of some lanes of the batch."""
         return Chain(self.finger.take_lanes(index))
 
     def moved(self, coordinates: Array, step: Array) -> Array:
+        """Coordinates + step: bars are coordinates themselves, so that no step strains them."""
         return coordinates + step
 
     def of_shape(self, shape: Internal) -> Array:
+        """The coordinates (e_1, a_1, b_1, s_1, …) of a shape, (size, batch)."""
         finger = self.finger
         rows = shape[1:3] if finger.is_rigid else shape
         batch = np.broadcast_shapes(*(row.shape for row in rows))[1]
@@ -110,9 +117,11 @@ class Chain:
         return pose_of(self._shape(coordinates), self.finger.segment_length)
 
     def openings(self, coordinates: Array) -> Array:
+        """Extension x of every bistable spring, mm, (unit, batch)."""
         return self._cells(coordinates).extension
 
     def springs(self, coordinates: Array) -> Springs:
+        """Extensions, impossible shapes, and the levers ∂x/∂a and ∂x/∂b."""
         cell, shape = self._cells(coordinates), self._shape(coordinates)
         length = self.finger.segment_length + shape.chord
         levers = cell.near_strut * cell.along_near, cell.far_strut * cell.along_far
@@ -121,10 +130,12 @@ class Chain:
         return Springs(cell.extension, is_impossible, np.stack(levers))
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        """∂E/∂a and ∂E/∂b: corners are coordinates themselves."""
         _, near, far, _ = internal(gradient, self.finger.is_rigid)
         return np.stack((near, far))
 
     def stations(self, coordinates: Array) -> Stations:
+        """T_i = B_i + (H + s_i) (−sin τ_i, cos τ_i), mm, with τ_i the angle of strut i."""
         pose = self._pose(coordinates)
         strut = self.finger.segment_height + self._shape(coordinates).strut
         return Stations(
@@ -135,6 +146,14 @@ class Chain:
         )
 
     def tip(self, coordinates: Array) -> tuple[Array, Array]:
+        """Tip x, y (mm) and angle −Σ (a + b), (3, batch), and their Jacobian, (size, 3, batch).
+
+        >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+        >>> chain = Chain(uniform_finger(1, **STUDY))
+        >>> pose, _ = chain.tip(np.array([[0.5 * np.pi], [0.0]]))  # the near corner by 90°
+        >>> pose.ravel().round(4)
+        array([  0.    , -13.5   ,  -1.5708])
+        """
         pose = self._pose(coordinates)
         tip = np.stack((pose.x[-1], pose.y[-1], pose.strut_angle[-1]))
         jacobian = np.zeros((self.size, 3, coordinates.shape[1]))
@@ -150,6 +169,7 @@ class Chain:
         return tip, jacobian
 
     def station_jacobian(self, coordinates: Array) -> Array:
+        """Derivatives of all node positions, (size, 4 n, batch); corners turn all beyond them."""
         finger = self.finger
         n, batch = finger.n_units, coordinates.shape[1]
         pose, nodes = self._pose(coordinates), self.stations(coordinates)

@@ -14,7 +14,13 @@ from dpgcli.mechanics.coordinates import Internal
 
 
 def internal(coordinates: Array, is_rigid: bool) -> Internal:
-    """Views of the rows of an array over the chain's coordinates; rigid bars have none."""
+    """Views of the rows e, a, b and s of an array (size, …) over the chain's coordinates.
+
+    Rigid bars have no rows: their e and s are zero.
+
+    >>> internal(np.array([[0.1], [0.2], [0.3], [0.4]]), is_rigid=True).near_angle.ravel()
+    array([0.1, 0.3])
+    """
     if is_rigid:
         rest = np.zeros((1,) * coordinates.ndim)
         return Internal(rest, coordinates[0::2], coordinates[1::2], rest)
@@ -42,7 +48,14 @@ class Cell(NamedTuple):
 
 
 def cells(shape: Internal, length: Array, height: Array, is_rigid: bool) -> Cell:
-    """Geometry of every unit of a shape, (unit, batch); L and H in mm."""
+    """Geometry of every unit of a shape, (unit, batch); L and H in mm, angles in rad.
+
+    >>> zero, angle = np.zeros((1, 1)), np.full((1, 1), np.pi / 6.0)
+    >>> shape = Internal(zero, angle, angle, zero)
+    >>> cell = cells(shape, np.array([[13.5]]), np.array([[10.0]]), is_rigid=True)
+    >>> round(float(cell.extension[0, 0]), 9)  # 2 H sin 30°
+    10.0
+    """
     chord, near, far, strut = shape
     far_strut = height + strut
     near_strut = far_strut
@@ -74,7 +87,7 @@ def cells(shape: Internal, length: Array, height: Array, is_rigid: bool) -> Cell
 
 
 class Pose(NamedTuple):
-    """Where the stations B_i and the bars point, each (unit, batch)."""
+    """Stations B_i (mm), directions of chords and angles of struts (rad), each (unit, batch)."""
 
     x: Array
     y: Array
@@ -84,7 +97,16 @@ class Pose(NamedTuple):
 
 
 def pose_of(shape: Internal, length: Array) -> Pose:
-    """Stations (mm) and directions of a shape; L in mm."""
+    """Stations (mm) and directions of a shape; L in mm.
+
+    A corner that opens turns all beyond it by −1: struts are at τ_i = −Σ (a + b), chords at
+    τ_(i−1) − a_i.
+
+    >>> zero = np.zeros((1, 1))
+    >>> pose = pose_of(Internal(zero, zero + np.pi / 2.0, zero, zero), np.array([[13.5]]))
+    >>> round(float(pose.x[0, 0]), 9), round(float(pose.y[0, 0]), 9)  # straight down
+    (0.0, -13.5)
+    """
     chord, near, far, _ = shape
     turned = np.cumsum(near + far, axis=0)
     direction = far - turned

@@ -1,4 +1,4 @@
-"""What a finger's energies are functions of, by its internal coordinates."""
+"""The measures of a finger's energies in internal coordinates."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +15,14 @@ RIGID, ELASTIC = ("a", "b"), ("e", "a", "b", "s")
 
 
 def own(finger: Finger, name: str) -> OwnCoordinate:
-    """A coordinate of every unit, by its letter: e, a, b or s."""
+    """The measure that is a coordinate of every unit, by its letter: e, a, b or s.
+
+    Raises ValueError for e and s of rigid bars.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> own(uniform_finger(2, **STUDY), "b")(np.arange(4.0)[:, None]).value.ravel()
+    array([1., 3.])
+    """
     names = RIGID if finger.is_rigid else ELASTIC
     return OwnCoordinate(Row(len(names), names.index(name)), finger.n_units)
 
@@ -41,7 +48,7 @@ class Opening:
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Of a and b; or of e, a, b and s, and of the strut before where there is one."""
+        """Rows of a and b; or of e, a, b and s, after the previous strut's if there is one."""
         if self.is_rigid:
             return Row(2, 0), Row(2, 1)
         own_rows = tuple(Row(4, k) for k in range(4))

@@ -1,4 +1,4 @@
-"""What both systems of coordinates of a finger offer: shapes, scales, and what terms measure."""
+"""The common interface of a finger's coordinates: shapes, scales and measures."""
 
 from typing import NamedTuple, Protocol
 
@@ -24,10 +24,11 @@ class Internal(NamedTuple):
 
 
 class Springs(NamedTuple):
-    """Extension x of every bistable spring (mm), (unit, batch); `impossible` shapes, (batch,).
+    """Extension x of every bistable spring (mm), (unit, batch); impossible shapes, (batch,).
 
-    `lever` is how far a spring extends as its near and its far corner open, mm/rad, (2, unit,
-    batch): H in the straight finger, nothing where a strut lies along the spring.
+    `is_folded` is true if any cell is `impossible`. `lever` is the extension by the opening of the
+    near and of the far corner, mm/rad, (2, unit, batch): H in the straight finger, zero if a strut
+    lies along the spring.
     """
 
     extension: Array
@@ -36,7 +37,7 @@ class Springs(NamedTuple):
 
 
 class CellShape(NamedTuple):
-    """What decides whether a cell can exist, arrays that broadcast to (unit, batch).
+    """The quantities that decide whether a cell can exist, broadcasting to (unit, batch).
 
     Lengths of the chord and of the far strut (mm), the corner angles (rad), and how far the
     dome's spring extends as the near and the far corner open (mm/rad).
@@ -61,6 +62,11 @@ def impossible(cell: CellShape) -> Flags:
 
     A cell without any of these is a quadrilateral whose sides do not cross (our derivation: both
     tops are above the chord then, so that only the struts could).
+
+    >>> flat = np.zeros((1, 1))
+    >>> angles = np.array([[0.3, 1.6]])  # the second is beyond 90°
+    >>> impossible(CellShape(flat + 13.5, flat + 10.0, angles, flat, flat + 9.0, flat + 9.0))
+    array([False,  True])
     """
     shortest = np.minimum(cell.chord, cell.strut).min(axis=0)
     turned = np.maximum(np.abs(cell.near_angle), np.abs(cell.far_angle)).max(axis=0)
@@ -105,13 +111,13 @@ class FingerCoordinates(Coordinates, Protocol):
         """Extension x of every bistable spring, mm, (unit, batch)."""
 
     def springs(self, coordinates: Array) -> Springs:
-        """Extensions, and whether any unit has an impossible shape."""
+        """Extensions and levers of the bistable springs, and flags of impossible shapes."""
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
-        """What the gradient does at the near and the far corners, N mm, (2, unit, batch).
+        """Moments of the gradient about the near and the far corners, N mm, (2, unit, batch).
 
-        The energy's slope as a corner opens and turns all that lies beyond it. Stiff bars do no
-        work in that, so that what rounding leaves of their forces drops out.
+        The energy's derivative as a corner opens and turns all that lies beyond it. Stiff bars do
+        no work in that, so that the rounding of their forces drops out.
         """
 
     def stations(self, coordinates: Array) -> Stations:

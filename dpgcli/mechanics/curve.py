@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 FEWEST_POINTS = 4
+AT_REST = 1e-6  # of the travels: points as near to rest are not told from it
 
 
 class Derivatives(NamedTuple):
@@ -30,12 +31,14 @@ class Curve:
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
     Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
     the well, where the slope vanishes: the minimum that lies deepest below what is on both its
-    sides, and the highest maximum before it; NaN where there is none.
+    sides, and the highest maximum before it; NaN where there is none. `ripples` are the lesser
+    wells between the two, each with the top after it.
     """
 
     knots: Array
     coefficients: Array
     rests: tuple[float, float]
+    ripples: tuple[tuple[float, float], ...]
 
     def __call__(self, travel: Array) -> Derivatives:
         """Value and derivatives at travels of any shape, complex ones too.
@@ -58,12 +61,19 @@ class Curve:
 def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     """The C² cubic spline through points of increasing travel.
 
-    Where the first point is rest, at travel 0, values are counted from the one there, and the slope
-    vanishes: a dome at rest exerts no force, and an energy is known but for a constant. Raises
-    ValueError for fewer than four points or travels that do not increase.
+    Values are counted from rest, at travel 0, and the slope vanishes there: a dome at rest exerts
+    no force, and an energy is known but for a constant. Points before rest only tell what the value
+    there is. Where all points are beyond it, nothing is known of rest. Raises ValueError for fewer
+    than four points from rest on, or travels that do not increase.
+
+    >>> dome = spline((-1.0, 0.0, 1.0, 2.0, 3.0), (101.0, 100.0, 101.0, 104.0, 109.0))
+    >>> [round(float(part), 9) for part in dome(np.array(2.0))]
+    [4.0, 4.0, 2.0]
     """
     from scipy.interpolate import CubicSpline
 
+    if travel[0] < 0.0 < travel[-1]:
+        travel, value = _from_rest(travel, value)
     if len(travel) < FEWEST_POINTS or np.any(np.diff(travel) <= 0.0):
         raise ValueError(f"travel: expected {FEWEST_POINTS} or more increasing values: {travel}")
     starts_at_rest = travel[0] == 0.0
@@ -73,7 +83,19 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     ends = [np.array([0.5 * cubic(x, 2), cubic(x, 1), cubic(x)]) for x in (travel[0], travel[-1])]
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
     coefficients = np.concatenate((before, cubic.c, after), axis=1)
-    return Curve(np.asarray(travel, float), coefficients, _rests(cubic))
+    return Curve(np.asarray(travel, float), coefficients, *_rests(cubic))
+
+
+def _from_rest(
+    travel: tuple[float, ...], value: tuple[float, ...]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Points from rest on, the value at rest by a spline through all."""
+    from scipy.interpolate import CubicSpline
+
+    at_rest = float(CubicSpline(travel, value)(0.0))
+    is_beyond = np.array(travel) > AT_REST * np.ptp(travel)
+    beyond, values = (np.array(part)[is_beyond].tolist() for part in (travel, value))
+    return (0.0, *beyond), (at_rest, *values)
 
 
 def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tuple[Array, Array]:
@@ -116,14 +138,19 @@ def _continued(travel: Array, value: Array, beyond: Array) -> Array:
     return np.asarray(value[nearest[0]] + slope * beyond + bend * beyond**2)
 
 
-def _rests(cubic: "CubicSpline") -> tuple[float, float]:
-    """The deepest well, by how much it lies below both sides, and the highest top before it."""
+def _rests(
+    cubic: "CubicSpline",
+) -> tuple[tuple[float, float], tuple[tuple[float, float], ...]]:
+    """The highest top before the deepest well, by how much it lies below both sides, and that well.
+
+    Then the wells between the two, each with the next top.
+    """
     slope, bend = cubic.derivative(), cubic.derivative(2)
     roots = np.array([root for root in slope.roots(extrapolate=False) if root > 0.0])
     tops, wells = (roots[sign * bend(roots) > 0.0] for sign in (-1.0, 1.0))
     wells = wells[wells > np.min(tops, initial=np.inf)]
     if not len(wells):
-        return np.nan, np.nan
+        return (np.nan, np.nan), ()
     last = float(cubic(cubic.x[-1]))
     depths = [
         min(cubic(tops[tops < well]).max(), np.max(cubic(tops[tops > well]), initial=last))
@@ -132,4 +159,7 @@ def _rests(cubic: "CubicSpline") -> tuple[float, float]:
     ]
     well = float(wells[np.argmax(depths)])
     before = tops[tops < well]
-    return float(before[np.argmax(cubic(before))]), well
+    top = float(before[np.argmax(cubic(before))])
+    lesser = wells[(wells > top) & (wells < well)]
+    ripples = tuple((float(lower), float(before[before > lower].min())) for lower in lesser)
+    return (top, well), ripples

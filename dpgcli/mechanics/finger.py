@@ -79,25 +79,38 @@ class Finger:
 
     @property
     def n_designs(self) -> int:
+        """Number of fingers in the batch."""
         return int(np.broadcast_shapes(*(v.shape for v in self.arrays().values()))[1])
 
     @property
     def is_rigid(self) -> bool:
+        """Whether all bars are rigid, k_L infinite."""
         return bool(np.isinf(self.linear_stiffness).all())
 
     @property
     def is_uniform(self) -> bool:
+        """Whether every array has one value for all units."""
         return all(values.shape[0] == 1 for values in self.arrays().values())
 
     @property
     def force_scale(self) -> Array:
-        """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design)."""
+        """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design).
+
+        >>> unit = uniform_finger(1, segment_length=13.5, segment_height=10.0, stroke=2.0,
+        ...     bistable_stiffness=1.0, force_linearity=0.0, hinge_stiffness=100.0)
+        >>> float(unit.force_scale[0, 0])
+        4.0
+        """
         hinge = self.hinge_stiffness / self.segment_height**2
         return (self.acting * self.bistable_stiffness + hinge) * self.stroke
 
     @property
     def straight_length(self) -> Array:
-        """Length of the straight finger, Σ L, mm, shape (design,)."""
+        """Length of the straight finger, Σ L, mm, shape (design,).
+
+        >>> float(uniform_finger(3, **STUDY).straight_length[0])
+        40.5
+        """
         shape = (self.n_units, self.segment_length.shape[1])
         return total(np.broadcast_to(self.segment_length, shape))
 
@@ -115,7 +128,10 @@ class Finger:
         return self.law.response(extension, self.domes)
 
     def changed(self, **arrays: Array) -> "Finger":
-        """The finger with other arrays."""
+        """The finger with other arrays, by the names of its fields.
+
+        Raises ValueError for shapes that do not fit.
+        """
         return replace(self, **arrays)  # type: ignore[arg-type]  # all arrays
 
     def with_values(self, values: Mapping[str, float]) -> "Finger":
@@ -123,7 +139,11 @@ class Finger:
         return self.changed(**{KEYS[key]: np.array([[value]]) for key, value in values.items()})
 
     def with_units(self, places: Sequence[int]) -> "Finger":
-        """A finger of some of the units, counted from 0; a unit may repeat."""
+        """A finger of the units at these places, counted from 0; a unit may repeat.
+
+        >>> uniform_finger(3, **STUDY).with_units([0, 0, 1, 2]).n_units
+        4
+        """
         arrays = {**self.arrays(), "acting": self.acting}.items()
         picked = {k: v if len(v) == 1 else v[list(places)] for k, v in arrays}
         return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
@@ -133,11 +153,14 @@ class Finger:
         return self.changed(linear_stiffness=np.array([[stiffness]]))
 
     def with_domes(self, inverted: Flags) -> "Finger":
-        """The finger with domes in these states, (unit, batch): as far as its law asks for them."""
+        """The finger with the springs that act in a pattern, (unit, batch).
+
+        A push-only law has none in ground units; other laws have all in any pattern.
+        """
         return self.changed(acting=self.law.acting(inverted))
 
     def with_domes_held(self, inverted: Flags) -> "Finger":
-        """The finger whose inverted domes are held where each alone would rest, (unit, batch)."""
+        """The finger with inverted domes held at the rest of each alone; pattern (unit, batch)."""
         rest = self.law.rests(self.domes).well / self.stroke
         share = np.where(np.isnan(rest), 1.0, rest) * inverted
         held = self.with_domes(inverted).changed(force_linearity=share)

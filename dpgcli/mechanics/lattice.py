@@ -82,7 +82,7 @@ class Lattice:
         return vectors(coordinates, self.finger.segment_height)
 
     def _distances(self) -> Array:
-        """How far the stations reach from the base, Σ L + H in mm, shape (unit, designs)."""
+        """Largest distance of the stations from the base, Σ L + H, mm, shape (unit, designs)."""
         finger = self.finger
         lengths = finger.segment_length
         lengths = np.broadcast_to(lengths, (finger.n_units, lengths.shape[1]))
@@ -95,11 +95,12 @@ class Lattice:
 
     @cached_property
     def force_unit(self) -> Array:
+        """1: all coordinates are lengths."""
         return np.ones((self.size, 1))
 
     @cached_property
     def rounding_floor(self) -> Array:
-        """Where the residual stops falling, N, shape (1, designs): 2 k_L ε (Σ L + H).
+        """The rounding floor of the residual, 2 k_L ε (Σ L + H), N, shape (1, designs).
 
         A position is stored to within ε/2 of itself, a bar's extension is the difference of
         two, and up to three bars meet at a node. Measured at equilibria of 1 to 40 units
@@ -110,7 +111,10 @@ class Lattice:
 
     @cached_property
     def gradient_scale(self) -> Array:
-        """The stronger unit's forces at a node, and what keeps `FINEST_TOLERANCE` in reach."""
+        """Forces in play at a node, N: the stronger unit's, plus the floor over `FINEST_TOLERANCE`.
+
+        The second part keeps a relative residual of `FINEST_TOLERANCE` attainable.
+        """
         scale = self.finger.force_scale
         shared = scale.copy()
         shared[:-1] = np.maximum(scale[:-1], scale[1:])
@@ -118,16 +122,17 @@ class Lattice:
 
     @cached_property
     def stiffness_scale(self) -> Array:
-        """Of the springs and hinges, k_b + k_θ/H²: what a soft direction is measured by."""
+        """Stiffness of the soft directions, k_b + k_θ/H², N/mm, by which pivots are judged."""
         return self._rowwise(self.finger.force_scale / self.finger.stroke)
 
     @cached_property
     def step_cap(self) -> Array:
-        """What a turn of the whole finger by 0.2 d/H, at most 0.3 rad, moves a node by."""
+        """The motion of a node, mm, by a turn of the whole finger by 0.2 d/H, at most 0.3 rad."""
         turn = np.minimum(0.2 * self.finger.stroke / self.finger.segment_height, 0.3)
         return self._rowwise(turn * self._distances())
 
     def take_lanes(self, index: Indices) -> "Lattice":
+        """The lattices of some lanes of the batch."""
         return Lattice(self.finger.take_lanes(index))
 
     def moved(self, coordinates: Array, step: Array) -> Array:
@@ -143,15 +148,18 @@ class Lattice:
         return np.stack((*base, *top), axis=1).reshape(coordinates.shape)
 
     def of_shape(self, shape: Internal) -> Array:
+        """The node positions of a shape, mm, (size, batch)."""
         chain = Chain(self.finger)
         stations = chain.stations(chain.of_shape(shape))
         nodes = np.stack(np.broadcast_arrays(*stations), axis=1)
         return nodes.reshape(-1, nodes.shape[2])
 
     def openings(self, coordinates: Array) -> Array:
+        """Extension x = |t| − L of every bistable spring, mm, (unit, batch)."""
         return extension(self._vectors(coordinates).top, self.finger.segment_length, 0)
 
     def springs(self, coordinates: Array) -> Springs:
+        """Extensions, impossible shapes, and the levers n × p and n × q, n along the spring."""
         cell = self._vectors(coordinates)
         along = cell.top / np.hypot(*cell.top)
         levers = cross(along, cell.near), cross(along, cell.far)
@@ -159,6 +167,7 @@ class Lattice:
         return Springs(self.openings(coordinates), impossible(shape), np.stack(levers))
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
+        """Moments of the forces on all nodes that a corner turns (our derivation)."""
         base, top = coordinates.reshape(-1, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)
         on_base, on_top = gradient.reshape(-1, 2, 2, gradient.shape[1]).transpose(1, 2, 0, 3)
         own = cross(top - base, on_top)  # of each station's strut, about the station
@@ -170,9 +179,11 @@ class Lattice:
         return -np.stack((about_near, about_far))
 
     def stations(self, coordinates: Array) -> Stations:
+        """The node positions, mm: views of the coordinates."""
         return Stations(*(coordinates[k::4] for k in range(4)))
 
     def tip(self, coordinates: Array) -> tuple[Array, Array]:
+        """Tip x, y (mm) and angle −Σ (a + b), (3, batch), and their Jacobian, (size, 3, batch)."""
         cell = self._vectors(coordinates)
         near, far = corners(cell)  # their sum counts full turns, an angle of the strut would not
         tip = np.stack((coordinates[-4], coordinates[-3], -total(near + far)))
@@ -184,5 +195,6 @@ class Lattice:
         return tip, jacobian
 
     def station_jacobian(self, coordinates: Array) -> Array:
+        """The unit matrix: nodes are the coordinates, (size, size, batch)."""
         size, batch = coordinates.shape
         return np.repeat(np.eye(size)[:, :, None], batch, axis=2)

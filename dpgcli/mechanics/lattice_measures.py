@@ -1,4 +1,4 @@
-"""What a finger's energies are functions of, by its node coordinates.
+"""The measures of a finger's energies in node coordinates.
 
 Every measure is a function of vectors between nodes: derivatives are taken by the vectors and
 spread over the nodes whose differences they are (our derivation).
@@ -29,7 +29,7 @@ def _rows(nodes: tuple[int, ...]) -> tuple[Row, ...]:
 
 @dataclass(frozen=True)
 class Extension:
-    """How far a vector of every cell is longer than at rest, |v| − r in mm.
+    """The extension of a vector of every cell, |v| − r in mm.
 
     Its gradient is n along the vector, ∇² is m mᵀ/|v| with m across it. In the straight finger
     the vector lies along `axis`.
@@ -43,7 +43,7 @@ class Extension:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """Of the nodes that the vector joins."""
+        """Rows of the nodes that the vector joins."""
         return _rows(ENDS[self.name])
 
     def __call__(self, coordinates: Array) -> Measured:
@@ -81,7 +81,7 @@ class Corner:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """Of the nodes of the chord and the strut."""
+        """Rows of the nodes of the chord and the strut."""
         return _rows(self._nodes)
 
     def __call__(self, coordinates: Array) -> Measured:
@@ -99,8 +99,8 @@ class Corner:
                 (self._nodes.index(node), end)
                 for node, end in zip(ENDS[name], (-1.0, 1.0), strict=True)
             ]
-            for place, end in ends:
-                slopes[place] += sign * end * slope
+            for node, end in ends:
+                slopes[node] += sign * end * slope
             for (first, start), (second, stop) in product(ends, repeat=2):
                 if first <= second:
                     block = start * stop * bend

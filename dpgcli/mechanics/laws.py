@@ -66,9 +66,9 @@ class Dome(NamedTuple):
 
 
 class Rests(NamedTuple):
-    """Extensions (mm) at which an inverted dome exerts no force: barrier top and well.
+    """Extensions (mm) of an inverted dome without force: the barrier's top and the well.
 
-    NaN where there is no inverted well.
+    NaN for a dome without a second well.
     """
 
     top: Array
@@ -76,14 +76,14 @@ class Rests(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Extensions (mm) between which a dome acts; infinite where it does at any."""
+    """The range of extensions (mm) in which a dome acts; infinite if it always does."""
 
     lowest: Array
     highest: Array
 
 
 class Attached:
-    """What a dome that pushes and pulls has in common: it acts in any state, at any extension."""
+    """Base of laws that push and pull: the dome acts in any state, at any extension."""
 
     def acting(self, inverted: Flags) -> Array:
         """1."""
@@ -96,27 +96,27 @@ class Attached:
 
 
 class Law(Protocol):
-    """How a dome answers to the extension of its spring."""
+    """A dome's law: energy, force and stiffness by the extension of its spring."""
 
     @property
     def description(self) -> str:
-        """What tables and summaries say stiffness figures come from."""
+        """The law in words, for tables and summaries."""
 
     @property
     def curve(self) -> Curve | None:
-        """The table behind the law; none where the study's polynomial is."""
+        """The tabulated curve of the law, None for the study's polynomial."""
 
     def response(self, extension: Array, dome: Dome) -> Response:
         """Energy (mJ), force (N) and stiffness (N/mm) at an extension (mm)."""
 
     def rests(self, dome: Dome) -> Rests:
-        """Where the spring alone is at rest when inverted."""
+        """Extensions (mm) of the spring alone at its barrier and in its inverted well."""
 
     def acting(self, inverted: Flags) -> Array:
-        """1 where a dome acts on its neighbor, else 0; (1, 1) where it does in any state."""
+        """1 for acting domes, 0 for others, (unit, batch); (1, 1) if all act in any state."""
 
     def touching(self, dome: Dome) -> Touching:
-        """Between which extensions (mm) a dome acts."""
+        """The range of extensions (mm) in which a dome acts."""
 
 
 class Published(Attached):
@@ -130,7 +130,13 @@ class Published(Attached):
         return bistable(extension, dome.stiffness, dome.linearity, dome.stroke)
 
     def rests(self, dome: Dome) -> Rests:
-        """u = [3β ± √(9β² − 8β)]/(4β) with β = 1 − α, for α < 1/9."""
+        """u = [3β ± √(9β² − 8β)]/(4β) with β = 1 − α, for α < 1/9; the roots of F = 0.
+
+        >>> one, zero = np.ones(()), np.zeros(())
+        >>> rests = PUBLISHED.rests(Dome(one, zero, 2.0 * one, zero))  # α = 0, d = 2 mm
+        >>> float(rests.top), float(rests.well)
+        (1.0, 2.0)
+        """
         beta = 1.0 - dome.linearity
         squared = 9.0 * beta * beta - 8.0 * beta
         is_bistable = np.real(squared) > 0.0
@@ -167,8 +173,9 @@ class Tabulated(Attached):
 class PushOnly:
     """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
 
-    Outside them dome and neighbor do not touch, the energy is constant there. Only inverted
-    domes act: which those are is a state of contact, given beside the energy.
+    Outside them dome and neighbor do not touch, the energy is constant there. So it is where a
+    curve with ripples would pull, from a lesser well to the next top: the dome stays in that well.
+    Only inverted domes act: which those are is a state of contact, given beside the energy.
     """
 
     def __init__(self, law: Published | Tabulated) -> None:
@@ -177,17 +184,28 @@ class PushOnly:
 
     @property
     def description(self) -> str:
-        """What the dome's own energy comes from."""
+        """The law in words, with the origin of the dome's own energy."""
         energy = self.law.description.split(" law")[0]
         return f"push-only law, {energy} energy of the dome"
 
     def response(self, extension: Array, dome: Dome) -> Response:
-        """The law's own response where dome and neighbor touch."""
+        """The law's response between barrier and well, no force outside.
+
+        >>> one, zero = np.ones(()), np.zeros(())
+        >>> beyond = PushOnly(PUBLISHED).response(3.0 * one, Dome(one, zero, 2.0 * one, zero))
+        >>> float(beyond.force), float(beyond.stiffness)
+        (0.0, 0.0)
+        """
         top, well = self.law.rests(dome)
         place = np.real(extension)
         touches = (place > np.real(top)) & (place < np.real(well))
         apart = np.where(place < np.real(well), top, well)
         apart = np.where(np.isnan(apart), 0.0, apart)  # never inverted: never in touch
+        travel = dome.stroke + dome.contact
+        for ripple in self.curve.ripples if self.curve is not None else ():
+            lower, upper = (rest * travel - dome.contact for rest in ripple)
+            lets_go = (place > np.real(lower)) & (place < np.real(upper))
+            touches, apart = touches & ~lets_go, np.where(lets_go, lower, apart)
         energy, *derivatives = self.law.response(np.where(touches, extension, apart), dome)
         force, stiffness = (np.where(touches, values, 0.0) for values in derivatives)
         return Response(energy, force, stiffness)
@@ -197,7 +215,11 @@ class PushOnly:
         return self.law.rests(dome)
 
     def acting(self, inverted: Flags) -> Array:
-        """1 where a dome is inverted."""
+        """1 for inverted domes, (unit, batch).
+
+        >>> PushOnly(PUBLISHED).acting(np.array([[True], [False]])).ravel()
+        array([1., 0.])
+        """
         return inverted.astype(float)
 
     def touching(self, dome: Dome) -> Touching:

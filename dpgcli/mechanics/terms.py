@@ -48,9 +48,14 @@ class Quadratic:
 
 
 def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
-    """Domes; two corners per hinge, each of stiffness 2 k_θ; bars.
+    """The terms of a finger's springs: domes; two corners per hinge, each of 2 k_θ; bars.
 
-    Hinges without stiffness, and rigid bars, are no terms.
+    Hinges without stiffness, and rigid bars, are no terms. Two springs of 2 k_θ in series are
+    the hinge's k_θ.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> [term.kind for term in spring_terms(Chain(uniform_finger(1, **STUDY)))]  # rigid bars
+    ['bistable', 'hinge', 'hinge']
     """
     finger = coordinates.finger
     corner, bar = Quadratic(2.0 * finger.hinge_stiffness), Quadratic(finger.linear_stiffness)
@@ -76,6 +81,11 @@ def chain_potential(finger: Finger) -> Potential[Chain]:
 
 
 def lattice_potential(finger: Finger) -> Potential[Lattice]:
-    """The energy of an unloaded finger in node coordinates; ValueError for rigid bars."""
+    """The energy of an unloaded finger in node coordinates; raises ValueError for rigid bars.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> lattice_potential(uniform_finger(2, **STUDY, linear_stiffness=1e4)).coordinates.size
+    8
+    """
     lattice = Lattice(finger)
     return Potential(lattice, spring_terms(lattice))

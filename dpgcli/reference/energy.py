@@ -127,7 +127,10 @@ class Expansion:
         self.band = [[mpf(0)] * (min(row, bandwidth) + 1) for row in range(size)]
 
     def add(self, response: Response, rate: Rate) -> None:
-        """Add a spring whose coordinate changes at `rate`; how the rate changes is extra."""
+        """Add E, F r and K r rᵀ of a spring whose coordinate has the gradient r, `rate`.
+
+        The rate's own derivatives, F ∇r, are added by `add_square` and `add_bend`.
+        """
         self.energy += response.energy
         for row, slope in rate.items():
             self.gradient[row] += response.force * slope
@@ -151,7 +154,7 @@ class Expansion:
 
 
 def _spread(unit: int, *parts: tuple[Vector, Vector]) -> Rate:
-    """The rate by nodes of what has given slopes by vectors, (ends, slope) each."""
+    """Spread slopes by vectors between nodes, (ends, slope) each, over these nodes."""
     rate: Rate = {}
     for (start, stop), slope in parts:
         for axis in (0, 1):
@@ -174,7 +177,7 @@ class ElasticBars:
 
     @property
     def scale(self) -> "mpf":
-        """What an unknown's step is small against."""
+        """The length that a step of an unknown is compared with, mm."""
         return sum(unit.length for unit in self.units) + self.units[0].height
 
     def unknowns(self, nodes: list["mpf"]) -> list["mpf"]:
@@ -184,7 +187,7 @@ class ElasticBars:
         return unknowns
 
     def at(self, unknowns: list["mpf"]) -> Expansion:
-        """The energy at nodes, expanded along the ways of `moved`."""
+        """The energy at nodes, expanded along the curved update `moved`."""
         expansion = Expansion(len(unknowns), bandwidth=7)
         shape = list(cells(self.base, unknowns))
         for i, (unit, cell) in enumerate(zip(self.units, shape, strict=True)):
@@ -193,8 +196,8 @@ class ElasticBars:
         _add_swings(expansion, shape)
         return expansion
 
-    def boldness(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
-        """Strokes by which a step opens the unit that it opens most."""
+    def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        """The largest opening of a unit by a step, in strokes."""
         strokes = []
         changes = cells([0] * 4, step)
         for unit, cell, change in zip(self.units, cells(self.base, unknowns), changes, strict=True):
@@ -206,7 +209,7 @@ class ElasticBars:
         return max(strokes)
 
     def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
-        """Turn and stretch each bar at the step's rates: a straight way would stretch it too."""
+        """Turn and stretch each bar at the step's rates; straight motion would stretch bars."""
         x, y = self.base[:2]
         nodes = []
         for cell, change in zip(cells(self.base, unknowns), cells([0] * 4, step), strict=True):
@@ -249,10 +252,11 @@ def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
 
 
 def _add_swings(expansion: Expansion, shape: list[Cell]) -> None:
-    """What the ways of `ElasticBars.moved` bend by, times the gradient: nothing at equilibrium.
+    """Add the second-order term of the curved update `moved`: gradient · ∂²nodes/∂step².
 
-    A bar v that turns by ω and stretches by σ moves all beyond it by σω m − ½ω² v, m = v turned
-    to the left. Without this, forces out of balance hide how softly a long finger bends.
+    It is zero at an equilibrium. A bar v that turns by ω and stretches by σ moves all beyond it by
+    σω m − ½ω² v, m = v turned to the left. Without this, forces out of balance hide how softly a
+    long finger bends.
     """
     pull: Vector = (0, 0)
     for i in reversed(range(len(shape))):
@@ -320,7 +324,7 @@ class RigidBars:
                 expansion.add_square(spring.force * _dot(n, bend), {row: 1})
         return expansion
 
-    def boldness(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+    def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
         per_turn = [max(unit.height / unit.stroke, 1) for unit in self.units for _ in "ab"]
         return max(abs(turn) * each for turn, each in zip(step, per_turn, strict=True))
 

@@ -1,6 +1,6 @@
-"""Equilibria of a finger in extended precision: what a solver's true errors are measured by.
+"""Equilibria of a finger in extended precision, the reference for a solver's true errors.
 
-Newton's method on the energy of `extended_energy`, with a factorization of its own.
+Newton's method on the energy of `reference.energy`, with a factorization of its own.
 """
 
 from collections.abc import Iterable
@@ -36,10 +36,10 @@ ExtendedArray = NDArray[np.longdouble]
 
 MOST_ITERATIONS = 100
 MOST_HALVINGS = 40  # of one step
-BOLDEST = 0.25  # strokes that one step may open a unit by
+LARGEST_OPENING = 0.25  # strokes that one step may open a unit by
 SUFFICIENT_DECREASE = 1e-4  # Nocedal and Wright, Numerical Optimization (2006), page 33
 ROUNDING = 1e6  # times the working precision: differences below it mean nothing
-PRINTED = 25  # digits, more than a long double holds
+PRINTED_DIGITS = 25  # digits, more than a long double holds
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ExtendedStates:
     `min_eigenvalue` of the Hessian in node coordinates (N/mm) and `condition`, in the 2-norm,
     of the Hessian in the unknowns are NaN where it is not positive definite. `is_minimum`:
     converged, and the Hessian is positive definite. `in_pattern`: every unit is on its
-    pattern's side of where its dome's spring turns over, no corner is turned by 90° or
+    pattern's side of its dome's barrier, no corner is turned by 90° or
     more, no strut's opening would shorten its spring, and the finger does not meet itself. All
     numbers of a state that did not converge are NaN.
     """
@@ -110,7 +110,7 @@ def extended_states(
 
 
 def _digits_lost(finger: Finger) -> int:
-    """Decimal digits by which the forces of stiff bars exceed those of the springs."""
+    """Decimal digits that stiff bars cost: the ratio of their stiffness to the springs', log10."""
     if finger.is_rigid:
         return 0
     return max(0, ceil(log10(finger.linear_stiffness.max() / finger.bistable_stiffness.min())))
@@ -158,7 +158,7 @@ def factorize(band: list[list["mpf"]], smallest: "mpf") -> Factorization:
 
 
 def _forward(factorization: Factorization, right_hand_side: list["mpf"]) -> list["mpf"]:
-    """L⁻¹ b; what stands above the first nonzero of b stays zero."""
+    """L⁻¹ b; rows above the first nonzero of b stay zero and are skipped."""
     from mpmath import fdot
 
     y = list(right_hand_side)
@@ -171,7 +171,7 @@ def _forward(factorization: Factorization, right_hand_side: list["mpf"]) -> list
 
 
 def _downhill(factorization: Factorization, gradient: list["mpf"]) -> list["mpf"]:
-    """Newton's step, but downhill where the Hessian is not positive definite: −(L|D|Lᵀ)⁻¹ g."""
+    """The step −(L|D|Lᵀ)⁻¹ g: Newton's if the Hessian is positive definite, downhill if not."""
     step = _forward(factorization, [-value for value in gradient])
     step = [value / abs(d) for value, d in zip(step, factorization.pivots, strict=True)]
     for row in range(len(step) - 1, 0, -1):
@@ -182,7 +182,7 @@ def _downhill(factorization: Factorization, gradient: list["mpf"]) -> list["mpf"
 
 
 class Stationary(NamedTuple):
-    """Where Newton's method converged, and what is known there."""
+    """A point where Newton's method converged, with the energy's expansion there."""
 
     bars: ElasticBars | RigidBars
     unknowns: list["mpf"]
@@ -224,7 +224,7 @@ def _further(
     """The unknowns a step further, halved until the energy falls, and its expansion there."""
     from mpmath import eps, fdot
 
-    fraction = 1 / max(1, bars.boldness(here, step) / BOLDEST)
+    fraction = 1 / max(1, bars.strokes_opened(here, step) / LARGEST_OPENING)
     slope = SUFFICIENT_DECREASE * fdot(step, expansion.gradient)
     springs = sum(unit.bistable * unit.stroke**2 for unit in bars.units)
     allowed = expansion.energy + ROUNDING * eps * (expansion.energy + springs)
@@ -286,7 +286,7 @@ def _missing(n_units: int) -> tuple[Any, ...]:
 def _long_doubles(values: Iterable["mpf"]) -> ExtendedArray:
     from mpmath import nstr
 
-    return np.array([np.longdouble(nstr(value, PRINTED)) for value in values])
+    return np.array([np.longdouble(nstr(value, PRINTED_DIGITS)) for value in values])
 
 
 def _spectrum(found: Stationary) -> tuple[float, float]:

@@ -35,30 +35,30 @@ def extended_units(finger: Finger) -> list[Unit]:
 
 
 def inverted_angle(unit: Unit) -> "mpf":
-    """Where a unit with rigid bars rests in its second well: both corners are open by this m, rad.
+    """The corner angle m (rad) of a unit with rigid bars at rest in its second well.
 
-    Without a second well it is that of the full stroke. With x = 2H sin m the unit's moment is
-    2 H² k_b times sin 2m P(u) + 2κm, where u = x/d, β = 1−α, P = 1 + β(2u² − 3u) and
-    κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots are between, and they are
-    told apart where P + 2κm/sin 2m is smallest (our derivation).
+    Both corners are open by m; without a second well, by the angle of the full stroke. With
+    x = 2H sin m the unit's moment is 2 H² k_b times sin 2m P(u) + 2κm, where u = x/d, β = 1−α,
+    P = 1 + β(2u² − 3u) and κ = k_θ/(k_b H²). P is at least α outside 1/2 < u < 1, so both roots
+    are between, and they are told apart where P + 2κm/sin 2m is smallest (our derivation).
     """
     from mpmath import asin, cos, sin
 
-    reach = 2 * unit.height / unit.stroke
+    widest = 2 * unit.height / unit.stroke
     softening = 1 - unit.linearity
     hinge = unit.hinge / (unit.bistable * unit.height**2)
 
     def moment(m: "mpf") -> "mpf":
-        u = reach * sin(m)
+        u = widest * sin(m)
         return sin(2 * m) * (1 + softening * (2 * u**2 - 3 * u)) + 2 * hinge * m
 
     def trend(m: "mpf") -> "mpf":
-        u, turn = reach * sin(m), 2 * m
+        u, turn = widest * sin(m), 2 * m
         bend = 2 * hinge * (sin(turn) - turn * cos(turn))
-        return softening * (4 * u - 3) * reach * cos(m) * sin(turn) ** 2 + bend
+        return softening * (4 * u - 3) * widest * cos(m) * sin(turn) ** 2 + bend
 
     def opened(strokes: float) -> "mpf":
-        return asin(min(strokes / reach, 1))
+        return asin(min(strokes / widest, 1))
 
     least = _bisected(trend, opened(0.25), opened(0.75))
     if not moment(least) < 0:
@@ -67,7 +67,7 @@ def inverted_angle(unit: Unit) -> "mpf":
 
 
 def spring_barrier(unit: Unit) -> "mpf":
-    """The opening (mm) at which the dome's spring alone turns over; infinite if it never does.
+    """The opening (mm) of the spring's energy barrier, infinite if it has none.
 
     A root of 1 + β(2u² − 3u) with β = 1 − α. Bars and hinges pull an open unit back, so that it
     rests inverted only beyond.
@@ -82,7 +82,7 @@ def spring_barrier(unit: Unit) -> "mpf":
 
 
 def _bisected(function: Callable[["mpf"], "mpf"], low: "mpf", high: "mpf") -> "mpf":
-    """Where a function goes from negative to positive; `high` where it stays negative."""
+    """The root of a function that goes from negative to positive, `high` if it stays negative."""
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if function(middle) < 0 else (low, middle)

@@ -14,14 +14,17 @@ from dpgcli.states.crossing import crosses_itself, outline
 from dpgcli.states.units import Units
 from dpgcli.states.wells import Wells
 
-MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))
-SMALL_SHARE = 0.1  # of what a unit bears: a residual below it cannot decide whether it holds
-LARGEST_CURVATURE = 1.0  # a shape of more than that is far from any fold
-FINEST_BALANCE = 1e-13  # of the forces in play: rounding's
+MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))  # below it, rounding may decide
+SMALL_SHARE = 0.1  # of a unit's holding force: a smaller residual cannot make it snap
+LARGEST_CURVATURE = 1.0  # a larger one is far from any loss of stability
+FINEST_BALANCE = 1e-13  # of the forces in play: rounding leaves so much of them
 
 
 class Status(IntEnum):
-    """What a state turned out to be, the graver the greater; `text` is what tables say."""
+    """The result of certification, the graver the greater.
+
+    `text` is the word in tables, `meaning` the sentence in summaries.
+    """
 
     STABLE = 0
     MARGINAL = 1
@@ -32,10 +35,12 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
+        """The word in tables, such as `not_bistable`."""
         return self.name.lower()
 
     @property
     def meaning(self) -> str:
+        """The sentence in summaries."""
         return _MEANINGS[self]
 
 
@@ -54,9 +59,9 @@ _MEANINGS = {
 class Settled:
     """Equilibria of one finger (or one per lane), certified, shapes (…, batch).
 
-    `inverted` is the pattern that was asked for, `reached` says which wells the units ended in,
-    `is_folded` which lanes are no finger, and `is_balanced` where what is left of the forces is too
-    small to matter. `status` holds `Status` codes.
+    `inverted` is the pattern that was asked for, `reached` the wells in which the units ended,
+    (unit, batch); `is_folded` marks impossible shapes, `is_balanced` residual forces too small to
+    matter, (batch,). `status` holds `Status` codes.
     """
 
     potential: FingerPotential
@@ -81,7 +86,7 @@ def certified(
     tolerance: float,
     own: slice = slice(None),
 ) -> Settled:
-    """Equilibria found for these patterns, (unit, batch), and whether they are their states.
+    """Certify equilibria found for these patterns, (unit, batch).
 
     `own` are the units that must have reached their wells; `units` are all.
     """
@@ -129,7 +134,7 @@ def _is_balanced(
     reached: Flags,
     wells: Wells,
 ) -> Flags:
-    """Whether what is left of the forces is too small to decide that there is a state, (batch,).
+    """Whether the residual forces are too small to decide that there is a state, (batch,).
 
     The moments about a unit's corners have to be small against
 

@@ -2,15 +2,10 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
-
-from numpy.typing import NDArray
-
-Columns = dict[str, NDArray[Any]]
 
 
 class Kind(StrEnum):
-    """What a column holds; patterns are bytes, statuses codes, counts whole numbers."""
+    """The type of a column: patterns are bytes, statuses codes, counts whole numbers."""
 
     PATTERN = "pattern"
     STATUS = "status"

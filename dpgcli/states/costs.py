@@ -1,7 +1,7 @@
-"""What a plan will cost: rough, good to a factor of two either way."""
+"""Estimates of a plan's run time and memory, good to a factor of two either way."""
 
 from dpgcli.states.columns import Group
-from dpgcli.states.halves import Split
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.settle import lanes_at_once
 
 # Measured on one core of a 2020s server, in seconds.
@@ -9,7 +9,7 @@ UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
 PAIR_SECONDS = 1.0e-6
 EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
 START_SECONDS = 0.3
-LIBRARIES = 96 * 2**20  # bytes
+LIBRARY_BYTES = 96 * 2**20  # bytes
 ROWS_WRITTEN, COPIES_WRITTEN = 2**17, 4  # of a table, at once; fewer rows of more columns
 COLUMNS_WRITTEN = 32
 
@@ -37,4 +37,4 @@ def peak_bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> in
     row = n_columns * 8 + 4 * n
     written = min(n_states, rows_at_once(n_columns)) * row * COPIES_WRITTEN
     halves = 0 if split is None else split.n_solves * 8 * 24
-    return LIBRARIES + batch + written + halves
+    return LIBRARY_BYTES + batch + written + halves

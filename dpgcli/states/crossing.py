@@ -1,4 +1,4 @@
-"""Fingers that run into themselves: far parts of one finger in the same place.
+"""Self-intersection: far parts of one finger in the same place.
 
 The energies know no contact, so a long finger may curl through itself: the sides of its outline
 cross. That takes a closed loop, which with turns of at most φ a unit has 2π/φ units or more (our
@@ -19,7 +19,7 @@ FEWEST_APART = 2  # cells that share no station
 
 
 def fewest_in_loop(turn: Array, length: Array, n_units: int) -> int | None:
-    """Units that the shortest loop may have; None where the finger is too short for one.
+    """The fewest units of a closed loop; None for a finger too short for one.
 
     `turn` is the largest by which each unit may turn the next, rad, `length` its L, (unit or 1,
     design or 1).
@@ -46,7 +46,13 @@ class Outline:
 
 
 def outline(nodes: Stations, height: Array) -> Outline:
-    """The outline of a finger whose free nodes are given, each (unit, batch); H in mm."""
+    """The outline of a finger by its free nodes, each (unit, batch); H in mm.
+
+    >>> one = np.ones((1, 1))
+    >>> around = outline(Stations(3.0 * one, 0.0 * one, 3.0 * one, 4.0 * one), 4.0 * one)
+    >>> around.base.ravel().tolist(), around.top.ravel().tolist()
+    ([0j, (3+0j)], [4j, (3+4j)])
+    """
     base, top = nodes.base_x + 1j * nodes.base_y, nodes.top_x + 1j * nodes.top_y
     clamped = np.zeros_like(base[:1])
     return Outline(np.concatenate((clamped, base)), np.concatenate((clamped + 1j * height, top)))
@@ -73,13 +79,23 @@ def crosses_itself(around: Outline, apart: int) -> Flags:
 
 
 def diagonals(around: Outline) -> Array:
-    """How near stations must be for their cells to touch: the longest diagonal twice, (batch,)."""
+    """Twice the longest diagonal of a cell, mm, (batch,): cells further apart cannot touch.
+
+    >>> square = Outline(np.array([[0j], [3 + 0j]]), np.array([[4j], [3 + 4j]]))
+    >>> diagonals(square).tolist()  # 2 · √(3² + 4²)
+    [10.0]
+    """
     chord = np.abs(np.diff(around.base, axis=0)).max(axis=0)
     return np.asarray(2.0 * np.hypot(chord, np.abs(around.top - around.base).max(axis=0)))
 
 
 def is_simple(around: Outline) -> Flags:
-    """Whether no sides of the outline cross: along the limiting layer and back along the domes."""
+    """Whether no sides of the outline cross, (batch,): along the layer, back along the domes.
+
+    >>> base, top = np.array([[0j], [3 + 0j]]), np.array([[4j], [3 + 4j]])
+    >>> is_simple(Outline(base, top)).tolist(), is_simple(Outline(base, top[::-1])).tolist()
+    ([True], [False])
+    """
     import shapely
 
     ring = np.concatenate((around.base, around.top[::-1])).T

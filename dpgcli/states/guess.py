@@ -1,4 +1,4 @@
-"""Where searches begin: units in their own wells, bars to first order, or opened by strokes."""
+"""Starting shapes of searches: units in their own wells, or opened by strokes."""
 
 from dataclasses import dataclass
 
@@ -66,7 +66,7 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
 
 
 def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
-    """−A⁻¹C for the near corner, by chord, near and far strut; infinite where A is singular."""
+    """−A⁻¹C for the near corner, by chord, near and far strut; infinite for a singular A."""
     corner, mixed = band[0, 1], band[1, 1]
     chord_near, strut_near, strut_far = band[1, 0], band[2, 1], band[1, 2]
     opening, leaning = corner + mixed, corner - mixed  # the eigenvalues of A
@@ -105,7 +105,17 @@ def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Intern
 
 
 def stroke_guess(finger: Finger, inverted: Flags, strokes: float) -> Internal:
-    """The shape with every inverted unit opened by `strokes` times its stroke."""
+    """The shape with every inverted unit opened by `strokes` times its stroke, (unit, batch).
+
+    Both corners open by m with 2 H sin m = strokes · d, at most 90°; bars keep their lengths.
+
+    >>> from dpgcli.mechanics.finger import uniform_finger
+    >>> unit = uniform_finger(1, segment_length=13.5, segment_height=10.0, stroke=10.0,
+    ...     bistable_stiffness=1.0, force_linearity=0.0, hinge_stiffness=1.0)
+    >>> angle = stroke_guess(unit, np.array([[True]]), 1.0).near_angle[0, 0]
+    >>> round(float(np.degrees(angle)), 9)
+    30.0
+    """
     half = np.minimum(strokes * finger.stroke / (2.0 * finger.segment_height), 1.0)
     rest = np.zeros((1, 1))
     angle = np.arcsin(half) * inverted

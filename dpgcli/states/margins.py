@@ -70,7 +70,7 @@ def limits(finger: Finger) -> Margins:
     def are_bistable(values: Array) -> Flags:
         return _are_bistable(units, values)
 
-    last = np.where(are_bistable(low), _last(are_bistable, low, high), -np.inf)
+    last = np.where(are_bistable(low), last_where(are_bistable, low, high), -np.inf)
     return Margins(*np.broadcast_to(last, (len(last), finger.n_units)))
 
 
@@ -87,8 +87,12 @@ def _are_bistable(units: Finger, values: Array) -> Flags:
     return wells.exists.reshape(values.shape)
 
 
-def _last(hold: Callable[[Array], Flags], low: Array, high: Array) -> Array:
-    """The last values at which something holds that does not hold at `high`, by bisection."""
+def last_where(hold: Callable[[Array], Flags], low: Array, high: Array) -> Array:
+    """The last values at which something holds that does not hold at `high`, by bisection.
+
+    >>> float(last_where(lambda x: x * x < 2.0, np.array(0.0), np.array(2.0)).round(12))
+    1.414213562373
+    """
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         held = hold(middle)

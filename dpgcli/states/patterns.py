@@ -14,15 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Codes, Flags
-from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 
-MOST_SELECTED = 2**26
+MOST_SELECTED = 2**26  # states of a run
 MOST_COUNTED = np.uint64(2**62)  # so that the sum of two is a number of 64 bits
 MOST_WAYS, MOST_BITS = 10_000, 10**9  # states of the automaton that matches: at most 10 s
 
 
 def chunks(n_codes: int, size: int) -> Iterator[Codes]:
-    """All codes below n_codes, in order, at most `size` at a time."""
+    """All codes below n_codes, in order, at most `size` at a time.
+
+    >>> [codes.tolist() for codes in chunks(5, 2)]
+    [[0, 1], [2, 3], [4]]
+    """
     for first in range(0, n_codes, size):
         yield np.arange(first, min(first + size, n_codes), dtype=np.uint64)
 
@@ -38,7 +42,11 @@ def inverted_units(codes: Codes, n_units: int) -> Flags:
 
 
 def codes_of(inverted: Flags) -> Codes:
-    """Inverse of `inverted_units`."""
+    """Codes of patterns (unit, state), the inverse of `inverted_units`.
+
+    >>> codes_of(np.array([[True], [False], [True]])).tolist()
+    [5]
+    """
     return reduce(lambda code, bit: (code << np.uint64(1)) | bit, inverted.astype(np.uint64))
 
 
@@ -64,15 +72,16 @@ def select(globs: Sequence[str], n_units: int) -> "Selection":
     for glob in globs:
         if not glob or set(glob) - set("01*?"):
             raise UsageError(
-                f"--pattern {shortened(glob)!r}: expected digits 0 and 1 with wildcards * and ?, "
-                f"such as {'1' * n_units} or 1*"
+                Field("patterns"),
+                f" {shortened(glob)!r}: expected digits 0 and 1 with wildcards * and ?, "
+                f"such as {'1' * n_units} or 1*",
             )
     selection = Selection(_transitions(_Globs.of(globs, n_units), n_units))
     if not len(selection):
         named = shortened(", ".join(globs))
         raise NothingSelectedError(f"no pattern of {n_units} units matches {named}")
     if len(selection) > MOST_SELECTED:
-        raise UsageError(too_many(n_units, "--pattern selects"))
+        raise UsageError(too_many(n_units, Field("patterns"), " selects"))
     return selection
 
 
@@ -94,7 +103,7 @@ class Selection:
         return int(self.counts[0].sum())
 
     def codes(self, first: int, stop: int) -> Codes:
-        """Codes of the patterns at the places first … stop − 1."""
+        """Codes of the patterns number first … stop − 1 of the selection."""
         place = np.arange(first, stop, dtype=np.uint64)
         state = np.zeros(len(place), np.int64)
         codes = np.zeros(len(place), np.uint64)
@@ -140,12 +149,12 @@ class _Globs:
         return places | (places & self.star) << 1
 
     def after(self, places: int, digit: int) -> int:
-        """Where one may be after a digit."""
+        """The places after a digit from these places."""
         taking = self.one if digit else self.zero
         return self.without_digit((places & taking) << 1 | (places & self.star))
 
     def before(self, places: int) -> int:
-        """From where some digit leads to these places."""
+        """The places from which some digit leads to these places."""
         found = (places >> 1) & (self.zero | self.one) | (places & self.star)
         return found | (found >> 1) & self.star
 
@@ -169,8 +178,9 @@ def _transitions(globs: _Globs, n_units: int) -> list[NDArray[np.int64]]:
         n_symbols = globs.end.bit_length()
         if len(after) > MOST_WAYS or len(after) * n_symbols > MOST_BITS:
             raise UsageError(
-                f"--pattern: globs of {n_symbols:,} symbols that match in {len(after):,} ways or "
-                "more: give fewer at a time, or simpler ones"
+                Field("patterns"),
+                f": globs of {n_symbols:,} symbols that match in {len(after):,} ways or "
+                "more: give fewer at a time, or simpler ones",
             )
         steps.append(np.array(step, np.int64).reshape(-1, 2))
         states = after
@@ -178,12 +188,15 @@ def _transitions(globs: _Globs, n_units: int) -> list[NDArray[np.int64]]:
 
 
 def shortened(text: str) -> str:
-    """A text of any length as far as a message has room for it."""
+    """A text cut to the 80 characters that a message has room for.
+
+    >>> len(shortened("01" * 100)), shortened("1*")
+    (80, '1*')
+    """
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-def too_many(n_units: int, what: str) -> str:
-    """Why so many states are refused, and what to do instead."""
-    return (
-        f"{what} more than {MOST_SELECTED:,} of the 2^{n_units} states: select fewer with --pattern"
-    )
+def too_many(n_units: int, *what: str) -> Message:
+    """The message that refuses so many states, after the words `what`."""
+    most = f"more than {MOST_SELECTED:,} of the 2^{n_units} states"
+    return Message(*what, f" {most}: select fewer with ", Field("patterns"))

@@ -6,27 +6,26 @@ from enum import StrEnum
 
 import numpy as np
 
-from dpgcli.errors import UsageError
+from dpgcli.design.scene import Scene
+from dpgcli.errors import Field, Message, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.costs import peak_bytes, seconds
-from dpgcli.states.halves import Split
-from dpgcli.states.pairs import paired_states
+from dpgcli.states.pairs.compose import paired_states
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.quantities import ALWAYS, Quantity, declared, named
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.rungs import (
     DEFAULT_TOLERANCE,
-    RUNGS,
+    Exactness,
     Rung,
     bar_flexibility,
-    cheapest,
     check_exactness,
-    error_bounds,
+    exactnesses,
 )
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
@@ -87,7 +86,7 @@ class Plan:
 
     scene: Scene
     request: Request
-    units: Units
+    exactness: Exactness
     method: Method
     split: Split | None
     selection: Selection | None
@@ -100,7 +99,6 @@ class Plan:
     omissions: tuple[Omission, ...]
     residual_limit: float
     bar_flexibility: float
-    rung: Rung | None
     error_bound: float
     expected_seconds: float
     expected_bytes: int
@@ -114,9 +112,19 @@ class Plan:
         return frozenset(column.group for column in self.columns)
 
     @property
+    def units(self) -> Units:
+        """The finger's units, as they are solved."""
+        return self.exactness.units
+
+    @property
+    def rung(self) -> Rung | None:
+        """What was chosen for the target error, if there is one."""
+        return self.exactness.rung
+
+    @property
     def dropped_error(self) -> float:
-        """What a rung without the scene's bars adds to the error of each tip, mm."""
-        return self.bar_flexibility if self.rung is not None and self.rung.drops_bars else 0.0
+        """What dropping the scene's bars adds to the error of each tip, mm."""
+        return float(self.exactness.dropped_error[0])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -141,30 +149,30 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     request = request or Request()
     _check(scene, request)
     n = scene.finger.n_units
-    units = Units.of(scene.finger)
-    flexibility = _flexibility(units)
-    rung, bound = _rung(units, request)
-    if rung is not None:
-        request = replace(request, tolerance=rung.tolerance)
-        units = Units.of(scene.finger.with_bars(np.inf)) if rung.drops_bars else units
-    finger = units.finger
+    scene_units = Units.of(scene.finger)
+    needs_bars = any(quantity.needs_bars for quantity in _asked_for(request))
+    ((_, exactness),) = exactnesses(
+        scene_units, request.tolerance, request.target_error, needs_bars=needs_bars
+    )
+    request, units = replace(request, tolerance=exactness.tolerance), exactness.units
+    is_bounded = request.formulation == "chain"
     selection = select(request.patterns, n) if request.patterns else None
     n_states = 2**n if selection is None else len(selection)
     if n_states > MOST_SELECTED:
         raise UsageError(too_many(n, "the finger has"))
-    potential = FORMULATIONS[request.formulation](finger)
+    potential = FORMULATIONS[request.formulation](units.finger)
     terms = potential.kinds
     is_fitted = scene.uncertainty is not None and request.formulation == "chain"
     available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
-    dropped = rung is not None and rung.drops_bars
-    columns, left_out = _columns(available, request.columns, n_states, has_bars=not dropped)
+    has_bars = not exactness.drops_bars
+    columns, left_out = _columns(available, request.columns, n_states, has_bars=has_bars)
     groups = {column.group for column in columns}
     split = _split(units, potential, request, selection is None, groups)
     n_solves = n_states if split is None else split.n_solves
     return Plan(
         scene=scene,
         request=request,
-        units=units,
+        exactness=exactness,
         method=Method.DIRECT if split is None else Method.PAIRS,
         split=split,
         selection=selection,
@@ -174,11 +182,10 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         n_unit_solves=units.wells.exists.size,
         n_finger_solves=n_solves,
         columns=columns,
-        omissions=(*_omissions(scene, units, split, n_solves, rung), *left_out),
+        omissions=(*_omissions(scene, units, split, n_solves, exactness), *left_out),
         residual_limit=request.tolerance * _largest_force(potential),
-        bar_flexibility=flexibility,
-        rung=rung,
-        error_bound=bound,
+        bar_flexibility=_flexibility(scene_units),
+        error_bound=float(exactness.error_bounds[0]) if is_bounded else np.inf,
         expected_seconds=seconds(
             request.formulation, split, n, n_states, {c.group for c in columns}
         ),
@@ -194,43 +201,38 @@ def _largest_force(potential: FingerPotential) -> float:
 def _check(scene: Scene, request: Request) -> None:
     if request.formulation not in FORMULATIONS:
         raise UsageError(
-            f"--formulation {request.formulation!r}: expected {' or '.join(FORMULATIONS)}"
+            Field("formulation"),
+            f" {request.formulation!r}: expected {' or '.join(FORMULATIONS)}",
         )
     if request.formulation == "lattice" and scene.finger.is_rigid:
         raise UsageError(
-            "--formulation lattice needs a finite finger.linear_stiffness_N_per_mm: "
-            "node coordinates cannot drop rigid bars; use the chain"
+            Field("formulation"),
+            " lattice needs a finite finger.linear_stiffness_N_per_mm: "
+            "node coordinates cannot drop rigid bars; use the chain",
         )
     if Group.UNCERTAINTY in request.columns:
         _check_uncertainty(scene, request)
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
-        raise UsageError("--target-error chooses among ways of the chain: drop --formulation")
+        raise UsageError(
+            Field("target_error"), " chooses among ways of the chain: drop ", Field("formulation")
+        )
 
 
 def _check_uncertainty(scene: Scene, request: Request) -> None:
     if scene.uncertainty is None:
         cancels = " (those of the curve's own k_b and d cancel)" if scene.finger.law.curve else ""
         raise UsageError(
-            f"--uncertainty: no value of the spec has a standard error{cancels}; "
-            "calibrate it by a file of dpg fit"
+            Field("uncertainty"),
+            f": no value of the spec has a standard error{cancels}; "
+            "calibrate it by a file of dpg fit",
         )
     if request.formulation != "chain":
-        raise UsageError("--uncertainty is known in the chain's coordinates: drop --formulation")
-
-
-def _rung(units: Units, request: Request) -> tuple[Rung | None, float]:
-    """The cheapest rung for a target error, and its bound (mm): of tips, and of the chain only.
-
-    Stiffness that was asked for needs the bars.
-    """
-    bounds = error_bounds(units)
-    if request.target_error is None:
-        return None, float(bounds[-1, 0]) if request.formulation == "chain" else np.inf
-    if any(q.needs_bars for q in _asked_for(request)):
-        bounds[0] = np.inf
-    (index,) = cheapest(bounds, request.target_error)
-    return RUNGS[index], float(bounds[index, 0])
+        raise UsageError(
+            Field("uncertainty"),
+            " is known in the chain's coordinates: drop ",
+            Field("formulation"),
+        )
 
 
 def _asked_for(request: Request) -> Iterator[Quantity]:
@@ -267,10 +269,11 @@ def _columns(
 
 def _why_left_out(group: Group, n_states: int) -> str:
     if group in ON_REQUEST:
-        return f"given on request: --{group}"
+        return Message("given on request: ", Field(group))
     if n_states <= MOST_STATES_WITH[group]:
         return "the target error drops the bars, without which they would be wrong"
-    return f"left out above {MOST_STATES_WITH[group]:,} states: --columns default,{group}"
+    most = f"left out above {MOST_STATES_WITH[group]:,} states"
+    return Message(most, ": ", Field("columns"), f" default,{group}")
 
 
 def _split(
@@ -312,16 +315,17 @@ def _flexibility(units: Units) -> float:
 
 
 def _omissions(
-    scene: Scene, units: Units, split: Split | None, n_solves: int, rung: Rung | None
+    scene: Scene, units: Units, split: Split | None, n_solves: int, exactness: Exactness
 ) -> tuple[Omission, ...]:
     finger = units.finger
     n = finger.n_units
     omissions = [Omission("loads, pressure and contact", "the spec has none")]
     if finger.is_rigid:
+        why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
         omissions.append(
             Omission(
                 f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
-                f"{_why_rigid(rung)}; units do not feel each other, "
+                f"{why}; units do not feel each other, "
                 "so the guess is the solution and Newton only certifies it",
                 "bars",
             )
@@ -346,9 +350,3 @@ def _omissions(
             Omission("the second finger", "a mirror image: solved once", "second-finger")
         )
     return tuple(omissions)
-
-
-def _why_rigid(rung: Rung | None) -> str:
-    if rung is None or not rung.drops_bars:
-        return "k_L is infinite"
-    return "the target error allows it"

@@ -6,11 +6,10 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from dpgcli.arrays import Codes, keep_freed_memory
-from dpgcli.mechanics.scene import Scene
+from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.design.scene import Scene
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Columns
-from dpgcli.states.pairs import paired_states
+from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.quantities import rows

@@ -1,4 +1,4 @@
-"""What can be said of states: each quantity with its name, unit, meaning and how it is computed.
+"""Quantities of states: each with its name, unit, meaning and function.
 
 A quantity is written here and nowhere else: tables, `--columns`, metadata and the manual follow.
 """
@@ -10,8 +10,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.errors import UsageError
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.arrays import Columns
+from dpgcli.errors import Field, UsageError
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import SolvedFingers, SolvedStates
 
@@ -22,8 +23,8 @@ Of = Callable[[SolvedFingers], NDArray[Any]]
 class Quantity(Column):
     """A column of states and the function that computes it.
 
-    `is_always` says that it is told of a pattern without a state, too: else it is NaN, or false,
-    there. Bars that are dropped would falsify what `needs_bars`.
+    Without a state of the pattern it is NaN, or false, unless `is_always`. A quantity that
+    `needs_bars` would be wrong if a plan dropped them.
     """
 
     of: Of = field(kw_only=True, compare=False)
@@ -73,14 +74,18 @@ def named(quantities: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantit
     """The declared quantities that are named, each by its name or its group's.
 
     Raises UsageError for names that are neither, with what there is.
+
+    >>> [q.name for q in named(declared(3, ("bistable", "hinge"), False), ["energies"])]
+    ['bistable_energy_mJ', 'hinge_energy_mJ']
     """
     known = {q.name for q in quantities} | {q.group for q in quantities}
     if unknown := [name for name in names if name not in known]:
         groups = ", ".join(dict.fromkeys(q.group for q in quantities))
         single = ", ".join(q.name for q in quantities if q.group is not Group.NODES)
         raise UsageError(
-            f"--columns: {', '.join(unknown)} unknown for this scene; "
-            f"groups: default, all, {groups}; columns: {single}"
+            Field("columns"),
+            f": {', '.join(unknown)} unknown for this scene; "
+            f"groups: default, all, {groups}; columns: {single}",
         )
     return tuple(q for q in quantities if q.name in names or q.group in names)
 
@@ -144,7 +149,7 @@ _NUMERICS = (
         is_always=True,
     ),
 )
-ALWAYS = (*_POSES, *_NUMERICS)  # what every table of states needs to be judged by
+ALWAYS = (*_POSES, *_NUMERICS)  # in every table of states: pose, status and numerical errors
 
 
 def _stiffness(name: str, unit: str, description: str, of: Of) -> Quantity:
@@ -205,38 +210,38 @@ _GRIPPER = (
         "aperture_mm",
         "mm",
         "gap of the inner faces at the tips; < 0: crossed",
-        lambda s: s.grip.aperture,
+        lambda s: s.in_gripper.aperture,
     ),
     _gripper(
         "fingers_overlap",
         "",
         "the predicted fingers overlap",
-        lambda s: s.grip.overlaps,
+        lambda s: s.in_gripper.overlaps,
         Kind.FLAG,
     ),
     _gripper(
         "upper_tip_x_mm",
         "mm",
         "x of the upper finger's tip in the gripper",
-        lambda s: s.grip.upper.base_x[-1],
+        lambda s: s.in_gripper.upper.base_x[-1],
     ),
     _gripper(
         "upper_tip_y_mm",
         "mm",
         "y of the upper finger's tip in the gripper",
-        lambda s: s.grip.upper.base_y[-1],
+        lambda s: s.in_gripper.upper.base_y[-1],
     ),
     _gripper(
         "lower_tip_x_mm",
         "mm",
         "x of the lower finger's tip in the gripper",
-        lambda s: s.grip.upper.base_x[-1],
+        lambda s: s.in_gripper.upper.base_x[-1],
     ),
     _gripper(
         "lower_tip_y_mm",
         "mm",
         "y of the lower finger's tip in the gripper",
-        lambda s: -s.grip.upper.base_y[-1],
+        lambda s: -s.in_gripper.upper.base_y[-1],
     ),
 )
 
@@ -276,7 +281,7 @@ def _node(finger: str, layer: str, station: int, axis: str) -> Quantity:
     sign = -1.0 if finger == "lower_" and axis == "y" else 1.0  # the mirror image
 
     def position(solved: SolvedFingers) -> NDArray[Any]:
-        nodes = solved.grip.upper if finger else solved.nodes
+        nodes = solved.in_gripper.upper if finger else solved.nodes
         return np.asarray(sign * getattr(nodes, coordinate)[station])
 
     return Quantity(

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Columns, Flags
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows
 from dpgcli.states.settle import settle
 from dpgcli.states.solved import ALONE, SolvedFingers, Surroundings
@@ -17,7 +17,11 @@ from dpgcli.states.units import Units
 
 
 def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
-    """Patterns and statuses as strings; all else unchanged."""
+    """Patterns and statuses as strings; all else unchanged.
+
+    >>> as_text(Column("status", "", "", kind=Kind.STATUS), np.array([0, 4])).tolist()
+    ['stable', 'folded']
+    """
     if column.kind is Kind.PATTERN:
         return np.asarray(values.astype(str))
     if column.kind is Kind.STATUS:
@@ -27,10 +31,10 @@ def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class RowRequest:
-    """What rows are to hold and how exactly: what a plan decides for all batches.
+    """The quantities of rows and their accuracy, which a plan decides for all batches.
 
     `around` and `dropped_error`, the error of the tip (mm) by what the units lack of the scene,
-    are for all states, or by lane. Without the scene's bars, what needs them is NaN.
+    are for all states, or by lane. Quantities that need the scene's bars are NaN without these.
     """
 
     formulate: Formulate

@@ -12,12 +12,14 @@ All are doubled for what is left out. Where bars are so soft, or a unit so close
 second well, that a single unit does not show what the finger does, there is no bound.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.tip import TIP_ROUNDING
@@ -51,15 +53,74 @@ def check_exactness(tolerance: float, target_error: float | None) -> None:
     """Raise UsageError for a tolerance or a target error (mm) that makes no sense."""
     if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
         raise UsageError(
-            f"--tolerance {tolerance}: expected {SMALLEST_TOLERANCE} … {LARGEST_TOLERANCE} "
-            "of the forces in play; below, rounding decides"
+            Field("tolerance"),
+            f" {tolerance}: expected {SMALLEST_TOLERANCE} … {LARGEST_TOLERANCE} "
+            "of the forces in play; below, rounding decides",
         )
     if target_error is None:
         return
     if not 0.0 < target_error < np.inf:
-        raise UsageError(f"--target-error {target_error} mm: expected a length > 0")
+        raise UsageError(Field("target_error"), f" {target_error} mm: expected a length > 0")
     if tolerance != DEFAULT_TOLERANCE:
-        raise UsageError("--target-error chooses the tolerance: drop --tolerance")
+        raise UsageError(Field("target_error"), " chooses the tolerance: drop ", Field("tolerance"))
+
+
+@dataclass(frozen=True)
+class Exactness:
+    """How exactly the states of some fingers are found: to a tolerance, or by a rung.
+
+    `scene_units` are those of the fingers as they were given.
+    """
+
+    scene_units: Units
+    tolerance: float
+    rung: Rung | None = None
+
+    @property
+    def drops_bars(self) -> bool:
+        """Whether the fingers are solved without their bars."""
+        return self.rung is not None and self.rung.drops_bars
+
+    @cached_property
+    def units(self) -> Units:
+        """The units of the fingers as they are solved."""
+        if not self.drops_bars:
+            return self.scene_units
+        return Units.of(self.scene_units.finger.with_bars(np.inf))
+
+    @cached_property
+    def error_bounds(self) -> Array:
+        """Bound on the error of every tip before the work, mm, (design,); infinite where none."""
+        bounds = error_bounds(self.scene_units)
+        return np.asarray(bounds[RUNGS.index(self.rung) if self.rung else -1])
+
+    @cached_property
+    def dropped_error(self) -> Array:
+        """What dropping the bars adds to the error of each tip, mm, (design,)."""
+        if not self.drops_bars:
+            return np.zeros(self.scene_units.finger.n_designs)
+        return bar_flexibility(self.scene_units)
+
+
+def exactnesses(
+    units: Units, tolerance: float, target_error: float | None, *, needs_bars: bool = False
+) -> Iterator[tuple[Indices, Exactness]]:
+    """How exactly to solve which designs: by the tolerance, or each as the target error allows.
+
+    With a target error (mm) each design takes the cheapest rung that is bounded by it; rigid bars
+    are none where something `needs_bars`. Designs of one rung come together.
+    """
+    if target_error is None:
+        yield np.arange(units.finger.n_designs), Exactness(units, tolerance)
+        return
+    bounds = error_bounds(units)
+    if needs_bars:
+        bounds[0] = np.inf
+    chosen = cheapest(bounds, target_error)
+    for index in np.unique(chosen):
+        places = np.flatnonzero(chosen == index)
+        some = units if len(places) == len(chosen) else units.take_lanes(places)
+        yield places, Exactness(some, RUNGS[index].tolerance, RUNGS[index])
 
 
 def error_bounds(units: Units) -> Array:

@@ -1,9 +1,9 @@
-"""How a certified state answers to its finger's values: dq/dp = −H⁻¹ ∂g/∂p, exact to rounding.
+"""Derivatives of certified states by their finger's values, dq/dp = −H⁻¹ ∂g/∂p.
 
 The Hessian H is factorized at the state already. The derivative of the gradient g by a value p
 comes from a complex step: Im g(q; p + ih)/h with h = 1e-100 (Squire and Trapp, SIAM Review 40,
-1998, 110). Nothing is subtracted, so nothing cancels, and every law and every value is covered
-by the one formula that states are solved with.
+1998, 110). It is exact to rounding: nothing is subtracted, nothing cancels, and every law and
+every value is covered by the one formula that states are solved with.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 
-STEP = 1e-100
+COMPLEX_STEP = 1e-100
 Direction = Mapping[str, Array]
 
 
@@ -60,15 +60,15 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
     here = cast("Array", coordinates + 0j)
     moved = chain_potential(_moved(settled, direction))
     with np.errstate(divide="ignore", invalid="ignore"):  # lanes that are no states
-        forces = moved.evaluate(here).gradient.imag / STEP
+        forces = moved.evaluate(here).gradient.imag / COMPLEX_STEP
         change = forward(equilibrium.factorization, -forces)
         change /= equilibrium.factorization.pivots
         change = backward(equilibrium.factorization, change)
-        stepped = here + 1j * STEP * change
+        stepped = here + 1j * COMPLEX_STEP * change
         stations = moved.coordinates.stations(stepped)
         _, near, far, _ = internal(change, moved.coordinates.finger.is_rigid)
         turns = -np.cumsum(near + far, axis=0)
-    x, y = (nodes[-1].imag / STEP for nodes in (stations.base_x, stations.base_y))
+    x, y = (nodes[-1].imag / COMPLEX_STEP for nodes in (stations.base_x, stations.base_y))
     return np.stack((x, y, turns[-1])), turns
 
 
@@ -76,4 +76,4 @@ def _moved(settled: Settled, direction: Direction) -> Finger:
     """The finger an imaginary step along a direction."""
     finger = settled.finger
     rates = direction.items()
-    return finger.changed(**{n: getattr(finger, n) + 1j * STEP * rate for n, rate in rates})
+    return finger.changed(**{n: getattr(finger, n) + 1j * COMPLEX_STEP * rate for n, rate in rates})

@@ -8,11 +8,12 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.terms import Formulate
-from dpgcli.states.certify import Settled, Status, certified, certify
+from dpgcli.states.certify import Settled, Status, certified
 from dpgcli.states.guess import geometric_guess, stroke_guess
 from dpgcli.states.units import Units
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
+HELD_FROM = (1.0, 0.0)  # strokes: corners open first, or soft bars give way first
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
 
 
@@ -29,9 +30,9 @@ def settle(
 
     `units` have one design, or one for each lane; `formulate` gives the potential of a finger,
     loads and all. `tolerance` is the largest residual over the forces in play. The search begins
-    at the shape `start`, or else at a guess that puts each unit into its own well; what soft bars
-    let go astray from there is looked for once more, with domes held open first. `own` are the
-    units that must have reached their wells.
+    at the shape `start`, or else at a guess that puts each unit into its own well; what goes
+    astray from there between bars that give way is looked for again, with domes held open first.
+    `own` are the units that must have reached their wells.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
@@ -46,14 +47,12 @@ def settle(
         return walk(potential.coordinates.of_shape(start))
     guess = geometric_guess(units.finger, inverted, units.first_order)
     settled = walk(potential.coordinates.of_shape(guess))
-    soft = units.are_soft.any(axis=0)
-    if not soft.any():
-        return settled
-    missed = certify(settled, units, tolerance) != Status.STABLE
-    lanes = np.flatnonzero(missed & soft)
-    if not len(lanes):
-        return settled
-    return _searched_again(units, formulate, settled, tolerance, own, lanes)
+    for strokes in HELD_FROM:
+        lanes = _worth_a_search(settled, units)
+        if not len(lanes):
+            break
+        settled = _searched_again(units, formulate, settled, tolerance, own, lanes, strokes)
+    return settled
 
 
 def settle_from(
@@ -80,6 +79,20 @@ def settle_from(
     return certified(units, potential, inverted, there, tolerance, own)
 
 
+def _worth_a_search(settled: Settled, units: Units) -> Indices:
+    """Lanes without a state, if bars give way and every inverted unit may have a second well.
+
+    What is folded in its own wells between stiff bars has no other state.
+    """
+    is_elsewhere = (settled.reached != settled.inverted).any(axis=0)
+    is_missed = is_elsewhere | (settled.status != Status.STABLE)
+    if units.finger.is_rigid or not is_missed.any():
+        return np.arange(0)
+    has_none = (settled.inverted & units.have_no_well).any(axis=0)
+    is_no_other = settled.is_folded & ~is_elsewhere & ~units.are_soft.any(axis=0)
+    return np.flatnonzero(is_missed & ~has_none & ~is_no_other)
+
+
 def _searched_again(
     units: Units,
     formulate: Formulate,
@@ -87,15 +100,16 @@ def _searched_again(
     tolerance: float,
     own: slice,
     lanes: Indices,
+    strokes: float,
 ) -> Settled:
     """Search some lanes with domes held open until bars and hinges have settled, then let go.
 
-    What is let go walks down from beyond its well, and meets the well before its barrier. A lane
-    is replaced if that finds its state.
+    The domes are pulled open from so many `strokes`. What is let go walks down from beyond its
+    well, and meets the well before its barrier. A lane is replaced if that finds its state.
     """
     few, inverted = units.take_lanes(lanes), np.take(settled.inverted, lanes, axis=1)
     held = formulate(few.finger.with_domes_held(inverted))
-    guess = held.coordinates.of_shape(stroke_guess(few.finger, inverted, 1.0))
+    guess = held.coordinates.of_shape(stroke_guess(few.finger, inverted, strokes))
     start = minimize(held, guess, tolerance).coordinates
     potential = formulate(few.finger.with_domes(inverted))
     again = settle_from(few, potential, inverted, start, tolerance)

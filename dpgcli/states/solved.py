@@ -1,4 +1,4 @@
-"""Solved states, by whatever method, and what can be asked of those solved as whole fingers."""
+"""Solved states by any method, and further quantities of those solved as whole fingers."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
+from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import Stations
-from dpgcli.mechanics.scene import Gripper, Uncertainty
 from dpgcli.states.certify import Settled, Status
-from dpgcli.states.gripper import Grip, grip
+from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.sensitivities import sensitivities
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
 
 
 @dataclass(frozen=True)
 class SolvedStates:
-    """Certified states, arrays of shape (…, state): what every method gives.
+    """Certified states by any method, arrays of shape (…, state).
 
     `status` holds `Status` codes. `pose` is tip x, y (mm) and angle (rad), `tip_error` in mm,
     `energies` in mJ by kind, `residual` in N.
@@ -33,7 +33,7 @@ class SolvedStates:
 
     @cached_property
     def is_state(self) -> Flags:
-        """Where there is an equilibrium of the row's own pattern to speak of."""
+        """Flags of stable and marginal states: equilibria of the pattern asked for, (state,)."""
         return np.asarray((self.status == Status.STABLE) | (self.status == Status.MARGINAL))
 
     @property
@@ -45,10 +45,9 @@ class SolvedStates:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around a finger, numbers or arrays by state.
+    """A finger's gripper, if any, layer thickness (mm) and uncertainty of fitted values.
 
-    Its gripper, if any, the thickness of its limiting layer (mm), and what fitted values may be
-    off by.
+    Numbers, or arrays by state.
     """
 
     gripper: Gripper | None = None
@@ -113,11 +112,11 @@ class SolvedFingers(SolvedStates):
         return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
 
     @cached_property
-    def grip(self) -> Grip:
+    def in_gripper(self) -> GripperPose:
         """The finger as the upper one of its gripper."""
         if self.around.gripper is None:
             raise ValueError("the fingers belong to no gripper")
-        return grip(self.around.gripper, self.around.layer_thickness, self.nodes)
+        return place_in_gripper(self.around.gripper, self.around.layer_thickness, self.nodes)
 
     @cached_property
     def compliance(self) -> Array:

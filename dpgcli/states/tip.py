@@ -8,14 +8,14 @@ from dpgcli.arrays import Array, total
 from dpgcli.equilibrium.banded import forward
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled
 
-TIP_ROUNDING = 8.0 * np.finfo(float).eps
-CANCELLED = 1e-3  # of the product: below it the determinant is found without cancellation
+TIP_ROUNDING = 8.0 * np.finfo(float).eps  # of the finger's length
+CANCELING_SHARE = 1e-3  # of xx · yy: a smaller determinant is found without cancellation
 COMPLIANCE_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True)
 class Tip:
-    """The tip and how far it is known, shapes (…, batch).
+    """The tip and its numerical error, shapes (…, batch).
 
     Pose x, y (mm) and angle (rad); estimated errors of its position (mm) and angle (rad); the
     compliance by `COMPLIANCE_PAIRS` in mm/N, rad/N and rad/(N mm), and the softest and the
@@ -36,6 +36,20 @@ def tip(settled: Settled, *, with_compliance: bool) -> Tip:
     few units in the last place, more for many units and where the curvature is small. Twice,
     since between very stiff bars of the lattice that step itself has lost its digits; infinite
     for a marginal state.
+
+    A straight unit of H = 1 mm with k_b H² = 2 k_θ = 2 N mm has the Hessian [[4, 2], [2, 4]] by
+    its corners, and a tip 3 mm away follows the near one alone: 3² · 4/12 = 3 mm/N along y.
+
+    >>> from dpgcli.mechanics.finger import uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> from dpgcli.states.settle import settle
+    >>> from dpgcli.states.units import Units
+    >>> unit = uniform_finger(1, segment_length=3.0, segment_height=1.0, stroke=0.5,
+    ...     bistable_stiffness=2.0, force_linearity=0.05, hinge_stiffness=1.0)
+    >>> straight = settle(Units.of(unit), chain_potential, np.array([[False]]), 1e-12)
+    >>> compliance = tip(straight, with_compliance=True).compliance
+    >>> compliance[COMPLIANCE_PAIRS.index((1, 1))].round(9)
+    array([3.])
     """
     equilibrium = settled.equilibrium
     finger = settled.finger
@@ -62,7 +76,7 @@ def _principal_stiffness(compliance: Array, sides: Array, pivots: Array) -> Arra
     """Softest and stiffest 1/eigenvalue of the position's compliance, (2, batch)."""
     xx, xy, yy = compliance[:3]
     determinant = xx * yy - xy * xy
-    cancelling = np.flatnonzero(~(determinant > CANCELLED * xx * yy))
+    cancelling = np.flatnonzero(~(determinant > CANCELING_SHARE * xx * yy))
     if len(cancelling):
         x, y = (np.take(sides[:, axis], cancelling, axis=-1) for axis in (0, 1))
         roots = np.sqrt(np.take(pivots, cancelling, axis=-1))

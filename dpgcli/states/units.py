@@ -11,6 +11,7 @@ from dpgcli.states.guess import FirstOrder, first_order
 from dpgcli.states.wells import Wells, inverted_wells
 
 LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are soft
+LARGEST_STRAIN = 0.05  # of a bar: what the first order says of it is no longer small
 WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twice the height
 
 
@@ -26,13 +27,19 @@ class Units:
     def are_soft(self) -> Flags:
         """Units that with rigid bars do not show what the finger does, (unit, design).
 
-        Bars turn them too far, or a stroke leads to where only bars that give way can follow.
+        Bars turn them too far or are strained too much, or a stroke leads to where only bars that
+        give way can follow.
         """
         if self.finger.is_rigid:
             return np.zeros((1, 1), bool)
+        finger, known = self.finger, self.first_order
         with np.errstate(invalid="ignore"):
-            is_turned = self.first_order.turn > LARGEST_TURN * self.wells.angle
-        return is_turned | (~self.wells.exists & (self.wells.angle > WIDE_ANGLE))
+            is_turned = known.turn > LARGEST_TURN * self.wells.angle
+        is_strained = (np.abs(known.chord) > LARGEST_STRAIN * finger.segment_length) | (
+            2.0 * np.abs(known.strut) > LARGEST_STRAIN * finger.segment_height
+        )
+        is_out_of_reach = ~self.wells.exists & (self.wells.angle > WIDE_ANGLE)
+        return is_turned | is_strained | is_out_of_reach
 
     @property
     def shortest_loop(self) -> int | None:

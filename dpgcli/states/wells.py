@@ -49,9 +49,12 @@ class Wells(ByUnit):
     the full stroke (of where a dome that only pushes still does) and `barrier` is the middle, so
     that a search can still begin.
 
-    `spring_barrier` is the x (mm) at which the dome's spring alone turns over. With any bars and
-    hinges a unit rests inverted only beyond it, since what holds the unit straight pulls back;
-    infinite where the spring does not. The unit's own barrier lies between it and the well.
+    `spring_barrier` is the x (mm) at which the dome's spring alone turns over: the highest top
+    before the deepest well of its curve, infinite where there is none. A unit counts as inverted
+    exactly where it is open beyond it, with any bars and hinges: what holds the unit straight pulls
+    back, so that it rests inverted only there. A unit in a ripple before it counts as not inverted,
+    whatever the hinge makes of the ripple's depth; `extension` is the deepest of the wells beyond
+    it, and the unit's own barrier lies between the two.
     `snap_force` and `reset_force` (N, on the opening) are what a unit bears in its ground and in
     its inverted well; where there is no second well, `reset_force` is negative, what is lacking.
     """
@@ -92,7 +95,7 @@ def inverted_wells(finger: Finger) -> Wells:
         extension,
         np.where(exists, barrier, MIDDLE) * stroke,
         np.arcsin(extension / (2.0 * finger.segment_height)),
-        _spring_barrier(finger, MIDDLE * stroke),
+        _spring_barrier(finger),
         snap,
         -reset,
     )
@@ -108,13 +111,13 @@ def _opened(finger: Finger, widest: Array) -> Array:
     return np.asarray(np.minimum(opening, widest))
 
 
-def _spring_barrier(finger: Finger, otherwise: Array) -> Array:
+def _spring_barrier(finger: Finger) -> Array:
     """Where the dome's spring alone turns over, mm; nowhere if it has no second well.
 
-    `otherwise` where a dome has done so before it opens its unit.
+    0 where a dome has done so before it opens its unit.
     """
     top = finger.law.rests(finger.domes).top
-    return np.asarray(np.where(np.isnan(top), np.inf, np.where(top > 0.0, top, otherwise)))
+    return np.asarray(np.where(np.isnan(top), np.inf, np.maximum(top, 0.0)))
 
 
 def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
@@ -149,13 +152,15 @@ def _searched_wells(finger: Finger) -> Wells:
     energy = _rigid_energy(finger, grid)[:-1]
     places = np.arange(SEARCHED - 1)[:, None, None]
     is_well, is_top = ~pulls[:-1] & pulls[1:], pulls[:-1] & ~pulls[1:]
+    turned = _spring_barrier(finger)
+    is_well &= grid[:-1] >= turned  # before it a unit may rest in a ripple, but is not inverted
     # the well that lies deepest below both sides, and the highest top before it: ripples pass
     left, right = (np.maximum.accumulate(e, axis=0) for e in (energy, energy[::-1]))
     depth = np.minimum(left, right[::-1]) - energy
     wells = np.where(is_well, depth, -np.inf).argmax(axis=0)
     is_top &= places < wells
     tops = np.where(is_top.any(axis=0), np.where(is_top, energy, -np.inf).argmax(axis=0), -1)
-    exists = is_well.any(axis=0) & np.isfinite(own) & within_reach
+    exists = is_well.any(axis=0) & within_reach
     well = _bisected(finger, grid, wells, rises=True)
     top = _bisected(finger, grid, np.maximum(tops, 0), rises=False)
     stroke = np.broadcast_to(finger.stroke, exists.shape)
@@ -166,7 +171,7 @@ def _searched_wells(finger: Finger) -> Wells:
         extension,
         barrier,
         np.arcsin(extension / lever),
-        _spring_barrier(finger, barrier),
+        turned,
         _largest(slope, grid <= barrier),
         _largest(-slope, (grid >= barrier) & (grid <= extension)),
     )

@@ -13,7 +13,7 @@ from typing import IO
 from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.models import Model
 from dpgcli.calibration.fe.results import displacements, reported_error, version
-from dpgcli.errors import OutputError, SolverError, UsageError
+from dpgcli.errors import Field, OutputError, SolverError, UsageError
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.temporary import temporary_folder
 
@@ -111,7 +111,7 @@ def curve_path(model: Model, folder: Path) -> Path:
 
 def _write(path: Path, text: str) -> None:
     with whole_file(path, MARKS[path.suffix]) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def solve(deck: Path, limits: Limits) -> Output:
@@ -154,19 +154,29 @@ def _ended(job: str, folder: Path, log: IO[bytes], limits: Limits, log_name: Pat
         try:
             return process.wait(limits.time_limit)
         except subprocess.TimeoutExpired:
-            limit = f"{limits.time_limit:g} s (--time-limit)"
-            raise SolverError(f"{SOLVER} was ended after {limit}; its log is {log_name}") from None
+            raise SolverError(
+                f"{SOLVER} was ended after {limits.time_limit:g} s (",
+                Field("time_limit"),
+                f"); its log is {log_name}",
+            ) from None
         finally:
-            os.killpg(group, signal.SIGKILL)
+            if group is None:
+                process.kill()
+            else:
+                os.killpg(group, signal.SIGKILL)
             process.wait()
 
 
 @contextmanager
-def _doomed_group() -> Iterator[int]:
+def _doomed_group() -> Iterator[int | None]:
     """A group of processes, all of which end with this block, and if this process is killed.
 
-    A shell in it waits for the end of a pipe that this process alone can write to.
+    A shell in it waits for the end of a pipe that this process alone can write to. None on
+    Windows, which has no groups that could be killed.
     """
+    if not hasattr(os, "killpg"):
+        yield None
+        return
     with subprocess.Popen(
         ["/bin/sh", "-c", "read line; kill -KILL 0"],
         stdin=subprocess.PIPE,

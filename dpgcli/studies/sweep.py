@@ -5,24 +5,25 @@ import shlex
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
-from dpgcli.files.scene_file import scene_of, spelled
+from dpgcli.files.scene_file import reason_against, scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
+from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.studies.differences import differences
-from dpgcli.studies.evaluation import DesignStatus, Evaluation, value_columns
-from dpgcli.studies.extent import Extent, size_text
-from dpgcli.studies.maker import HERE, check_workers
 from dpgcli.studies.work import Work
+from dpgcli.sweeps.differences import differences
+from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Chunk, Runner, Workplace, chunked
+from dpgcli.sweeps.extent import Extent, size_text
+from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
@@ -71,19 +72,21 @@ class Study:
     tolerance: float = DEFAULT_TOLERANCE
     target_error: float | None = None
 
-    @property
+    @cached_property
     def evaluation(self) -> Evaluation:
         """The function of each chunk."""
+        data = self.sweep.base_data
         return Evaluation(
-            self.sweep.base_data,
+            self.sweep.base.design,
+            numbers_of(data),
+            partial(reason_against, data),
             value_columns(self.sweep.space),
             self.sweep.constraints,
             self.tolerance,
-            self.sweep.base.gripper is not None,
             self.target_error,
         )
 
-    @property
+    @cached_property
     def metadata(self) -> dict[str, str]:
         """All that the results depend on, and its SHA-256 as the fingerprint."""
         said = {
@@ -103,7 +106,7 @@ class Study:
             return {"dpg.tolerance": repr(self.tolerance)}
         return {"dpg.target_error_mm": repr(self.target_error)}
 
-    @property
+    @cached_property
     def store(self) -> PartStore:
         """Where the parts of just this sweep are kept."""
         return PartStore(self.folder / PARTS / self.metadata[FINGERPRINT][:16])
@@ -116,7 +119,8 @@ class Study:
     @cached_property
     def extent(self) -> Extent:
         """What the sweep takes."""
-        return Extent(self.sweep, lambda values: self.evaluation.allowed(values))
+        allowed = self.evaluation.allowed if self.sweep.constraints else None
+        return Extent(self.sweep.space, self.sweep.base.finger.units, allowed)
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""
@@ -154,12 +158,13 @@ class Study:
 
     def check_room(self) -> None:
         """Refuse what memory, or the disk, cannot hold; raises UsageError."""
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-        if self.extent.bytes_in_memory > memory:
+        memory = _memory()
+        if memory is not None and self.extent.bytes_in_memory > memory:
             raise UsageError(
                 f"{self.sweep.space.size:,} designs take {size_text(self.extent.bytes_in_memory)} "
                 f"of memory in their summary, and this machine has {size_text(memory)}: "
-                "take fewer values, or go on with --force"
+                "take fewer values, or go on with ",
+                Field("force"),
             )
         missing = self.store.missing([(0, self.sweep.space.size)])
         n_designs = sum(stop - start for start, stop in missing)
@@ -170,7 +175,8 @@ class Study:
             raise UsageError(
                 f"{n_designs:,} designs have about {n_states:,} states, "
                 f"{size_text(needed)} while they are made, and {size_text(free)} are free: "
-                "take fewer values or units, or go on with --force"
+                "take fewer values or units, or go on with ",
+                Field("force"),
             )
 
     def check_unfinished(self) -> None:
@@ -182,7 +188,10 @@ class Study:
                 what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
                 raise UsageError(
                     f"{self.folder} holds an unfinished sweep {what}: "
-                    "finish it as it was, take another --output, or drop it with --restart"
+                    "finish it as it was, take another ",
+                    Field("output"),
+                    ", or drop it with ",
+                    Field("restart"),
                 )
 
     def drop_unfinished(self) -> None:
@@ -244,10 +253,11 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     """
     metadata = parts_of[0].said()
     for store in parts_of:
-        if not store.said():
+        if not store.said().get(FINGERPRINT, "").startswith(store.folder.name):
             raise UsageError(f"{store.folder / SAID} is damaged: run its sweep again")
         if damaged := store.damaged():
-            raise UsageError(f"{damaged[0].path} is damaged: run its sweep again")
+            wrong = "is damaged, or of another sweep: run its sweep again"
+            raise UsageError(f"{damaged[0].path} {wrong}")
     for store in parts_of[1:]:
         if changed := differences(metadata, store.said()):
             raise UsageError(f"{store.folder.parent.parent} differs in {', '.join(changed)}")
@@ -292,6 +302,13 @@ def _stores(folder: Path) -> list[PartStore]:
     """Folders whose names are beginnings of fingerprints, and that nobody else uses."""
     found = map(PartStore, sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/")))
     return [store for store in found if store.is_own]
+
+
+def _memory() -> int | None:
+    """Bytes of this machine's memory, where the system says."""
+    if not hasattr(os, "sysconf"):  # Windows
+        return None
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def _existing(folder: Path) -> Path:

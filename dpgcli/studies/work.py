@@ -7,9 +7,9 @@ from time import process_time
 from typing import IO, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
-from dpgcli.studies.evaluation import Evaluation, Numbers, Tables
-from dpgcli.studies.maker import Maker, check_maker
+from dpgcli.sweeps.evaluation import Evaluation, Numbers, Tables
 from dpgcli.sweeps.executors import Chunk
+from dpgcli.sweeps.maker import Maker, check_maker
 
 
 class Done(NamedTuple):

@@ -1,1 +1,1 @@
-"""Parameter spaces, executors, design metrics and requirements of sweeps."""
+"""Sweeps: spaces, evaluation of designs, executors, metrics and requirements."""

@@ -8,7 +8,7 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from dpgcli.errors import NoWorkerError
+from dpgcli.errors import Field, Message, NoWorkerError
 from dpgcli.sweeps.executors import GO_ON, PERIOD, Workplace
 
 PATIENCE = 10  # s, for an answer of the scheduler
@@ -34,7 +34,8 @@ class Watch:
             self.last_seen = now
         lonely = now - self.last_seen
         if lonely > self.limit:
-            raise NoWorkerError(f"{self.name}: no worker for {lonely:.0f} s (--wait). {GO_ON}")
+            since = f"{self.name}: no worker for {lonely:.0f} s ("
+            raise NoWorkerError(since, Field("wait"), f"). {GO_ON}")
         if (silence if n_workers else lonely) < SILENCE:
             self.is_said = False
         elif not self.is_said:
@@ -43,7 +44,8 @@ class Watch:
 
     def _word(self, n_workers: int, silence: float) -> str:
         if not n_workers:
-            return f"{self.name}: no worker answers; waiting {self.limit:g} s for one (--wait)"
+            waiting = f"{self.name}: no worker answers; waiting {self.limit:g} s for one ("
+            return Message(waiting, Field("wait"), ")")
         who = "its worker" if n_workers == 1 else f"any of its {n_workers} workers"
         return f"{self.name}: nothing from {who} for {silence:.0f} s; waiting"
 

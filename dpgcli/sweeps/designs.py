@@ -1,47 +1,23 @@
 """Many designs at once: all states of each in bounded blocks, and their metrics."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array, Codes, Indices
-from dpgcli.mechanics.finger import ARRAYS, Finger
-from dpgcli.mechanics.scene import Gripper, Scene
-from dpgcli.mechanics.terms import Formulate
-from dpgcli.states.columns import Columns
+from dpgcli.arrays import Array, Codes, Columns, Indices
+from dpgcli.design.scene import Gripper, Scene
+from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.quantities import Quantity
 from dpgcli.states.rows import RowRequest, solved_rows
-from dpgcli.states.rungs import RUNGS, Rung, bar_flexibility, cheapest, error_bounds
+from dpgcli.states.rungs import Exactness
 from dpgcli.states.settle import lanes_at_once
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import Units
 from dpgcli.sweeps.metrics import Metrics
 
 ROWS_AT_ONCE = 2**15  # of one design
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Designs (by place) that take one rung, and the bound on their tips' error, mm."""
-
-    rung: Rung
-    places: Indices
-    bounds: Array
-
-
-def choices(scenes: Sequence[Scene], target_error: float) -> Iterator[Choice]:
-    """The cheapest rung of each design that is bounded by the target error (mm), by rung.
-
-    The scenes agree in the number of units and in having rigid bars.
-    """
-    bounds = error_bounds(Units.of(_stacked([scene.finger for scene in scenes])))
-    chosen = cheapest(bounds, target_error)
-    for index in np.unique(chosen):
-        places = np.flatnonzero(chosen == index)
-        yield Choice(RUNGS[index], places, bounds[index, places])
 
 
 class Block(NamedTuple):
@@ -56,37 +32,35 @@ class Block(NamedTuple):
 
 
 def design_states(
-    scenes: Sequence[Scene],
-    formulate: Formulate,
-    tolerance: float,
+    scene: Scene,
+    exactness: Exactness,
     quantities: tuple[Quantity, ...],
-    *,
-    drops_bars: bool = False,
 ) -> Iterator[Block]:
-    """All states of some designs, design by design, in blocks.
+    """All states of a batch of designs, design by design, in blocks.
 
     A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
-    depends on its number of units alone. The scenes agree in that, in having rigid bars and in
-    being grippers. If it drops the bars, the error of the tips includes what that costs.
+    depends on its number of units alone.
     """
-    units = Units.of(_stacked([scene.finger for scene in scenes]))
-    dropped = np.zeros(len(scenes))
-    if drops_bars:
-        dropped = bar_flexibility(units)
-        units = Units.of(units.finger.with_bars(np.inf))
+    units, dropped = exactness.units, exactness.dropped_error
+    n_designs = units.finger.n_designs
 
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
-        around = Surroundings(*_placement(scenes, lanes))
+        around = Surroundings(*_placement(scene, n_designs, lanes))
         request = RowRequest(
-            formulate, tolerance, quantities, around, dropped[lanes], has_bars=not drops_bars
+            chain_potential,
+            exactness.tolerance,
+            quantities,
+            around,
+            dropped[lanes],
+            has_bars=not exactness.drops_bars,
         )
         return solved_rows(_designs(units, lanes), inverted, request)
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
-    for designs in _design_batches(len(scenes), n_units):
+    for designs in _design_batches(n_designs, n_units):
         metrics = Metrics(_designs(units, designs), len(designs))
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
@@ -107,30 +81,22 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _stacked(fingers: Sequence[Finger]) -> Finger:
-    """Fingers as the designs of one batch."""
-    columns = {name: _side_by_side([getattr(f, name) for f in fingers]) for name in ARRAYS}
-    return fingers[0].changed(**columns)
-
-
-def _side_by_side(parts: list[Array]) -> Array:
-    rows = max(len(part) for part in parts)
-    repeated = (part if len(part) == rows else np.repeat(part, rows, axis=0) for part in parts)
-    return np.concatenate(list(repeated), axis=1)
-
-
 def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
     size = max(1, lanes_at_once(n_units) >> n_units)
     for first in range(0, n_designs, size):
         yield np.arange(first, min(first + size, n_designs))
 
 
-def _placement(scenes: Sequence[Scene], lanes: Indices) -> tuple[Gripper | None, float | Array]:
+def _placement(
+    scene: Scene, n_designs: int, lanes: Indices
+) -> tuple[Gripper | None, float | Array]:
     """The gripper and the layer's thickness of each lane's design."""
-    grippers = [scene.gripper for scene in scenes if scene.gripper is not None]
-    thickness = np.array([scene.layer_thickness or 0.0 for scene in scenes])[lanes]
-    if not grippers:
+
+    def of_lanes(values: float | Array) -> Array:
+        return np.broadcast_to(values, n_designs)[lanes]
+
+    thickness = 0.0 if scene.layer_thickness is None else of_lanes(scene.layer_thickness)
+    if scene.gripper is None:
         return None, thickness
-    spacing = np.array([gripper.base_spacing for gripper in grippers])[lanes]
-    angle = np.array([gripper.mounting_angle for gripper in grippers])[lanes]
-    return Gripper(spacing, angle), thickness
+    spacing, angle = scene.gripper.base_spacing, scene.gripper.mounting_angle
+    return Gripper(of_lanes(spacing), of_lanes(angle)), thickness

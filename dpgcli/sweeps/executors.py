@@ -29,7 +29,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from dpgcli.errors import WorkplaceError
+from dpgcli.errors import Field, WorkplaceError
+from dpgcli.signals import STOP_SIGNALS
 from dpgcli.temporary import temporary_folder
 
 T = TypeVar("T")
@@ -42,7 +43,6 @@ TRIALS = 3  # workers that must fail to do nothing before none is believed to st
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
 PERIOD = 1.0  # s, of looking after a workplace while nothing comes back
 LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 GO_ON = "What is done is kept, and the same command goes on from there."
 
 
@@ -245,15 +245,19 @@ def process_pool(n_workers: int) -> Executor:
     """A pool of fresh processes: BLAS on one thread, deaf to Ctrl-C, gone with their parent."""
     from multiprocessing import get_context
 
+    method = "forkserver" if _has_fork_server() else "spawn"
     start_fork_server()
-    return _Pool(n_workers, mp_context=get_context("forkserver"), initializer=_start_worker)
+    return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
 
 
 def start_fork_server(*modules: str) -> None:
     """Start the process that workers are forked from; it imports these modules once for all.
 
-    Called early, it does so while this process is still busy with imports of its own.
+    Called early, it does so while this process is still busy with imports of its own. On Windows
+    there is none, and every worker imports for itself.
     """
+    if not _has_fork_server():
+        return
     from multiprocessing import forkserver, resource_tracker
 
     _own_temporary_folder()
@@ -268,6 +272,12 @@ def start_fork_server(*modules: str) -> None:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _has_fork_server() -> bool:
+    from multiprocessing import get_all_start_methods
+
+    return "forkserver" in get_all_start_methods()
 
 
 @cache
@@ -303,8 +313,8 @@ class _Pool(ProcessPoolExecutor):
             except (ConnectionError, FileNotFoundError, EOFError) as error:
                 raise BrokenExecutor("the fork server is gone") from error
             except OSError as error:
-                said = f"cannot start a process: {error.strerror}. Take fewer --jobs. {GO_ON}"
-                raise WorkplaceError(said) from error
+                why = f"cannot start a process: {error.strerror}. Take fewer "
+                raise WorkplaceError(why, Field("jobs"), f". {GO_ON}") from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of the base."""

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-LONGEST = 500
-LARGEST = 1e300
-DEEPEST = 50
-DIGITS = "number_"  # before a part of a dotted name that is a number
+MOST_CHARACTERS = 500
+LARGEST_NUMBER = 1e300  # just below the largest double
+MOST_LEVELS = 50  # of nesting, well below Python's own limit
+DIGITS_PREFIX = "number_"  # before a part of a dotted name that is a number
 
 Values = Mapping[str, Any]
 
@@ -88,8 +88,8 @@ def expression(text: str) -> Expression:
 
     Raises ExpressionError for anything but the language above.
     """
-    if len(text) > LONGEST:
-        raise ExpressionError(f"longer than {LONGEST} characters")
+    if len(text) > MOST_CHARACTERS:
+        raise ExpressionError(f"longer than {MOST_CHARACTERS} characters")
     try:
         body = ast.parse(_without_digits(text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -97,14 +97,14 @@ def expression(text: str) -> Expression:
     is_comparison = isinstance(body, ast.Compare | ast.BoolOp) or (
         isinstance(body, ast.UnaryOp) and isinstance(body.op, ast.Not)
     )
-    return Expression(text.strip(), frozenset(_names(body, DEEPEST)), is_comparison)
+    return Expression(text.strip(), frozenset(_names(body, MOST_LEVELS)), is_comparison)
 
 
 def _without_digits(text: str) -> str:
     """Parts of dotted names that are numbers, `overrides.4-5.`, spelled as Python names."""
 
     def spelled(match: re.Match[str]) -> str:
-        return f".{DIGITS}{match[1].replace('-', 'to')}."
+        return f".{DIGITS_PREFIX}{match[1].replace('-', 'to')}."
 
     return re.sub(r"(?<=[A-Za-z_])\.(\d+(?:-\d+)?)\.(?=[A-Za-z_])", spelled, text)
 
@@ -112,9 +112,9 @@ def _without_digits(text: str) -> str:
 def _names(node: ast.expr, depth: int) -> list[str]:
     """Names in an expression; refuses every node that is not in the language."""
     if depth == 0:
-        raise ExpressionError(f"nested more than {DEEPEST} levels deep")
-    if (number := _number(node)) is not None:
-        if not abs(number) < LARGEST:
+        raise ExpressionError(f"nested more than {MOST_LEVELS} levels deep")
+    if (number := _constant(node)) is not None:
+        if not abs(number) < LARGEST_NUMBER:
             raise ExpressionError("a number beyond double precision")
         return []
     if name := _dotted(node):
@@ -143,7 +143,7 @@ def _parts(node: ast.expr) -> list[ast.expr]:
     raise ExpressionError(f"not allowed here: {type(node).__name__}")
 
 
-def _number(node: ast.expr) -> int | float | None:
+def _constant(node: ast.expr) -> int | float | None:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return None if isinstance(node.value, bool) else node.value
     return None
@@ -160,7 +160,9 @@ def _dotted(node: ast.expr) -> str:
     if isinstance(node, ast.Attribute):
         parent = _dotted(node.value)
         part = (
-            node.attr.removeprefix(DIGITS).replace("to", "-") if DIGITS in node.attr else node.attr
+            node.attr.removeprefix(DIGITS_PREFIX).replace("to", "-")
+            if DIGITS_PREFIX in node.attr
+            else node.attr
         )
         return f"{parent}.{part}" if parent else ""
     return ""
@@ -172,8 +174,8 @@ def _as_number(value: Any) -> Any:
 
 
 def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
-    """The value of a node; where finite parts have none, `undefined` learns of it."""
-    if (number := _number(node)) is not None:
+    """The value of a node; `undefined` collects flags of finite parts without a finite value."""
+    if (number := _constant(node)) is not None:
         return float(number)
     if name := _dotted(node):
         return values[name]

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from dpgcli.arrays import Flags, Indices
-from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.text import printable
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A design that does not meet a requirement, and what was found in it."""
+    """A design that fails a requirement, with the values found in it."""
 
     design: int
     values: dict[str, float]
@@ -78,15 +78,16 @@ def requirement(text: str, columns: Collection[str]) -> Expression:
         for name in sorted(rule.names.difference(columns)):
             nearest = get_close_matches(name, sorted(columns), n=1, cutoff=0.0)
             raise UsageError(
-                f"--require {text!r}: no column {name} of numbers; the nearest is {nearest[0]}"
+                Field("require"),
+                f" {text!r}: no column {name} of numbers; the nearest is {nearest[0]}",
             )
         rule(dict.fromkeys(rule.names, 1.0))
     except ExpressionError as error:
-        raise UsageError(f"--require {text!r}: {error}") from error
+        raise UsageError(Field("require"), f" {text!r}: {error}") from error
     except (TypeError, ValueError, RecursionError) as error:
-        raise UsageError(f"--require {text!r}: cannot be evaluated") from error
+        raise UsageError(Field("require"), f" {text!r}: cannot be evaluated") from error
     if not rule.is_comparison:
-        raise UsageError(f"--require {text!r}: expected a comparison, found a number")
+        raise UsageError(Field("require"), f" {text!r}: expected a comparison, found a number")
     return rule
 
 
@@ -113,6 +114,12 @@ def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
     truth = np.broadcast_to(np.asarray(rule(values), float), len(designs))
     met &= np.isfinite(truth) & (truth != 0.0)
     return np.flatnonzero(~met & _in_question(designs))
+
+
+def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[Verdict, ...]:
+    """Hold every design against requirements in words; see `check_requirements`."""
+    columns = number_columns(designs)
+    return check_requirements(designs, [requirement(text, columns) for text in texts])
 
 
 def check_requirements(

@@ -1,13 +1,14 @@
 """What the states of designs come to for each design, gathered block by block."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Columns, Group, Kind
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import Units
 from dpgcli.states.wells import barriers
 
@@ -73,7 +74,7 @@ class Metrics:
     def __post_init__(self) -> None:
         self.n_stable = np.zeros(self.n_designs, np.int64)
         self.length = np.broadcast_to(self.units.finger.straight_length, self.n_designs)
-        self.corners: list[tuple[Indices, Array]] = []
+        self.hulls: list[tuple[Indices, Any]] = []
         self.tips = _Distinct()
 
     def add(self, rows: Columns) -> None:
@@ -116,17 +117,16 @@ class Metrics:
         owner = np.nonzero(stable)[0]
         tips = np.column_stack((x[stable], y[stable]))
         self.tips.add(owner, tips * (TIPS_PER_LENGTH / self.length[owner])[:, None])
-        self.corners.append(hull_corners(owner, tips))
+        if len(owner):
+            self.hulls.append(hulls_of(owner, tips))
 
     def _area(self) -> Array:
         """Area of each design's hull; 0 where it is narrower than rounding."""
         import shapely
 
-        owner = np.concatenate([part[0] for part in self.corners])
-        points = np.concatenate([part[1] for part in self.corners])
         area = np.zeros(self.n_designs)
-        if len(owner):
-            designs, hulls = _hulls(owner, points)
+        if self.hulls:
+            designs, hulls = self.hulls[0] if len(self.hulls) == 1 else _joined(self.hulls)
             found, around = shapely.area(hulls), shapely.length(hulls)
             rounding = 8.0 * np.finfo(float).eps * self.length[designs] * around
             area[designs] = np.where(found > rounding, found, 0.0)
@@ -156,31 +156,41 @@ class _Distinct:
         return np.bincount(self.known >> (2 * CELL_BITS), minlength=n_designs)
 
     def _join(self) -> None:
-        self.known = np.unique(np.concatenate((self.known, *self.waiting)))
+        parts = [part for part in (self.known, *self.waiting) if len(part)]
+        if parts:
+            self.known = parts[0] if len(parts) == 1 else np.unique(np.concatenate(parts))
         self.waiting.clear()
 
 
-def hull_corners(owner: Indices, points: Array) -> tuple[Indices, Array]:
-    """The points (point, 2) that span each owner's convex hull, and the owner of each.
+def hulls_of(owner: Indices, points: Array) -> tuple[Indices, Any]:
+    """The owners and the convex hull of each one's points (point, 2), at least one point in all.
+
+    Polygons, lines or points, whatever a hull comes to.
 
     >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
-    >>> owner, corners = hull_corners(np.zeros(5, int), square)
-    >>> sorted(set(map(tuple, corners.tolist())))
-    [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]
+    >>> owners, hulls = hulls_of(np.full(5, 7), square)
+    >>> owners.tolist(), hulls[0].area, len(hulls[0].exterior.coords) - 1
+    ([7], 1.0, 4)
     """
     import shapely
 
-    if not len(owner):
-        return owner, points
-    designs, hulls = _hulls(owner, points)
-    corners, index = shapely.get_coordinates(hulls, return_index=True)
-    return designs[index], corners
+    order = np.arange(len(owner))
+    if (owner[1:] < owner[:-1]).any():
+        order = np.argsort(owner, kind="stable")
+        owner = owner[order]
+    is_first = np.concatenate(([True], owner[1:] != owner[:-1]))
+    place = np.repeat(np.cumsum(is_first) - 1, 2)  # a line needs two points
+    lines = shapely.linestrings(points[np.repeat(order, 2)], indices=place)
+    return owner[is_first], shapely.convex_hull(lines)
 
 
-def _hulls(owner: Indices, points: Array) -> tuple[Indices, Array]:
-    """The owners and the hull of each one's points, whatever it comes to: polygon, line, point."""
+def _joined(parts: Sequence[tuple[Indices, Any]]) -> tuple[Indices, Any]:
+    """The hulls of what lies in hulls of the same owners."""
     import shapely
 
-    order = np.repeat(np.argsort(owner, kind="stable"), 2)  # a line needs two points
-    designs, place = np.unique(owner[order], return_inverse=True)
-    return designs, shapely.convex_hull(shapely.linestrings(points[order], indices=place))
+    owners, points = [], []
+    for designs, hulls in parts:
+        corners, index = shapely.get_coordinates(hulls, return_index=True)
+        owners.append(designs[index])
+        points.append(corners)
+    return hulls_of(np.concatenate(owners), np.concatenate(points))

@@ -10,10 +10,10 @@ from dpgcli.arrays import Array
 from dpgcli.benchmark import peers
 from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.benchmark.peers import Solve, tip_pose
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import lattice_potential
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.patterns import inverted_units

@@ -12,10 +12,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.arrays import keep_freed_memory
+from dpgcli.design.scene import Scene
 from dpgcli.files.table_writer import write_states
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units

@@ -9,8 +9,8 @@ import pytest
 
 from dpgcli.calibration.comparison import compare, distances
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.predict import predict
 
 Fingers = Callable[..., Finger]

@@ -6,13 +6,13 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.record import (
     Record,
-    alikeness,
     cleaned,
-    dirt,
     in_order,
     integral,
     inverted_well,
+    lag1_autocorrelation,
     quasi_static,
+    record_warnings,
     unsampled,
     work,
 )
@@ -46,45 +46,51 @@ CLEAN = Record(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL))
 
 
 def test_a_clean_curve_has_no_dirt() -> None:
-    assert list(dirt(CLEAN, is_cut=False)) == []
+    assert list(record_warnings(CLEAN, is_cut=False)) == []
     loading = Record(TRAVEL, energy=energy(TRAVEL), force=force(TRAVEL), time=TRAVEL)
-    assert list(dirt(loading, is_cut=False)) == []
+    assert list(record_warnings(loading, is_cut=False)) == []
 
 
 def test_ringing_is_said_unless_it_is_cut_away() -> None:
-    said = list(dirt(ringing(), is_cut=False))
+    said = list(record_warnings(ringing(), is_cut=False))
     assert said[0].startswith("ringing: the travel reverses 1")
-    assert not [text for text in dirt(ringing(), is_cut=True) if text.startswith("ringing")]
+    assert not [
+        text for text in record_warnings(ringing(), is_cut=True) if text.startswith("ringing")
+    ]
 
 
 def test_loading_and_unloading_is_not_ringing() -> None:
     there = np.concatenate((TRAVEL, TRAVEL[::-1], TRAVEL, TRAVEL[::-1]))
     cycles = Record(there, energy=energy(there), time=np.arange(float(len(there))))
-    assert list(dirt(cycles, is_cut=False)) == []
+    assert list(record_warnings(cycles, is_cut=False)) == []
     assert quasi_static(cycles).kept.all()
 
 
 def test_energies_that_drift_are_said_with_numbers() -> None:
     there = np.concatenate((TRAVEL, TRAVEL[::-1]))
     drifting = energy(there) + np.linspace(0.0, 40.0, len(there))
-    said = list(dirt(Record(there, energy=drifting, time=np.arange(282.0)), is_cut=False))
+    said = list(
+        record_warnings(Record(there, energy=drifting, time=np.arange(282.0)), is_cut=False)
+    )
     assert said[0].startswith("drifting energy: at ")
     assert "anything from" in said[0]
 
 
 def test_an_energy_that_is_not_the_work_is_said() -> None:
     said = list(
-        dirt(Record(TRAVEL, energy=1.1 * energy(TRAVEL), force=force(TRAVEL)), is_cut=False)
+        record_warnings(
+            Record(TRAVEL, energy=1.1 * energy(TRAVEL), force=force(TRAVEL)), is_cut=False
+        )
     )
     assert [text.partition(":")[0] for text in said] == ["the energy is not the work done"]
     by_volume = Record(
         TRAVEL, energy=1.1 * energy(TRAVEL), pressure=force(TRAVEL) / 50, volume=50 * TRAVEL
     )
-    assert list(dirt(by_volume, is_cut=False)) == said
+    assert list(record_warnings(by_volume, is_cut=False)) == said
 
 
 def test_an_energy_at_rest_is_said() -> None:
-    said = list(dirt(Record(TRAVEL, energy=energy(TRAVEL) + 20.0), is_cut=False))
+    said = list(record_warnings(Record(TRAVEL, energy=energy(TRAVEL) + 20.0), is_cut=False))
     assert said == ["the energy at rest is 20 mJ, not 0 as the law has it"]
 
 
@@ -206,6 +212,6 @@ def test_a_small_curve_is_kept_as_it_is() -> None:
 
 def test_neighbors_alike_and_not() -> None:
     noise = np.random.default_rng(0).normal(size=1000)
-    assert abs(alikeness(noise)) < 0.1
-    assert alikeness(np.sin(np.linspace(0.0, 6.0, 100))) > 0.95
-    assert alikeness(np.zeros(5)) == 0.0
+    assert abs(lag1_autocorrelation(noise)) < 0.1
+    assert lag1_autocorrelation(np.sin(np.linspace(0.0, 6.0, 100))) > 0.95
+    assert lag1_autocorrelation(np.zeros(5)) == 0.0

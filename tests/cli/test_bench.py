@@ -23,7 +23,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "TABLE_UNITS", 3)
     monkeypatch.setattr(module, "BATCH", 8)
     monkeypatch.setattr(module, "PEER_STATES", 1)
-    monkeypatch.setattr("dpgcli.benchmark.timing.SHORTEST", 0.0)
+    monkeypatch.setattr("dpgcli.benchmark.timing.SHORTEST_ROUND", 0.0)
 
 
 def test_tables_a_figure_in_text_and_the_cheapest_way(call: Any) -> None:

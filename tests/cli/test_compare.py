@@ -167,6 +167,7 @@ def test_both_errors_with_a_calibration(call: Any, published: tuple[str, ...], l
     plain = rows(call(*published, "--format", "json", "-q").stdout)
     other = ("-s", "finger.lattice.segment_height_mm=12.33")
     better = rows(call(*published, *other, "--format", "json", "-q").stdout)
+    assert found and found.keys() == better.keys()
     for pattern, row in found.items():
         for name in ("error_mm", "error_percent", "angle_error_rad"):
             assert row[name] == plain[pattern][name]
@@ -292,7 +293,9 @@ def test_calibrated_is_what_a_spec_with_that_calibration_predicts(
         plain = (*plain, "-s", "finger.overrides.2.lattice.bistable_stiffness_N_per_mm=null")
     expected = rows(call(*command, *plain).stdout)
     assert all(row["error_mm"] is not None for row in expected.values())
-    for pattern, row in rows(result.stdout).items():
+    found = rows(result.stdout)
+    assert found and found.keys() == expected.keys()
+    for pattern, row in found.items():
         assert row["calibrated_error_mm"] == expected[pattern]["error_mm"]
         assert row["calibrated_error_percent"] == expected[pattern]["error_percent"]
 

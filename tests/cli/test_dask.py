@@ -17,7 +17,7 @@ import pytest
 
 import dpgcli
 from dpgcli.cli.exits import ExitCode
-from dpgcli.studies.maker import HERE
+from dpgcli.sweeps.maker import HERE
 
 pytest.importorskip("distributed")
 

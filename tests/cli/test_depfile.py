@@ -63,7 +63,7 @@ def depend(folder: str, *files: str) -> None:
     """A depfile of tables in a folder, made from these files."""
     text = depfile_text(folder, ("states.parquet", "designs.parquet"), map(Path, files))
     Path(folder).mkdir(parents=True, exist_ok=True)
-    Depfile(Path("sweep.d"), text).write()
+    Depfile(Path("sweep.d"), text).beside(lambda work: bool(work() or True), lambda: None)
 
 
 def make() -> str:

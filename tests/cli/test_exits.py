@@ -122,7 +122,7 @@ def test_a_bug_is_3_and_keeps_its_traceback(call: Call, monkeypatch: pytest.Monk
     def broken(*_: object) -> None:
         raise ZeroDivisionError("oh")
 
-    monkeypatch.setattr("dpgcli.files.scene_file.read_scene", broken)
+    monkeypatch.setattr("dpgcli.api.inputs.read_scene", broken)
     result = call("predict", "three_unit.yaml")
     assert result.exit_code == ExitCode.INTERNAL
     assert "ZeroDivisionError: oh" in result.stderr

@@ -36,7 +36,7 @@ def fitted(call: Any, folder: Path) -> Any:
 
 
 def value(calibration: Calibration, key: str) -> float:
-    found = calibration.fitted(key)
+    found = calibration.values.given().get(key)
     assert found is not None
     return found.value
 
@@ -177,7 +177,7 @@ def test_a_seed_gives_the_same_bytes_twice(call: Any, folder: Path) -> None:
         assert call(*FIT, *options).exit_code == ExitCode.DONE
         texts.append((folder / "out.yaml").read_bytes())
     assert texts[0] == texts[1] != texts[2]
-    found = read_calibration(folder / "out.yaml").fitted(LEVER)
+    found = read_calibration(folder / "out.yaml").values.given().get(LEVER)
     assert found is not None and found.interval is not None
     assert found.interval[0] <= found.value <= found.interval[1]
     assert "bootstrap of 4 (seed 4)" in read_calibration(folder / "out.yaml").method

@@ -17,10 +17,10 @@ try:
     main()
 except SystemExit as end:
     assert not end.code, end.code
-report.write_text(" ".join({name.partition(".")[0] for name in sys.modules}))
+report.write_text(" ".join(sys.modules))
 """
 AT_START = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "pydantic", "numba"}
-PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba"}
+PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba", "rich", "shapely", "filelock"}
 
 
 Loaded = Callable[..., set[str]]
@@ -28,7 +28,7 @@ Loaded = Callable[..., set[str]]
 
 @pytest.fixture
 def loaded(tmp_path: Path) -> Loaded:
-    """Names of the top-level modules that a run has loaded."""
+    """Names of the modules that a run has loaded."""
 
     def modules(*arguments: str) -> set[str]:
         report = tmp_path / "modules.txt"
@@ -70,6 +70,30 @@ def test_predicting_loads_neither_tables_nor_figures(
     assert loaded(*arguments) & PREDICTING == set()
 
 
+def test_comparing_loads_no_scipy(loaded: Loaded, tmp_path: Path) -> None:
+    tips = tmp_path / "tips.csv"
+    tips.write_text("pattern,tip_x_mm,tip_y_mm\n000,51,0\n")
+    assert loaded("compare", str(CONFIGS / "three_unit.yaml"), str(tips)) & PREDICTING == set()
+
+
 def test_writing_a_table_loads_no_pandas(loaded: Loaded, tmp_path: Path) -> None:
     table = str(tmp_path / "states.parquet")
     assert "pandas" not in loaded("predict", str(CONFIGS / "three_unit.yaml"), "-o", table)
+
+
+def test_a_command_loads_no_other_than_those_it_shares_with(loaded: Loaded) -> None:
+    found = loaded("predict", str(CONFIGS / "three_unit.yaml"))
+    others = {
+        "bench",
+        "check",
+        "compare",
+        "fe",
+        "fit",
+        "init",
+        "merge",
+        "report",
+        "stress",
+        "sweep",
+    }
+    assert "dpgcli.cli.predict" in found
+    assert not {f"dpgcli.cli.{name}" for name in others} & found

@@ -70,6 +70,36 @@ def test_mixed_sweeps_name_the_key(call: Any, folder: Path, shard: Any) -> None:
     assert not tables(folder / "all")
 
 
+def test_a_part_of_another_sweep_is_not_taken(call: Any, folder: Path, shard: Any) -> None:
+    """Neither merged nor gone on from, though its range and its own bytes are right."""
+    shards = shard(1, 2, 3)
+    (other,) = shard(2, prefix="other", options=("-s", "finger.linear_stiffness_N_per_mm=2e4"))
+    own_part, *_ = sorted((folder / shards[1]).rglob("*.part"))
+    foreign, *_ = sorted((folder / other).rglob("*.part"))
+    own_bytes = own_part.read_bytes()
+    own_part.unlink()
+    exchanged = own_part.parent / foreign.name
+    exchanged.write_bytes(foreign.read_bytes())
+    result = call("merge", *shards, "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "is damaged, or of another sweep: run its sweep again" in result.stderr
+    assert not tables(folder / "all")
+    assert shard(2) == [shards[1]]
+    assert own_part.read_bytes() == own_bytes
+    assert call("merge", *shards, "-o", "all").exit_code == ExitCode.DONE
+
+
+def test_a_description_of_another_sweep_is_not_taken(call: Any, folder: Path, shard: Any) -> None:
+    shards = shard(1, 2, 3)
+    (other,) = shard(2, prefix="other", options=("-s", "finger.linear_stiffness_N_per_mm=2e4"))
+    (own,) = (folder / shards[1]).rglob("sweep.json")
+    (foreign,) = (folder / other).rglob("sweep.json")
+    own.write_bytes(foreign.read_bytes())
+    result = call("merge", shards[1], "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "sweep.json is damaged" in result.stderr
+
+
 @pytest.mark.parametrize("what", ["nothing", "a file", "a finished sweep"])
 def test_what_is_no_shard(call: Any, folder: Path, shard: Any, what: str) -> None:
     shards = shard(1, 2, 3)
@@ -142,7 +172,7 @@ def test_shards_stay_until_all_is_written(
 ) -> None:
     shards = shard(1, 2, 3)
     with monkeypatch.context() as patch:
-        patch.setattr("dpgcli.report.page.markdown", _stop)
+        patch.setattr("dpgcli.api.report.page", _stop)
         assert call("merge", *shards, "-o", "s1").exit_code != ExitCode.DONE
     assert call("merge", *shards, "-o", "s1").exit_code == ExitCode.DONE
     assert not (folder / "s1" / ".parts").exists()

@@ -225,6 +225,7 @@ def test_unknown_columns_are_named_with_what_there_is(call: Call) -> None:
 def test_both_formulations_agree(call: Call) -> None:
     chain = rows_of(call, "three_unit.yaml")
     lattice = rows_of(call, "three_unit.yaml", "--formulation", "lattice")
+    assert len(chain) == 8
     for one, other in zip(chain, lattice, strict=True):
         assert other["tip_x_mm"] == pytest.approx(one["tip_x_mm"], abs=1e-6)
         assert other["tip_y_mm"] == pytest.approx(one["tip_y_mm"], abs=1e-6)
@@ -448,6 +449,7 @@ def test_uncertainty_is_that_of_two_values_a_little_off(call: Call) -> None:
 def test_a_state_that_does_not_exist_has_no_uncertainty(call: Call) -> None:
     wells = ("-s", "finger.overrides.2.lattice.force_linearity=0.3")
     rows = rows_of(call, "three_unit.yaml", *BY_FILE, *wells, "--uncertainty")
+    assert len(rows) == 8
     for row in rows:
         assert (row["status"] == "stable") == (row["pattern"][1] == "0")
         assert (row["tip_x_uncertainty_mm"] is not None) == (row["status"] == "stable")

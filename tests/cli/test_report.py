@@ -98,7 +98,7 @@ def test_the_report_of_former_tables_is_made_anew(
     """As after a kill between the tables and the report; once, since Make looks at its age."""
     change(folder)
     with monkeypatch.context() as patch:
-        patch.setattr("dpgcli.cli.sweep.summarize", stop)
+        patch.setattr("dpgcli.api.report.summarize", stop)
         assert call(*AGAIN).exit_code != 0
     assert "2.5 … 6.5 mm" in (swept / "report.md").read_text(encoding="utf-8")
     assert call(*AGAIN).stderr == "out: up to date\n"

@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.stress import verdicts
-from dpgcli.stress.cases import Case
-from dpgcli.stress.table import STRESS_COLUMNS
-from dpgcli.stress.verdicts import Answer, Outcome, Verdict
+from dpgcli.hard_cases import verdicts
+from dpgcli.hard_cases.cases import Case
+from dpgcli.hard_cases.table import STRESS_COLUMNS
+from dpgcli.hard_cases.verdicts import Answer, Outcome, Verdict
 
 Call = Callable[..., Any]
 QUICK = ("--only", "mirror")

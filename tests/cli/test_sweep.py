@@ -23,10 +23,10 @@ from dpgcli.files.output import sole_use
 from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import read_sweep
 from dpgcli.files.table_writer import read_metadata
-from dpgcli.studies.maker import HERE
 from dpgcli.studies.sweep import Study
 from dpgcli.studies.work import Work
 from dpgcli.sweeps.executors import Chunk
+from dpgcli.sweeps.maker import HERE
 
 HEIGHT = "finger.geometry.dome_height_mm"
 SEPARATION = "finger.geometry.unit_separation_mm"

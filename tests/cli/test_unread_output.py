@@ -29,14 +29,15 @@ KILLS = (
     "    return old(self, broken) if a and a[0].start <= 1 < a[0].stop else old(self, f, *a)\n"
     "S.submit = submit"
 )
-FAILS = (
-    "from dpgcli.stress.verdicts import Outcome\nOutcome.is_failure = property(lambda self: True)"
-)
+FAILS = """
+from dpgcli.hard_cases.verdicts import Outcome
+Outcome.is_failure = property(lambda self: True)
+"""
 BREAKS = (
     ""
     "def broken(*_): raise BrokenPipeError('of a socket')\n"
-    "import dpgcli.files.scene_file as specs\n"
-    "specs.read_spec = broken"
+    "import dpgcli.api.inputs as specs\n"
+    "specs.read_scene = broken"
 )
 FEW = (
     "from dpgcli.states.predict import Prediction\n"

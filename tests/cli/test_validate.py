@@ -70,7 +70,9 @@ def test_github_escapes_what_it_reads_as_its_own(
     call: Call, folder: Path, name: str, escaped: str
 ) -> None:
     (folder / name).write_text("finger: {50%: 1}\n", encoding="utf-8")
-    for line in call("validate", name, "--format", "github").stdout.splitlines():
+    lines = call("validate", name, "--format", "github").stdout.splitlines()
+    assert lines
+    for line in lines:
         assert line.startswith(f"::error file={escaped},line=1,col=")
         assert re.sub("%25|%0A|%0D", "", line.partition("col=")[2]).count("%") == 0
 
@@ -79,7 +81,9 @@ def test_a_message_is_one_line_whatever_the_file_says(call: Call, folder: Path) 
     text = 'finger:\n  "a\\n::error ::b": "\\r\\n::warning ::c"\n'
     (folder / "bad.yaml").write_text(text, encoding="utf-8")
     for form in ("text", "github"):
-        for line in call("validate", "bad.yaml", "--format", form).stdout.splitlines():
+        lines = call("validate", "bad.yaml", "--format", form).stdout.splitlines()
+        assert lines
+        for line in lines:
             assert not line.startswith(("::error ::b", "::warning"))
 
 

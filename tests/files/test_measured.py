@@ -207,7 +207,7 @@ def test_another_unit_is_suspected(
 
 def test_a_small_dome_is_no_mistake_where_the_geometry_says_so(path: Path) -> None:
     path.write_text("travel_mm,force_N\n0,0\n0.06,1\n", encoding="utf-8")
-    assert read_curve(path, {"dome_height_mm": 0.03}).curve.reach == 0.06
+    assert read_curve(path, {"dome_height_mm": 0.03}).curve.largest_travel == 0.06
 
 
 MOMENTS = 'variant,moment_N_mm,rotation_rad,note\n"a, b",2.5,0.1,1\n"a, b",5,0.2,2\nc,5,0.3,3\n'
@@ -225,9 +225,9 @@ def test_moments_of_one_variant(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "where", "said"),
     [
-        (MOMENTS, "variant=d", "--where: expected a text of variant, found 'd' (a, b; c)"),
+        (MOMENTS, "variant=d", "where: expected a text of variant, found 'd' (a, b; c)"),
         (MOMENTS, "varian=c", "header: expected a column varian, found variant, moment_N_mm"),
-        (MOMENTS, "variant", "--where: expected COLUMN=TEXT, found 'variant'"),
+        (MOMENTS, "variant", "where: expected COLUMN=TEXT, found 'variant'"),
         ("moment_N_m,rotation_rad\n1,1\n", None, "expected a column moment_N_mm"),
         ("moment_N_mm,angle\n1,1\n", None, "expected a column rotation_rad or rotation_mid"),
         ("moment_N_mm,rotation_rad\n5,10.3\n", None, "found 10.3 (degrees?)"),

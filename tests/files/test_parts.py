@@ -1,10 +1,15 @@
 """Parts of a sweep: whole or not there, whatever happens to who writes them."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
-from dpgcli.files.parts import PartStore
+from dpgcli.files.parts import PartStore, write_part
+from dpgcli.files.table_writer import record_batch, schema
+from dpgcli.states.columns import Column, Group, Kind
 
 
 def test_what_a_killed_worker_left_of_a_part_goes_when_the_part_is_made(tmp_path: Path) -> None:
@@ -30,3 +35,28 @@ def test_a_part_that_is_there_is_made_again(tmp_path: Path) -> None:
             file.write(b"whole")
     (part,) = tmp_path.iterdir()
     assert part.read_bytes() == b"whole"
+
+
+def test_a_part_is_a_parquet_file_whose_blocks_come_back_one_by_one(tmp_path: Path) -> None:
+    """As few at a time in memory as when they were made, with units and descriptions."""
+    states = (
+        Column("x_mm", "mm", "place", Group.STATES, Kind.NUMBER),
+        Column("pattern", "", "digits", Group.STATES, Kind.PATTERN),
+    )
+    designs = (Column("design", "", "number", Group.STATES, Kind.COUNT),)
+    blocks: list[Any] = [
+        ({"x_mm": np.arange(n) / 3, "pattern": np.full(n, b"01")}, {"design": np.arange(k)})
+        for n, k in ((3, 1), (2, 0), (0, 2))
+    ]
+    with PartStore(tmp_path).part(0, 3) as file:
+        assert write_part(file, states, designs, blocks) == 5
+    (part,) = PartStore(tmp_path).parts()
+    assert pq.read_table(part.path).num_rows == len(blocks)
+    assert part.schema(0).equals(schema(states), check_metadata=True)
+    for which, columns in enumerate((states, designs)):
+        found = list(part.batches(which))
+        assert [batch.num_rows for batch in found] == [
+            len(b[which][columns[0].name]) for b in blocks
+        ]
+        for batch, block in zip(found, blocks, strict=True):
+            assert batch.equals(record_batch(columns, block[which]), check_metadata=True)

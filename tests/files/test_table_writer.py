@@ -35,6 +35,7 @@ def metadata(table: pq.ParquetFile) -> dict[str, str]:
 @pytest.mark.parametrize("name", ["three_unit", "gripper", "graded_five_unit"])
 def test_every_column_has_a_unit_and_a_description(tmp_path: Path, name: str) -> None:
     table = written(tmp_path / "states.parquet", name, columns=("all",))
+    assert {"pattern", "tip_x_mm"} <= set(table.schema_arrow.names)
     for field in table.schema_arrow:
         assert set(field.metadata) == {b"unit", b"description"}
         assert field.metadata[b"description"]

@@ -76,3 +76,24 @@ def test_a_gap_before_the_first_piece_is_bridged_towards_rest() -> None:
     more, value = bridged(travel, travel**2, [(0.0, 6.0)])
     assert more.tolist() == pytest.approx([0.0, 4.0, 14.0 / 3.0, 16.0 / 3.0, 6.0, 7.0, 8.0, 9.0])
     assert value == pytest.approx(more**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("before", [(-0.4, -0.2), (-0.4, -0.2, 0.0), (-0.3, -1e-9, 1e-9)])
+@pytest.mark.parametrize("offset", [0.0, 100.0, -3.0])
+def test_a_curve_from_before_rest_is_counted_from_rest(
+    before: tuple[float, ...], offset: float
+) -> None:
+    """A polynomial of third degree near rest, which every spline through it follows there."""
+    travel = np.concatenate((before, TRAVEL[1:]))
+    found = spline(tuple(travel), tuple(2.0 * travel**2 - travel**3 + offset))
+    inside = np.linspace(0.0, 1.3, 27)
+    assert found(inside).value == pytest.approx(2.0 * inside**2 - inside**3, abs=1e-12)
+    at_rest = found(np.array(0.0))
+    assert (at_rest.value, at_rest.slope) == (0.0, 0.0)
+    assert at_rest.bend == pytest.approx(4.0, rel=1e-9)
+    assert found.knots[0] == 0.0
+
+
+def test_too_few_points_from_rest_on() -> None:
+    with pytest.raises(ValueError, match="4 or more increasing"):
+        spline((-2.0, -1.0, 0.0, 1.0, 2.0), (4.0, 1.0, 0.0, 1.0, 4.0))

@@ -135,6 +135,7 @@ def test_energies_survive_a_mirror(
     mirrored = Finger(n_units, **{k: v[::-1] for k, v in finger.arrays().items()})
     there = _energies(formulation(finger), Internal(chord, near, far, strut))
     back = _energies(formulation(mirrored), mirrored_shape)
+    assert list(there) == ["bistable", "hinge", "bar"]
     for kind, energy in there.items():
         assert back[kind] == pytest.approx(energy, rel=1e-11)
 

@@ -15,8 +15,8 @@ from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Settled, Status, certified, certify
 from dpgcli.states.guess import geometric_guess
-from dpgcli.states.halves import Half, Split
-from dpgcli.states.pairs import _Block, _fit, paired_states
+from dpgcli.states.pairs.compose import _Block, _fit, paired_states
+from dpgcli.states.pairs.halves import Half, Split
 from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.tip import tip
 from dpgcli.states.units import Units
@@ -202,14 +202,15 @@ def test_the_shared_strut_feels_both_halves_and_their_disagreement(
     inner, outer = split.inner(), split.outer()
     assert inner.joint is not None
     assert outer.joint is not None
-    assert outer.held is not None
+    assert outer.clamped is not None
     gap = 1e-3
-    inner = half_with(inner, extension=gap, pull=2.0)
-    outer = half_with(outer, extension=0.0, pull=1.0)
-    held = replace(outer.held, pull=np.full_like(outer.held.pull, 1e3 * pull), force=0.0 * gap)
-    held = replace(held, force=np.zeros_like(outer.held.force))
+    inner = half_with(inner, extension=gap, force=2.0)
+    outer = half_with(outer, extension=0.0, force=1.0)
+    nothing = np.zeros_like(outer.clamped.cell_stiffness)
+    per_mm = np.full_like(outer.clamped.strut_stiffness, 1e3 * pull)
+    clamped = replace(outer.clamped, strut_stiffness=per_mm, cell_stiffness=nothing)
     block = _Block(np.arange(4), 2, 1)
-    fit = _fit(split, inner, replace(outer, held=held), block)
+    fit = _fit(split, inner, replace(outer, clamped=clamped), block)
     assert fit.residual == pytest.approx(abs(2.0 + 1.0 + pull), abs=1e-9)
 
 

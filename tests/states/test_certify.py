@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certified, certify
 from dpgcli.states.plan import Request
@@ -48,6 +48,7 @@ def test_numbers_of_a_row_without_a_state_are_nan(graded_finger: Fingers) -> Non
     fallen = rows["status"] == "not_bistable"
     assert fallen.sum() == 4
     kept = {"pattern", "status", "reached_pattern", "residual_N"}
+    assert rows.keys() > kept
     for name, values in rows.items():
         if name not in kept:
             assert (np.isnan(values.astype(float)) == fallen).all(), name

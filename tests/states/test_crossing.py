@@ -12,8 +12,8 @@ from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
-from dpgcli.states.halves import Split
-from dpgcli.states.pairs import paired_states
+from dpgcli.states.pairs.compose import paired_states
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import Units
 

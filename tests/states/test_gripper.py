@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Gripper, Scene
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 

@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.curve import Curve, spline
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
-from dpgcli.mechanics.scene import Scene
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.wells import barriers, inverted_wells
@@ -209,3 +210,122 @@ def test_an_energy_is_counted_from_rest(reference_finger: Fingers, offset: float
     assert rows(found)["energy_mJ"] == pytest.approx(rows(expected)["energy_mJ"], rel=1e-12)
     least = [barriers(finger, inverted_wells(finger))[0] for finger in (expected, found)]
     assert least[1] == pytest.approx(least[0], rel=1e-12)
+
+
+def rippled(bars: float, hinge_stiffness: float, *, pushes_only: bool = False) -> Finger:
+    """A dome of 20 N/mm whose curve has a shallow well at 1.8 mm and its own at 4.6 mm."""
+    travel = np.linspace(0.0, 6.0, 61)
+    heights = [0.0, 40.0, 20.0, 44.0, 10.0, 60.0]
+    through = CubicHermiteSpline([0.0, 1.0, 1.8, 2.8, 4.6, 6.0], heights, [0.0] * 5 + [60.0])
+    curve = spline(tuple(travel / 4.6), tuple(through(travel) / (20.0 * 4.6**2)))
+    law = PushOnly(Tabulated(curve)) if pushes_only else Tabulated(curve)
+    values = {**STUDY, "stroke": 4.6, "bistable_stiffness": 20.0}
+    values["hinge_stiffness"] = hinge_stiffness
+    return replace(uniform_finger(1, **values, linear_stiffness=bars), law=law)
+
+
+def rests_of(finger: Finger) -> tuple[np.ndarray, np.ndarray]:
+    """Openings and energies at every well and top between rigid bars, by a scan in closed form."""
+    curve = finger.law.curve
+    assert curve is not None
+    x = np.linspace(1e-6, 6.0, 60_001)
+    half_turn = np.arcsin(x / (2.0 * STUDY["segment_height"]))
+    hinge = 0.5 * float(finger.hinge_stiffness[0, 0]) * (2.0 * half_turn) ** 2
+    energy = 20.0 * 4.6**2 * curve(x / 4.6).value + hinge
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
+    return x[turns], energy[turns]
+
+
+@pytest.mark.parametrize("bars", [np.inf, 1e4])
+@pytest.mark.parametrize("hinge_stiffness", [24.2, 250.0, 330.0, 400.0, 600.0])
+@pytest.mark.parametrize("pushes_only", [False, True])
+def test_a_unit_is_inverted_in_the_well_of_its_curve_not_in_a_ripple_before_it(
+    bars: float, hinge_stiffness: float, pushes_only: bool
+) -> None:
+    """From 330 N mm/rad on the hinge makes the ripple the deeper well of the two."""
+    finger = rippled(bars, hinge_stiffness, pushes_only=pushes_only)
+    found = rows(finger, patterns=("1",), columns=("default", "opening_1_mm"))
+    (_, _, _, well), (_, _, top_energy, well_energy) = rests_of(finger)
+    assert found["status"].tolist() == ["stable"]
+    assert found["reached_pattern"].tolist() == ["1"]
+    assert found["opening_1_mm"][0] == pytest.approx(well, abs=2e-4 if bars == np.inf else 0.2)
+    if not pushes_only:
+        (least,) = barriers(finger, inverted_wells(finger))
+        assert least == pytest.approx(top_energy - well_energy, rel=1e-6)
+
+
+def test_a_unit_that_can_only_rest_in_a_ripple_is_not_bistable() -> None:
+    """It counts as not inverted: the curve's own barrier is still before it."""
+    finger = rippled(np.inf, 1500.0)
+    found = rows(finger, patterns=("1",))
+    assert len(rests_of(finger)[0]) == 2
+    assert found["status"].tolist() == ["not_bistable"]
+    assert found["reached_pattern"].tolist() == ["0"]
+    assert not inverted_wells(finger).exists.any()
+    assert barriers(finger, inverted_wells(finger)).tolist() == [0.0]
+
+
+def rippled_curve(random: np.random.Generator) -> Curve:
+    """The study's polynomial with waves in it, or with noise in its points."""
+    travel = np.linspace(0.0, random.uniform(1.1, 1.6), int(random.integers(12, 80)))
+    linearity = random.uniform(0.0, 0.1)
+    energy = 0.5 * travel**2 * (linearity + (1.0 - linearity) * (1.0 - travel) ** 2)
+    if random.random() < 0.5:
+        waves = np.sin(2.0 * np.pi * travel * random.integers(1, 9)) * np.minimum(1, travel / 0.2)
+        energy += random.choice([0.003, 0.01, 0.03]) * waves
+    else:
+        energy += 0.003 * random.standard_normal(len(travel)) * (travel > 0.1)
+    return spline(tuple(travel), tuple(energy))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pushes_only", [False, True])
+def test_units_with_rippled_curves_rest_where_a_scan_finds_them(pushes_only: bool) -> None:
+    """Wells beyond the curve's own barrier, by SciPy's roots of each piece and a scan of e'."""
+    random = np.random.default_rng(2)
+    n_states = n_none = 0
+    for _ in range(150):
+        curve = rippled_curve(random)
+        stroke, hinge = 10.0 ** random.uniform(-1.0, 1.2), 10.0 ** random.uniform(-1.0, 3.0)
+        if np.isnan(curve.rests).any():
+            continue
+        contact = random.uniform(0.0, 0.6) * curve.rests[1] * stroke if pushes_only else 0.0
+        law = PushOnly(Tabulated(curve)) if pushes_only else Tabulated(curve)
+        values = {**STUDY, "stroke": stroke - contact, "hinge_stiffness": hinge}
+        finger = replace(uniform_finger(1, **values), law=law)
+        if pushes_only:
+            finger = finger.changed(dome_travel=np.array([[stroke]]))
+        top, well = (rest * stroke - contact for rest in curve.rests)
+        x = np.linspace(max(top, 0.0) + 1e-9, min(21.4, curve.knots[-1] * stroke), 40_001)
+        force = 12.84 * stroke * curve((x + contact) / stroke).slope
+        if pushes_only:
+            force = np.where(x < well, np.minimum(force, 0.0), 0.0)
+        half_turn = np.arcsin(x / 21.5)
+        slope = force + 2.0 * hinge * half_turn / (10.75 * np.cos(half_turn))
+        places = x[:-1][(slope[:-1] < 0.0) & (slope[1:] >= 0.0)]
+        found = rows(finger, patterns=("1",), columns=("default", "openings"))
+        assert (found["status"][0] == "stable") == (len(places) > 0)
+        n_states, n_none = n_states + (len(places) > 0), n_none + (len(places) == 0)
+        assert found["reached_pattern"][0] == str(int(len(places) > 0))
+        if len(places):
+            assert np.abs(places - found["opening_1_mm"][0]).min() < 1e-3 * stroke
+    assert min(n_states, n_none) > 5
+
+
+def test_a_dome_that_only_pushes_does_not_pull_in_a_ripple_either() -> None:
+    """It stays in the lesser well, where its energy is, until the next top."""
+    curve = rippled(np.inf, 24.2).law.curve
+    assert curve is not None and curve.ripples == ()
+    travel = np.linspace(0.0, 1.4, 141)
+    energy = 0.5 * travel**2 * (0.02 + 0.98 * (1.0 - travel) ** 2) + 0.01 * np.sin(20.0 * travel)
+    curve = spline(tuple(travel), tuple(energy))
+    ((lower, upper),) = curve.ripples
+    law, dome = PushOnly(Tabulated(curve)), rippled(np.inf, 24.2).domes
+    inside = np.linspace(lower, upper, 9)[1:-1] * 4.6
+    assert (Tabulated(curve).response(inside, dome).force > 0.0).all()
+    apart = law.response(inside, dome)
+    assert (apart.force == 0.0).all() and (apart.stiffness == 0.0).all()
+    at_rest = float(dome.stiffness.item() * 4.6**2 * curve(np.array(lower)).value)
+    assert apart.energy == pytest.approx(np.full((1, 7), at_rest), rel=1e-12)
+    around = np.linspace(*curve.rests, 201)[1:-1] * 4.6
+    assert (law.response(around, dome).force <= 0.0).all()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
-from dpgcli.states.halves import Split
-from dpgcli.states.pairs import paired_states
+from dpgcli.states.pairs.compose import paired_states
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import Prediction, Summary, predict
 from dpgcli.states.settle import settle

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

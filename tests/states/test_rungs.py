@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain
@@ -148,7 +148,7 @@ def test_long_fingers_in_pairs_meet_it_too(reference_finger: Fingers) -> None:
     ],
 )
 def test_targets_that_make_no_sense(reference_finger: Fingers, request_: Request) -> None:
-    with pytest.raises(UsageError, match="--target-error"):
+    with pytest.raises(UsageError, match="target_error"):
         explain(Scene(reference_finger(2, 1e4), ()), request_)
 
 

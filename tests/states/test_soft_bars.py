@@ -1,6 +1,7 @@
 """States between soft bars, against an independent minimizer that holds the domes open first."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -154,3 +155,62 @@ def test_a_state_between_soft_bars_that_rigid_ones_would_not_have(
     assert status is Status.STABLE
     assert is_state(finger, inverted, nodes)
     assert nodes == pytest.approx(independent(finger, inverted), abs=1e-6)
+
+
+CHORDS_GIVE_WAY = uniform_finger(
+    2,
+    segment_length=7.8,
+    segment_height=13.3,
+    stroke=36.0,
+    bistable_stiffness=2.4,
+    force_linearity=0.0,
+    hinge_stiffness=0.029,
+    linear_stiffness=0.11,
+)
+PULLED_FROM_STRAIGHT = uniform_finger(
+    3,
+    segment_length=13.8,
+    segment_height=11.17,
+    stroke=42.8,
+    bistable_stiffness=0.14,
+    force_linearity=0.1,
+    hinge_stiffness=1.11,
+    linear_stiffness=0.00168,
+)
+
+
+@pytest.mark.parametrize(
+    ("finger", "pattern"),
+    [(CHORDS_GIVE_WAY, "01"), (CHORDS_GIVE_WAY, "10"), (PULLED_FROM_STRAIGHT, "001")],
+)
+def test_a_state_whose_bars_are_strained_far_beyond_the_first_order(
+    finger: Finger, pattern: str
+) -> None:
+    """Chords are stretched by half their length, though to first order corners hardly turn."""
+    inverted = np.array([[digit == "1"] for digit in pattern])
+    status, nodes = solved(finger, inverted)
+    assert status is Status.STABLE
+    assert is_state(finger, inverted, nodes)
+
+
+def test_a_search_that_stalls_between_stiff_bars_is_made_again(
+    extended_state: Callable[..., Any],
+) -> None:
+    """Units of 95 and 0.13 N/mm, and a hinge of 2e-6 N mm/rad: the search from the guess stalls."""
+    values = {
+        "segment_length": [13.521356261359175, 19.62060533905622],
+        "segment_height": [9.240178021868507],
+        "stroke": [19.31166805094475, 18.514752183267174],
+        "bistable_stiffness": [95.26264629209065, 0.1298985700619414],
+        "force_linearity": [0.0001, 0.0],
+        "hinge_stiffness": [3.6281941996104354, 2.277576595556012e-06],
+        "linear_stiffness": [85157.23504274359],
+    }
+    columns = {name: np.array(value)[:, None] for name, value in values.items()}
+    finger = Finger(2, **columns)
+    inverted = np.array([[False], [True]])
+    status, nodes = solved(finger, inverted)
+    assert status is Status.STABLE
+    truth = extended_state(finger, nodes)
+    assert truth.is_minimum
+    assert np.array(truth.nodes, float) == pytest.approx(nodes, abs=1e-6)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.contracts import Response, Term
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.scene import Scene
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper, Scene, Uncertainty
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Gripper, Scene, Uncertainty
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
@@ -97,5 +97,5 @@ def test_all_columns_of_the_lattice_are_without_it(reference_finger: Fingers) ->
 def test_what_it_needs(reference_finger: Fingers, formulation: str) -> None:
     known = uncertainty() if formulation == "lattice" else None
     scene = Scene(reference_finger(2, 1e4), (), uncertainty=known)
-    with pytest.raises(UsageError, match="--uncertainty"):
+    with pytest.raises(UsageError, match="uncertainty"):
         predict(scene, Request(columns=("uncertainty",), formulation=formulation))

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dpgcli.files.scene_file import read_spec, scene_of
+from dpgcli.files.scene_file import read_spec, reason_against, scene_of
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 
@@ -47,6 +47,7 @@ def test_metrics_follow_from_the_states(study: Any, tables: Any, base: str) -> N
     states, designs = tables(study(HEIGHTS, SEPARATIONS, base=base))
     metrics = designs.set_index("design")
     assert set(states["design"]) == set(metrics.index[metrics["status"] == "stable"])
+    assert len(states)
     for number, rows in states[states["status"] == "stable"].groupby("design"):
         row = metrics.loc[number]
         length = rows["tip_x_mm"][rows["pattern"].str.count("1") == 0].item()
@@ -165,9 +166,40 @@ def test_invalid_designs_are_rows_with_a_reason(study: Any, tables: Any, axis: s
     assert designs["reason"].str.contains("expected").tolist()[:4] == [True] * 4
 
 
+@pytest.mark.parametrize(
+    ("base", "axes"),
+    [
+        ("three_unit", [HEIGHTS, SEPARATIONS, "{key: finger.units, values: [3, 99]}"]),
+        ("three_unit", ["{key: finger.geometry.unit_cell_mm, values: [1.5, 2, 22]}", HEIGHTS]),
+        ("three_unit", ["{key: finger.lattice.stroke_mm, values: [3.5, 3.4]}", HEIGHTS]),
+        ("graded_five_unit", ["{key: finger.units, values: [3, 4, 5, 6]}", SEPARATIONS]),
+        ("graded_five_unit", ["{key: finger.lattice.bistable_stiffness_N_per_mm, values: [9]}"]),
+        ("gripper", ["{key: gripper.mounting_angle_deg, values: [91, 0]}", HEIGHTS]),
+    ],
+)
+def test_a_reason_is_what_the_spec_alone_would_say(
+    study: Any, tables: Any, base: str, axes: list[str]
+) -> None:
+    made = study(*axes, base=base)
+    _, designs = tables(made)
+    values = made.sweep.space.designs(0, len(designs))
+    invalid = designs[designs["status"] == "invalid"]
+    for place in invalid["design"]:
+        changes = {key: column[place].item() for key, column in values.items()}
+        assert designs["reason"][place] == reason_against(made.sweep.base_data, changes)
+    assert len(invalid) > 0
+
+
 def test_whole_units_beside_fractions_are_designs(study: Any, tables: Any) -> None:
     _, designs = tables(study("{key: finger.units, values: [3.5, 3.0, 2]}"))
     assert designs["status"].tolist() == ["invalid", "stable", "stable"]
+
+
+def test_equal_numbers_of_units_are_designs_each(study: Any, tables: Any) -> None:
+    states, designs = tables(study("{key: finger.units, values: [2, 3, 2]}"))
+    assert designs["n_states"].tolist() == [4, 8, 4]
+    assert (designs["calibration"] == "calibrated").all()
+    assert len(states) == 16
 
 
 @pytest.mark.parametrize("value", ["100000", "1000000000"])

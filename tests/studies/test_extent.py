@@ -12,9 +12,9 @@ import pytest
 from dpgcli.cli.options import LONG
 from dpgcli.errors import UsageError
 from dpgcli.studies import sweep as studies
-from dpgcli.studies.extent import MOST_CHUNKS, PROCESS_BYTES
 from dpgcli.sweeps import designs, metrics
 from dpgcli.sweeps.executors import serial
+from dpgcli.sweeps.extent import MOST_CHUNKS, PROCESS_BYTES
 
 UNITS = "{key: finger.units, values: [2, 3, 30]}"
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7]}"

@@ -29,8 +29,8 @@ def test_a_missing_worker_is_said_once_and_waited_for(monkeypatch: pytest.Monkey
     scene.wait(9)
     assert scene.said == []
     scene.wait(51)
-    assert scene.said == ["Dask: no worker answers; waiting 60 s for one (--wait)"]
-    with pytest.raises(NoWorkerError, match=r"Dask: no worker for 61 s \(--wait\). What is done"):
+    assert scene.said == ["Dask: no worker answers; waiting 60 s for one (wait)"]
+    with pytest.raises(NoWorkerError, match=r"Dask: no worker for 61 s \(wait\). What is done"):
         scene.wait(1)
 
 

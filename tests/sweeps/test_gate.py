@@ -78,7 +78,7 @@ def test_checking_leaves_the_table_as_it_was() -> None:
     ],
 )
 def test_what_is_no_requirement_is_refused(text: str, said: str) -> None:
-    with pytest.raises(UsageError, match=r"^--require ") as caught:
+    with pytest.raises(UsageError, match=r"^require ") as caught:
         requirement(text, COLUMNS)
     assert said in str(caught.value)
 

@@ -1,23 +1,29 @@
 """Metrics of designs: hulls, distinct tips and extremes, whatever the scale and the blocks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pytest
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Columns
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.scene import Scene
-from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Columns, Group
+from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
+from dpgcli.states.rungs import Exactness
 from dpgcli.states.units import Units
-from dpgcli.sweeps.designs import design_states
+from dpgcli.sweeps.designs import Block, design_states
 from dpgcli.sweeps.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics
 
 Fingers = Callable[..., Finger]
 QUANTITIES = tuple(q for q in declared(1, (), False) if q.group in {Group.STATES, Group.STIFFNESS})
+
+
+def all_states(finger: Finger) -> Iterator[Block]:
+    return design_states(Scene(finger, ()), Exactness(Units.of(finger), 1e-12), QUANTITIES)
+
+
 LENGTH = 27.0  # mm, of the reference finger of two units
 
 
@@ -56,10 +62,7 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
     """In micrometers as in meters: the area is never lost, and as many tips differ."""
     finger, force = graded_finger(5, 3), length**2
     scaled = in_other_units(finger, length, force)
-    (one,), (other,) = (
-        list(design_states([Scene(f, ())], chain_potential, 1e-12, QUANTITIES))
-        for f in (finger, scaled)
-    )
+    (one,), (other,) = (list(all_states(f)) for f in (finger, scaled))
     assert one.metrics is not None and other.metrics is not None
     powers = {"mm2": length**2, "mm": length, "N": force, "mJ": force * length}
     powers["N_per_mm"] = force / length
@@ -149,12 +152,14 @@ def test_no_grid_is_too_large_for_its_cells(metrics: Callable[..., Columns]) -> 
 
 
 def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
-    scenes = [Scene(graded_finger(3, seed), ()) for seed in range(7)]
-    (together,) = design_states(scenes, chain_potential, 1e-12, QUANTITIES)
+    fingers = [graded_finger(3, seed) for seed in range(7)]
+    parts = [finger.arrays() for finger in fingers]
+    arrays = {name: np.concatenate([p[name] for p in parts], axis=1) for name in parts[0]}
+    (together,) = all_states(Finger(3, **arrays))
     assert together.metrics is not None
     areas: list[Array] = []
-    for place, scene in enumerate(scenes):
-        (alone,) = design_states([scene], chain_potential, 1e-12, QUANTITIES)
+    for place, finger in enumerate(fingers):
+        (alone,) = all_states(finger)
         assert alone.metrics is not None
         for name, values in alone.metrics.items():
             assert together.metrics[name][place] == values[0], name

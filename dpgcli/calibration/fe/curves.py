@@ -25,7 +25,7 @@ class DomeCurve(NamedTuple):
 
 
 class HingeCurve(NamedTuple):
-    """Moments that open a gap, and by how much; the first row is the hinge at rest."""
+    """Moments on a gap and the rotations by which it opens; the first row is at rest."""
 
     moment_N_mm: Array
     rotation_rad: Array
@@ -63,7 +63,7 @@ def hinge_curve(
 
 
 def dome_finding(dome: Dome, curve: DomeCurve) -> str:
-    """When a dome snaps, if it does, and how it rests at the end."""
+    """A sentence on the dome's snap, if any, and its rest at the end."""
     inverted = curve.pole_travel_mm > dome.height  # the pole beyond the plane of the base
     if not inverted.any():
         return f"The dome does not snap up to {curve.pressure_MPa.max():.4g} MPa."

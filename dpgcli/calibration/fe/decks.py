@@ -10,7 +10,7 @@ from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.dome import Dome, DomeMesh
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
-from dpgcli.mechanics.geometry import WALL_THICKNESS
+from dpgcli.design.geometry import WALL_THICKNESS
 
 UNITS = "Units: mm, N, MPa, s; mass in t."
 DENSITY = 1.2e-9
@@ -83,7 +83,7 @@ def dome_deck(dome: Dome, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) 
 
 
 def dome_words(dome: Dome) -> tuple[str, ...]:
-    """What a dome's model is, for people."""
+    """A description of a dome's model in words."""
     return (
         f"Axisymmetric dome: a spherical cap of mid-surface height {dome.height:g} mm over a base "
         f"of diameter {dome.base_diameter:g} mm,",
@@ -95,7 +95,7 @@ def dome_words(dome: Dome) -> tuple[str, ...]:
 
 
 def pulse_words(loading: Pulse) -> tuple[str, ...]:
-    """What a dome's loading is, for people."""
+    """A description of a dome's loading in words."""
     ramp, hold, release = np.diff((0.0, *loading.corners))
     return (
         "Pressure on the whole convex side, dome and annulus; implicit dynamics, alpha = -0.3, "
@@ -137,7 +137,7 @@ def hinge_deck(
 
 
 def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
-    """What a hinge's model is, for people."""
+    """A description of a hinge's model in words."""
     return (
         "2 hollow chambers on a limiting layer, half of them (z = 0 is a plane of "
         f"symmetry): inner length {chambers.length:g} mm,",

@@ -49,7 +49,7 @@ def sphere_radius(dome: Dome) -> float:
 
 
 def edge_angles(dome: Dome) -> tuple[float, float]:
-    """Polar angles at which the inner and the outer face of the cap meet those of the annulus.
+    """Polar angles of the joint between the faces of cap and annulus, inner and outer.
 
     The faces are spheres of radius R -+ t/2, cut by the planes z = -+ t/2: the joint is a miter,
     so the wall has its thickness on both sides. Raises ValueError where they do not meet.

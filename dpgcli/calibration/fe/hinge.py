@@ -7,7 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.elements import END_FACE, gauss, quad_shapes
-from dpgcli.mechanics.geometry import WALL_THICKNESS
+from dpgcli.design.geometry import WALL_THICKNESS
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Chambers:
         return self.outer_length + self.separation
 
     def middle(self, number: int) -> float:
-        """Where along x the middle of a chamber lies, counted from 0, in mm."""
+        """The x of the middle of a chamber, counted from 0, in mm."""
         return number * self.pitch + self.outer_length / 2
 
 
@@ -77,13 +77,13 @@ def _is_solid(chambers: Chambers, x: Array, y: Array, z: Array) -> Flags:
 
 
 def on_plane(mesh: Bricks, axis: int, place: float) -> Flags:
-    """Which nodes lie on a plane across an axis, but for rounding."""
+    """Flags of the nodes on a plane across an axis, but for rounding."""
     span = np.ptp(mesh.nodes[:, axis])
     return np.abs(mesh.nodes[:, axis] - place) < 1e-9 * span
 
 
 def layer_end(chambers: Chambers, mesh: Bricks, place: float) -> Flags:
-    """Which nodes lie on a face across the limiting layer."""
+    """Flags of the nodes on a face across the limiting layer."""
     is_layer = mesh.nodes[:, 1] < (1 + 1e-9) * chambers.layer_thickness
     return on_plane(mesh, 0, place) & is_layer
 

@@ -1,4 +1,4 @@
-"""The two models: what their decks are, and how a run of theirs becomes a curve."""
+"""The two models: their decks, and the curves that their runs give."""
 
 import hashlib
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from dpgcli.calibration.fe.decks import (
 )
 from dpgcli.calibration.fe.dome import Dome, dome_mesh
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
-from dpgcli.mechanics.geometry import snap_pressure
+from dpgcli.design.geometry import snap_pressure
 
 DOME_CELLS = {"coarse": (20, 3, 1), "medium": (28, 4, 2), "fine": (56, 8, 4)}
 """Cells along the cap, along the annulus and through the wall."""
@@ -37,7 +37,7 @@ PEAK_OVER_SNAP = 1.25
 
 
 class Outcome(NamedTuple):
-    """The curve that a run found, and in one line what it says."""
+    """The curve of a run, and its finding in one line."""
 
     curve: Curve
     finding: str
@@ -45,9 +45,9 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """A deck, what it is in words, and what times and displacements of a run come to.
+    """A deck, its description in words, and the curve by times and displacements of a run.
 
-    A run is whole if it comes to the time `end`.
+    A run is complete if it gets to the time `end`.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Model:
     outcome: Callable[[Array, Array], Outcome]
 
     def comments(self, version: str, finding: str) -> tuple[str, ...]:
-        """What stands above a curve: solver, model, the hash of the deck, and the finding."""
+        """The comments above a curve: solver, model, hash of the deck, finding."""
         digest = hashlib.sha256(self.deck.encode()).hexdigest()
         return (
             f"dpg fe {self.name}: a simulation with finite elements, CalculiX {version}",

@@ -73,7 +73,7 @@ def _plain(words: list[str], time: str) -> Array:
 
 
 def _number(word: str, time: str) -> float:
-    """A number as Fortran writes it: 1.0-100 stands for 1.0E-100, stars for what does not fit."""
+    """Parse a number of Fortran: 1.0-100 means 1.0E-100, stars a number that does not fit."""
     try:
         return float(_SHORT.sub(r"e\1", word.replace("D", "E")))
     except ValueError:

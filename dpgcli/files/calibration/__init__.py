@@ -16,7 +16,8 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from dpgcli import __version__
-from dpgcli.errors import FitError, Problem, SpecError
+from dpgcli.design.dimensions import AGREEMENT
+from dpgcli.errors import Field, FitError, Problem, SpecError
 from dpgcli.files.calibration.models import (
     Calibration,
     Curve,
@@ -29,9 +30,8 @@ from dpgcli.files.calibration.models import (
 )
 from dpgcli.files.last_line import is_whole_text, sealed
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.places import KeyPath, Place, in_order, located, shown
+from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.sections import (
-    AGREEMENT,
     Geometry,
     Section,
     UnitGeometry,
@@ -39,6 +39,7 @@ from dpgcli.files.sections import (
     wrong_width,
 )
 from dpgcli.files.yaml_file import Document, parse_document, parse_value, read_text
+from dpgcli.text import KeyPath, dotted
 
 __all__ = [
     "VERSION",
@@ -51,6 +52,7 @@ __all__ = [
     "ScalingLaw",
     "Values",
     "calibration_in",
+    "calibration_of",
     "geometry_of",
     "made_by",
     "read_calibration",
@@ -80,6 +82,12 @@ def made_by() -> str:
     return f"dpg {__version__}, numpy {np.__version__}, scipy {scipy.__version__}"
 
 
+def calibration_of(sections: Mapping[str, Any]) -> Calibration:
+    """A calibration with these sections, made by this program."""
+    head = {"calibration_version": VERSION, "made_by": made_by()}
+    return Calibration.model_validate({**head, **sections})
+
+
 def write_calibration(path: Path, calibration: Calibration) -> None:
     """Write a calibration, sealed by its last line: the same one gives the same bytes.
 
@@ -94,7 +102,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     text = io.StringIO()
     yaml.dump(content, text)
     with whole_file(path, Mark.CALIBRATION) as new:
-        new.write_bytes(sealed(text.getvalue()).encode())
+        new.write_text(sealed(text.getvalue()), encoding="utf-8", newline="\n")
 
 
 def read_calibration(path: str | Path) -> Calibration:
@@ -102,6 +110,9 @@ def read_calibration(path: str | Path) -> Calibration:
 
     What `dpg fit` wrote has its SHA-256 in the last line: values that were cut off would else be
     taken from the next calibration, in silence.
+
+    >>> read_calibration("configs/calibration/push_3.5mm.yaml").has("stroke_mm")
+    True
     """
     file, text = read_text(path)
     if is_whole_text(text) is False:
@@ -132,7 +143,7 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
     Raises SpecError with every problem.
     """
     data: dict[str, Any] = {} if base is None else base.model_dump(exclude_none=True)
-    place = Place("--geometry")
+    place = Place(Field("geometry"))
     problems: list[Problem] = []
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))
@@ -149,8 +160,8 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
         located_errors = ({**e, "loc": ("geometry", *e["loc"])} for e in error.errors())
         problems += [_problem(document, e) for e in located_errors]
     else:
-        if wrong := wrong_width(found.model_dump(exclude_none=True)):
-            problems.append(located(place, f"geometry.{wrong[0]}", *wrong[1:]))
+        if wrong := wrong_width(found.given()):
+            problems.append(located(place, dotted(wrong.path[1:]), *wrong[1:]))
     if problems:
         raise SpecError(in_order(problems))
     return found

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Generic, Literal, TypeVar
 
 from pydantic import Field
 
+from dpgcli.design import calibrations
+from dpgcli.design.dimensions import LARGEST
 from dpgcli.files.sections import (
-    LARGEST,
     BarStiffness,
     Fraction,
     Geometry,
@@ -66,10 +67,6 @@ class Values(Section):
     segment_length_mm: FittedPositive | None = None
     linear_stiffness_N_per_mm: FittedBars | None = None
 
-    def given(self) -> dict[str, Fitted[float]]:
-        """The values that there are, by key."""
-        return {key: value for key, value in vars(self).items() if value is not None}
-
 
 Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -89,6 +86,13 @@ class Curve(Section):
     unsampled_mm: list[Stretch] = Field(
         default_factory=list, description="pairs of travels in mm between which nothing is known"
     )
+
+    @property
+    def known(self) -> calibrations.DomeCurve:
+        """What it gives to designs."""
+        return calibrations.DomeCurve(
+            self.travel_mm, self.energy_mJ, self.opening_per_travel, self.unsampled_mm
+        )
 
 
 class ScalingLaw(Section):
@@ -136,9 +140,12 @@ class Grid(Section):
         quantities = {k: np.array(v) for k, v in self.points.items() if k not in self.over}
         return Law(Method(self.method), Points(tuple(self.over), geometry, quantities))
 
-    def has(self, key: str) -> bool:
-        """Whether a quantity is among the points."""
-        return key in self.points and key not in self.over
+    @property
+    def known(self) -> calibrations.Grid:
+        """What it gives to designs."""
+        over = tuple(self.over)
+        quantities = frozenset(self.points) - {*over}
+        return calibrations.Grid(over, quantities, self.method == "scaling", self.law)
 
 
 class Quality(Section):
@@ -180,14 +187,18 @@ class Calibration(Section):
     warnings: list[str] = Field(default_factory=list, description="a list of texts")
     sources: list[DataFile] = Field(default_factory=list, description="a list of files")
 
-    def fitted(self, key: str) -> Fitted[float] | None:
-        """The value of a key of the lattice, if there is one."""
-        return None if self.values is None else self.values.given().get(key)
-
-    def has(self, key: str) -> bool:
-        """Whether the file gives a key of the lattice, at one geometry or over several."""
-        in_grid = self.grid is not None and self.grid.has(key)
-        return in_grid or self.fitted(key) is not None
+    @property
+    def known(self) -> calibrations.Calibration:
+        """What it gives to designs."""
+        values = {} if self.values is None else self.values.given()
+        return calibrations.Calibration(
+            self.file,
+            {k: calibrations.Fitted(v.value, v.standard_error) for k, v in values.items()},
+            {} if self.geometry is None else self.geometry.given(),
+            self.correlation,
+            None if self.curve is None else self.curve.known,
+            None if self.grid is None else self.grid.known,
+        )
 
     @property
     def uncertain(self) -> dict[str, float]:

@@ -1,14 +1,18 @@
 """From a fit to what a calibration file says about it."""
 
 import math
+from collections.abc import Iterator
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
-from dpgcli.calibration.bistable import BistableFit
-from dpgcli.calibration.choices import Method
+from dpgcli.calibration.bistable import BistableFit, Choice
+from dpgcli.calibration.choices import Method, Quantity
+from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import Law
+from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import FitError
 from dpgcli.files.calibration.models import (
     Curve,
@@ -18,7 +22,7 @@ from dpgcli.files.calibration.models import (
     ScalingLaw,
     Values,
 )
-from dpgcli.files.sections import LARGEST, SMALLEST
+from dpgcli.files.measured import GridTable
 
 
 def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) -> dict[str, object]:
@@ -29,6 +33,34 @@ def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) ->
         "quality": quality_of(fit, unit),
         "sources": [source],
     }
+
+
+def method_of(what: str, fit: Fit, resamples: int, seed: int) -> str:
+    """The method of a fit in one line."""
+    text = f"least squares on the {what}, {fit.loss} loss"
+    if fit.loss != "linear":
+        text += f" beyond {fit.loss_scale:.4g}"
+    return text + (f", bootstrap of {resamples} (seed {seed})" if resamples else "")
+
+
+def bistable_method(found: BistableFit, choice: Choice) -> str:
+    """The method of a fit of the bistable law, with what of the curve it was made to."""
+    text = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
+    if choice.quantity is Quantity.PRESSURE:
+        text += f", area {choice.area:g} mm2"
+    return text + (", quasi-static pieces" if choice.is_quasi_static else "")
+
+
+def finger_method(study: FingerFit, found: Fit, resamples: int, seed: int) -> str:
+    """The method of a fit to known states, with the frame that was assumed."""
+    frame = study.frame
+    station, tip = ("{:g},{:g}".format(*point) for point in (frame.first_station, frame.tip))
+    what = f"{study.target} through the equilibrium"
+    held = ", ".join(f"{p.key} {p.start:g}" for p in found.parameters if not p.is_free)
+    return (
+        f"{method_of(what, found, resamples, seed)}, first station {station} mm, "
+        f"tip offset {tip} mm, {study.finger.law.description}; held: {held}"
+    )
 
 
 def values_of(fit: Fit, *, only_free: bool) -> Values:
@@ -103,6 +135,24 @@ def grid_of(law: Law) -> Grid:
         scaling={k: _scaling_of(law, k) for k in points.quantities} if is_scaling else None,
         leave_one_out={k: v for k, v in left_out.items() if math.isfinite(v)} or None,
     )
+
+
+def grid_doubts(law: Law, table: GridTable) -> Iterator[str]:
+    """What a user should know about a table of points, in words."""
+    yield from table.doubts
+    if table.ignored:
+        yield f"columns not used, since they hold text: {', '.join(table.ignored)}"
+    taken = [key for key in Values.model_fields if key != "linear_stiffness_N_per_mm"]
+    unused = {key: get_close_matches(key, taken, n=1) for key in table.quantities}
+    names = [
+        key + (f" (did you mean {close[0]}?)" if close else "")
+        for key, close in unused.items()
+        if key not in taken
+    ]
+    if names:
+        yield f"nothing that specs take from a grid, fitted all the same: {', '.join(names)}"
+    if any(np.isnan(law.leave_one_out(key)[0]) for key in table.quantities):
+        yield "too few points to leave one out: nothing is known about the error between them"
 
 
 def _scaling_of(law: Law, key: str) -> ScalingLaw:

@@ -7,15 +7,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
+from dpgcli.errors import SpecError
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
 from dpgcli.files.scene_file.references import recalibrated, with_calibrations
 from dpgcli.files.scene_file.scenes import scene_of
 from dpgcli.files.scene_file.settings import changed, with_settings
 from dpgcli.files.yaml_file import Document, read_document
-from dpgcli.mechanics.scene import Scene
 
 __all__ = [
     "Spec",
@@ -26,11 +24,11 @@ __all__ = [
     "read_keys",
     "read_scene",
     "read_spec",
+    "reason_against",
     "recalibrated",
     "scene_of",
     "spelled",
     "starter",
-    "variant",
 ]
 
 
@@ -57,16 +55,13 @@ def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
     return with_calibrations(with_settings(read_document(path), settings), folder)
 
 
-def variant(data: Mapping[str, Any], changes: Mapping[str, float]) -> Scene:
-    """The scene of a spec's plain data with some keys ("a.b.c") changed.
-
-    Raises SpecError where the changed spec is wrong.
-    """
-    document = changed(Document("design", dict(data), {}), changes)
+def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
+    """What is wrong with a spec's plain data once some keys ("a.b.c") are changed, in one line."""
     try:
-        return scene_of(Spec.model_validate(document.data))
-    except ValidationError:
-        return scene_of(checked(document))
+        checked(changed(Document("design", dict(data), {}), changes))
+    except SpecError as error:
+        return "; ".join(problem.statement for problem in error.problems)
+    raise ValueError(f"nothing is wrong with {changes}")
 
 
 def json_schema() -> dict[str, Any]:

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from dpgcli.design.dimensions import sizes_of
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Place, located
 from dpgcli.files.scene_file.models import Spec
-from dpgcli.files.scene_file.rules import sizes_of
 from dpgcli.files.sections import expected_of
 
 
@@ -15,17 +15,17 @@ def dimensions(spec: Spec, file: str, keys: Sequence[str], purpose: str) -> dict
     The width of the chamber also follows from that of the unit cell. Raises SpecError that names
     every missing key.
     """
-    given = sizes_of(spec.finger.geometry)
+    given = sizes_of(spec.design.finger.geometry)
     missing = [key for key in keys if key not in given]
     if missing:
         raise SpecError(tuple(_problem(file, key, purpose) for key in missing))
-    return {key: given[key] for key in keys}
+    return {key: given[key].item() for key in keys}
 
 
 def overridden(spec: Spec, keys: Sequence[str]) -> tuple[str, ...]:
     """Units, as the spec writes them, for which an override changes one of the keys."""
     changed = {
-        units: set(override.geometry.model_dump(exclude_none=True))
+        units: set(override.geometry.given())
         for units, override in (spec.finger.overrides or {}).items()
         if override is not None and override.geometry is not None
     }

@@ -3,12 +3,18 @@
 A section or value that is null counts as absent.
 """
 
-import re
+from functools import cached_property
 from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, JsonValue
 from pydantic.json_schema import SkipJsonSchema
 
+from dpgcli.design import dimensions
+from dpgcli.design.calibrations import Calibration as Known
+from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
+from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Calibration
 from dpgcli.files.sections import (
     BarStiffness,
@@ -22,8 +28,6 @@ from dpgcli.files.sections import (
 
 BARS: list[JsonValue] = [{"required": ["linear_stiffness_N_per_mm"]}, {"required": ["calibration"]}]
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
-MAX_UNITS = 64
-UNIT_RANGE = re.compile(r"([0-9]{1,4})(?: *- *([0-9]{1,4}))?")
 
 
 class UnitOverride(Section):
@@ -62,6 +66,13 @@ class FingerSpec(Section):
         json_schema_extra={"propertyNames": {"pattern": f"^{UNIT_RANGE.pattern}$"}},
     )
 
+    @property
+    def calibrations(self) -> tuple[str | Known, ...]:
+        """What it calibrates by, in its order."""
+        said = self.calibration if isinstance(self.calibration, list) else [self.calibration]
+        parts = (part for part in said if part is not None)
+        return tuple(p.known if isinstance(p, Calibration) else p for p in parts)
+
 
 class GripperSpec(Section):
     """Two mirrored fingers."""
@@ -79,3 +90,34 @@ class Spec(Section):
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+
+    @cached_property
+    def resolution(self) -> Resolution:
+        """The lattice behind it, and what is wrong between its keys; found once."""
+        return resolve(self.design)
+
+    @property
+    def design(self) -> Design:
+        """What it says, as a batch of one design."""
+        finger = self.finger
+        bars = finger.linear_stiffness_N_per_mm
+        return Design(
+            finger.units,
+            _section(finger),
+            {units: _section(own) for units, own in (finger.overrides or {}).items()},
+            None if bars is None else np.array([bars], float),
+            finger.calibrations,
+            finger.law,
+            _sizes(self.gripper),
+        )
+
+
+def _section(part: UnitOverride | FingerSpec | None) -> dimensions.Section:
+    if part is None:
+        return dimensions.Section()
+    return dimensions.Section(_sizes(part.geometry), _sizes(part.lattice))
+
+
+def _sizes(section: Section | None) -> dict[str, NDArray[np.float64]]:
+    given = {} if section is None else section.given()
+    return {key: np.array([value], float) for key, value in given.items()}

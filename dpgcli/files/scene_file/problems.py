@@ -5,28 +5,27 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST, STIFFEST, unit_range
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.places import KeyPath, dotted, in_order, shown
+from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file.models import (
-    MAX_UNITS,
     FingerSpec,
     GripperSpec,
     Spec,
     UnitOverride,
 )
-from dpgcli.files.scene_file.scenes import chamber_issues, early_issues, issues, unit_range
+from dpgcli.files.scene_file.scenes import early_issues
 from dpgcli.files.sections import (
-    LARGEST,
-    SMALLEST,
-    STIFFEST,
     Geometry,
     Lattice,
     Section,
     UnitGeometry,
     UnitLattice,
     expected_of,
+    wrong_width,
 )
 from dpgcli.files.yaml_file import Document
+from dpgcli.text import KeyPath, dotted
 
 SECTIONS: dict[KeyPath, type[Section]] = {
     (): Spec,
@@ -73,7 +72,10 @@ def checked(document: Document) -> Spec:
     """
     spec, problems = _validated(document)
     problems = [*document.problems, *problems]
-    found = early_issues(document.data) if spec is None or problems else issues(spec)
+    if spec is None or problems:
+        found = early_issues(document.data)
+    else:
+        found = spec.resolution.problems.of(0)
     problems += [document.problem(*issue) for issue in found]
     if spec is None or problems:
         own_first = sorted(problems, key=lambda problem: problem.file != document.file)
@@ -87,8 +89,9 @@ def checked_keys(document: Document) -> Spec:
     Of the rules between keys, those of the geometry alone hold.
     """
     spec, problems = _validated(document)
-    if spec is not None:
-        problems = [document.problem(*issue) for issue in chamber_issues(spec.finger)]
+    if spec is not None and spec.finger.geometry is not None:
+        wrong = wrong_width(spec.finger.geometry.given())
+        problems = [] if wrong is None else [document.problem(*wrong)]
     if spec is None or problems or document.problems:
         raise SpecError(in_order([*document.problems, *problems]))
     return spec

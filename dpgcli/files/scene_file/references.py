@@ -4,13 +4,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dpgcli.design.calibrations import PUBLISHED
+from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
 from dpgcli.files.content import quoted_if
-from dpgcli.files.places import KeyPath, shown
-from dpgcli.files.scene_file.rules import LINEAR_STIFFNESS, PUBLISHED
+from dpgcli.files.places import shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
+from dpgcli.text import KeyPath
 
 EXPECTED = '"published" or the name of a calibration file'
 KEY = ("finger", "calibration")
@@ -41,23 +43,22 @@ def with_calibrations(document: Document, folder: Path) -> Document:
     return replace(embedded, problems=problems, files=tuple(reader.files))
 
 
-def recalibrated(document: Document, file: Path) -> Document:
+def recalibrated(document: Document, calibration: Calibration) -> Document:
     """The document with a calibration's values in the place of its own, wherever it has them.
 
     They come before its other calibrations, and its lattice sections lose what the file gives.
-    Raises SpecError with every problem of the file.
     """
-    calibration = read_calibration(file).model_copy(update={"file": file.name})
     finger = document.data["finger"]
     said = finger.get("calibration")
+    known = calibration.known
     before = said if isinstance(said, list) else [] if said is None else [said]
 
     def without(section: dict[str, Any]) -> dict[str, Any]:
         kept = (section.get("lattice") or {}).items()
-        return {**section, "lattice": {k: v for k, v in kept if not calibration.has(k)}}
+        return {**section, "lattice": {k: v for k, v in kept if not known.has(k)}}
 
     changes = {**without(finger), "calibration": [calibration, *before]}
-    if calibration.has(LINEAR_STIFFNESS):
+    if known.has(LINEAR_STIFFNESS):
         changes.pop(LINEAR_STIFFNESS, None)
     overrides = finger.get("overrides") or {}
     changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}

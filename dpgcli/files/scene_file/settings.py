@@ -1,21 +1,14 @@
-"""Changes to a spec from the command line: `--set key.path=value`."""
+"""Changes to a spec: "key.path=value" texts, as `--set` of the command line takes them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dpgcli.errors import Problem, SpecError
-from dpgcli.files.places import (
-    KeyPath,
-    Place,
-    dotted,
-    in_order,
-    located,
-    shortened,
-    shown,
-)
+from dpgcli.errors import Field, Problem, SpecError
+from dpgcli.files.places import Place, in_order, located, shown
 from dpgcli.files.yaml_file import MAX_DEPTH, Document, parse_value
+from dpgcli.text import KeyPath, dotted, shortened
 
-SETTING = Place("--set")
+SETTING = Place(Field("settings"))
 
 
 def with_settings(document: Document, settings: Sequence[str]) -> Document:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import quoted_if
-from dpgcli.files.places import KeyPath, in_order, located, shown
+from dpgcli.files.places import in_order, located, shown
 from dpgcli.files.scene_file import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.scene_file.problems import checked
 from dpgcli.files.scene_file.settings import SETTING
@@ -28,8 +28,9 @@ from dpgcli.files.sweep_file.space import SpaceReader
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
+from dpgcli.text import KeyPath
 
-__all__ = ["Sweep", "read_sweep"]
+__all__ = ["Sweep", "read_sweep", "sweep_in"]
 
 MOST_DIGITS = 30
 TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
@@ -63,19 +64,32 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
 
     Raises SpecError with all problems of both files at once, those of content after those of form.
     """
-    document = read_document(path)
+    found = sweep_in(read_document(path), path.parent, settings)
+    return replace(found, files=(path, *found.files))
+
+
+def sweep_in(
+    document: Document, folder: Path, settings: Sequence[str] = (), base: Document | None = None
+) -> Sweep:
+    """The sweep in a document; names of files are relative to a folder.
+
+    `base` is the base spec where no file holds it. Raises SpecError as `read_sweep` does.
+    """
     spec, problems = _validated(document)
-    named = document.data.get("base")
-    base_path = path.parent / str(named)
-    base_document, base = None, None
-    if isinstance(named, str):
-        base_document, base = _base(base_path, settings, problems)
-    if spec is None or base_document is None:
+    base_path = folder / str(document.data.get("base"))
+    base_files: tuple[Path, ...] = ()
+    base_spec = None
+    if base is not None:
+        base_spec = checked(base)
+    elif isinstance(document.data.get("base"), str):
+        base, base_spec = _base(base_path, settings, problems)
+        base_files = (base_path,)
+    if spec is None or base is None:
         raise SpecError(in_order([*document.problems, *problems]))
-    reader = SpaceReader(document, path.parent, "gripper" in base_document.data)
+    reader = SpaceReader(document, folder, "gripper" in base.data)
     axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
     rules = [
-        reader.constraint(place, text, base_document.data)
+        reader.constraint(place, text, base.data)
         for place, text in enumerate(spec.constraints or ())
     ]
     problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
@@ -83,15 +97,15 @@ def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     if space.size > MOST_DESIGNS:
         expected, found = f"at most {MOST_DESIGNS:,} designs", _many(space.size)
         problems.append(document.problem(("space",), expected, found, "take fewer values"))
-    if problems or base is None:
+    if problems or base_spec is None:
         raise SpecError(in_order(problems))
     return Sweep(
-        base,
-        base_document.data,
+        base_spec,
+        base.data,
         space,
         tuple(rule for rule in rules if rule is not None),
         base_path,
-        (path, base_path, *base_document.files, *reader.files),
+        (*base_files, *base.files, *reader.files),
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(reader.files.values()),
     )

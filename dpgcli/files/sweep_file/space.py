@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of
-from dpgcli.files.places import KeyPath, shown
+from dpgcli.files.places import shown
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.sweep_file.models import (
     MANY_KEYS,
@@ -27,11 +28,12 @@ from dpgcli.files.sweep_file.models import (
 from dpgcli.files.yaml_file import Document
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.space import Axis, Range, linear, listed, logarithmic, sampled
+from dpgcli.text import KeyPath
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNITS = "finger.units"
+
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs"
@@ -210,8 +212,7 @@ class SpaceReader:
             return None
         if not rule.is_comparison:
             self.wrong(path, "a comparison, such as dome_height_mm > 5", shown(text))
-        numbers = {k for k, v in flattened(data).items() if type(v) in (int, float)}
-        known = self.keys | numbers
+        known = self.keys | numbers_of(data).keys()
         last = Counter(name.rsplit(".", 1)[-1] for name in known)
         short = {name for name, count in last.items() if count == 1}
         if unknown := sorted(rule.names - known - short):
@@ -238,12 +239,12 @@ def _numbers(values: Sequence[int | float]) -> Any:
     return np.array(values, np.int64 if counts else np.float64)
 
 
-def flattened(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values of nested data by dotted key."""
-    flat: dict[str, Any] = {}
+def numbers_of(data: dict[str, Any], prefix: str = "") -> dict[str, float]:
+    """The numbers in nested data by dotted key."""
+    flat: dict[str, float] = {}
     for key, value in data.items():
         if isinstance(value, dict):
-            flat |= flattened(value, f"{prefix}{key}.")
-        else:
+            flat |= numbers_of(value, f"{prefix}{key}.")
+        elif type(value) in (int, float):
             flat[f"{prefix}{key}"] = value
     return flat

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dpgcli.design.scene import Origin
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, read_spec, scene_of
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
-from dpgcli.mechanics.scene import Origin
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 
@@ -265,6 +265,42 @@ def test_a_curve_that_begins_after_rest_begins_at_rest(scene):
     assert finger.law.rests(finger.domes).well.item() == pytest.approx(WELL - 9.5, abs=1e-3)
 
 
+@pytest.mark.parametrize("law", ["tabulated", "push_only"])
+@pytest.mark.parametrize("first", [-2.0, -1.95, 0.0])
+def test_energies_are_counted_from_rest_wherever_a_curve_begins(scene, law, first):
+    """100 mJ more everywhere are the same dome, and pattern 0 is straight."""
+    travel = np.concatenate((np.arange(first, 0.0, 0.125), TRAVEL[first < 0.0 :]))
+    energy = (polynomial(travel) + 100.0).tolist()
+    found = scene(law, dome=calibration(travel.tolist(), energy))
+    patterns, columns = ("000", "111"), ("status", "energy_mJ", "openings")
+    one, other = (predict(s, Request(patterns, columns)).arrays() for s in (found, scene(law)))
+    assert one["status"].tolist() == ["stable"] * 2
+    assert one["energy_mJ"][0] == 0.0
+    assert one["opening_1_mm"][0] == 0.0
+    for name in ("energy_mJ", "opening_1_mm"):
+        assert one[name] == pytest.approx(other[name], rel=1e-3)
+
+
+@pytest.mark.parametrize("law", ["tabulated", "push_only"])
+@pytest.mark.parametrize("offset", [-100.0, 30.0, 100.0])
+def test_an_energy_that_no_dome_has_so_near_rest_is_not_counted_from_there(problem, law, offset):
+    travel = TRAVEL[1:]
+    said = problem(law, dome=calibration(travel.tolist(), (polynomial(travel) + offset).tolist()))
+    assert said.startswith(
+        "x.yaml:5:3: finger.law: expected a curve that begins at rest, travel 0, or whose "
+        f"energies are counted from there, found {polynomial(0.125) + offset:g} mJ at 0.125 mm"
+    )
+    assert said.endswith("in dome.yaml (add the point at travel 0 to the curve)")
+
+
+@pytest.mark.parametrize("start", [1, 4, 16, 40])
+def test_records_that_begin_after_rest_and_are_counted_from_it_are_taken(scene, start):
+    """Up to travels where the dome is softening, and with energies known to some percent."""
+    noise = np.random.default_rng(start).normal(0.0, 0.3, len(TRAVEL) - start)
+    energy = polynomial(TRAVEL[start:]) + noise
+    scene("tabulated", dome=calibration(TRAVEL[start:].tolist(), energy.tolist()))
+
+
 def test_the_first_file_with_a_curve_gives_it(scene):
     Path("values.yaml").write_text(json.dumps(calibration(curve=None)), encoding="utf-8")
     found = scene("tabulated", "finger.calibration=[values.yaml, dome.yaml, published]").finger
@@ -308,6 +344,18 @@ HINT = "(dpg fit bistable writes one)"
             [],
             calibration([0.0, 1.0, 2.0]),
             f"expected a curve of 4 points or more, found 3 in dome.yaml {HINT}",
+        ),
+        (
+            "tabulated",
+            [],
+            calibration([-2.0, -1.0, 0.0, 1.0, 2.0]),
+            f"expected a curve of 4 points or more, found 3 from rest on in dome.yaml {HINT}",
+        ),
+        (
+            "push_only",
+            [],
+            calibration([-5.0, -4.0, -3.0, -2.0, -1.0]),
+            f"expected a curve of 4 points or more, found 1 from rest on in dome.yaml {HINT}",
         ),
         (
             "push_only",

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dpgcli.design import geometry
+from dpgcli.design.scene import Origin
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, json_schema, read_scene, read_spec, scene_of
-from dpgcli.mechanics import geometry
-from dpgcli.mechanics.scene import Origin
 
 FINGER = """\
 finger:
@@ -369,7 +369,7 @@ def test_a_grid_over_a_dimension_that_the_spec_lacks(write, problems):
         text=without,
     )
     assert found == [
-        f"--set: finger.lattice.{STIFFNESS}: expected a value, or geometry with "
+        f"settings: finger.lattice.{STIFFNESS}: expected a value, or geometry with "
         "dome_height_mm, found no dome_height_mm "
         "(g.yaml is over dome_height_mm, dome_thickness_mm)"
     ]

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dpgcli.errors import SpecError
-from dpgcli.files.places import Place, shortened, shown
+from dpgcli.errors import Field, SpecError
+from dpgcli.files.places import Place, shown
 from dpgcli.files.yaml_file import MAX_BYTES, parse_document, parse_value, read_document
+from dpgcli.text import shortened
 
 
 def problems_of(text):
@@ -172,13 +173,13 @@ def test_standard_input_and_byte_order_marks(monkeypatch):
 
 
 def test_single_values():
-    place = Place("--set")
+    place = Place(Field("settings"))
     assert parse_value("1e4", place) == 1e4
     assert parse_value("{a: [1]}", place) == {"a": [1]}
     assert parse_value("", place) is None
     with pytest.raises(SpecError) as caught:
         parse_value("{a: 1, a: 2}", place)
-    assert str(caught.value) == "--set: a: expected each key once, found it again"
+    assert str(caught.value) == "settings: a: expected each key once, found it again"
 
 
 def test_found_values_are_short_and_printable():

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dpgcli.design.resolve import resolve
+from dpgcli.design.scene import Gripper, Origin, Source
 from dpgcli.errors import SpecError
-from dpgcli.files.scene_file import canonical_json, json_schema, read_spec, scene_of, starter
+from dpgcli.files.scene_file import (
+    canonical_json,
+    json_schema,
+    models,
+    read_spec,
+    scene_of,
+    starter,
+)
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import SECTIONS, checked
 from dpgcli.files.yaml_file import Document
-from dpgcli.mechanics.scene import Gripper, Origin, Source
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 GRADED = CONFIGS / "graded_five_unit.yaml"
@@ -155,6 +164,23 @@ def test_every_example_is_a_scene(path):
     assert (scene.gripper is not None) == (path.stem == "gripper")
 
 
+def test_reading_a_spec_resolves_it_once(monkeypatch):
+    calls = []
+    monkeypatch.setattr(models, "resolve", lambda design: calls.append(1) or resolve(design))
+    spec = read_spec(CONFIGS / "graded_five_unit.yaml")
+    assert scene_of(spec).finger.n_units == scene_of(spec).finger.n_units == 5
+    assert calls == [1]
+
+
+def test_a_resolved_spec_can_be_sent_and_compared():
+    paths = (CONFIGS / "graded_five_unit.yaml", CONFIGS / "calibration" / "three_gap_finger.yaml")
+    for path in paths:
+        spec, again = read_spec(path), read_spec(path)
+        sent = pickle.loads(pickle.dumps(spec))
+        assert scene_of(sent).sources == scene_of(spec).sources
+        assert sent == spec == again
+
+
 def test_the_starter_means_the_three_unit_finger_and_names_every_key(read):
     assert read(starter()) == read_spec(CONFIGS / "three_unit.yaml")
     for section in SECTIONS.values():
@@ -205,7 +231,7 @@ def test_problems_of_form_and_of_content_come_together(problems):
         ("x.yaml", 17, 5, "finger.overrides.x"),
         ("x.yaml", 17, 5, "finger.overrides.x"),
         ("x.yaml", 18, 1, "grip"),
-        ("--set", None, None, "finger.calibration"),
+        ("settings", None, None, "finger.calibration"),
     ]
 
 
@@ -235,7 +261,7 @@ def test_problems_of_form_and_of_content_come_together(problems):
 )
 def test_values_out_of_range_are_refused(problems, key, value):
     (problem,) = problems(FINGER, f"{key}={value}")
-    assert (problem.file, problem.line) == ("--set", None)
+    assert (problem.file, problem.line) == ("settings", None)
     assert problem.key.startswith(key)
 
 
@@ -273,25 +299,25 @@ def test_settings_reach_overrides_written_as_numbers(read):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("units", '--set: setting: expected key.path=value, found "units"'),
-        ("=3", '--set: setting: expected key.path=value, found "=3"'),
-        ("finger..units=3", '--set: setting: expected key.path=value, found "finger..units=3"'),
+        ("units", 'settings: setting: expected key.path=value, found "units"'),
+        ("=3", 'settings: setting: expected key.path=value, found "=3"'),
+        ("finger..units=3", 'settings: setting: expected key.path=value, found "finger..units=3"'),
         (
             "finger.units.a=3",
-            "--set: finger.units.a: expected a key of a section, found 5 at finger.units",
+            "settings: finger.units.a: expected a key of a section, found 5 at finger.units",
         ),
         (
             "finger.unit=3",
-            "--set: finger.unit: expected a known key, found unit (did you mean units?)",
+            "settings: finger.unit: expected a known key, found unit (did you mean units?)",
         ),
         (
             "stroke_mm=3",
-            "--set: stroke_mm: expected a known key, found stroke_mm "
+            "settings: stroke_mm: expected a known key, found stroke_mm "
             "(did you mean finger.lattice.stroke_mm?)",
         ),
         (
             "zzz=3",
-            "--set: zzz: expected a known key, found zzz (known here: finger, gripper)",
+            "settings: zzz: expected a known key, found zzz (known here: finger, gripper)",
         ),
     ],
 )
@@ -301,7 +327,11 @@ def test_wrong_settings(problems, change, message):
 
 def test_a_setting_that_is_no_yaml_is_named(problems):
     (problem,) = problems(FINGER, "finger.units=[1")
-    assert (problem.file, problem.key, problem.expected) == ("--set", "finger.units", "valid YAML")
+    assert (problem.file, problem.key, problem.expected) == (
+        "settings",
+        "finger.units",
+        "valid YAML",
+    )
 
 
 def test_geometry_and_lattice_must_agree(problems):
@@ -456,7 +486,9 @@ def test_the_schema_describes_every_key():
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert schema["title"] == "dpg spec"
     assert schema["additionalProperties"] is False
+    assert schema["$defs"]
     for definition in schema["$defs"].values():
+        assert definition["properties"]
         for key, value in definition["properties"].items():
             assert value["description"], key
     json.dumps(schema, allow_nan=False)

@@ -1,0 +1,106 @@
+"""`bench`: error against run time, on the user's own finger."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from dpgcli.api.inputs import Settings, SpecInput, check_installed, scene_input
+from dpgcli.api.tables import Table
+from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
+from dpgcli.calibration.known import Frame
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.csv_file import Tabular
+from dpgcli.files.known_states import states_of
+from dpgcli.files.study_tables import write_bench, write_record
+from dpgcli.files.table_reader import read_record
+from dpgcli.files.table_writer import write_states
+from dpgcli.reports.precision import changes, cheapest_way, draw_precision
+from dpgcli.sweeps.differences import differences
+
+
+@dataclass(frozen=True)
+class BenchResult:
+    """What was measured, a row for each way and size; `recorded` are rows of an earlier record."""
+
+    name: str
+    spec_json: str
+    rows: tuple[Row, ...]
+    target_error: float | None = None
+    recorded: tuple[Row, ...] | None = None
+
+    @property
+    def table(self) -> Table:
+        """All rows, the columns of `benchmark.bench.COLUMNS`."""
+        return Table.of(COLUMNS, as_columns(self.rows))
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """The cheapest way for the target error, and what got slower since the record."""
+        cheapest = (
+            () if self.target_error is None else (cheapest_way(self.rows, self.target_error),)
+        )
+        return (*cheapest, *(() if self.recorded is None else changes(self.recorded, self.rows)))
+
+    def save(self, path: str | Path, command: Sequence[str] = ()) -> None:
+        """Write all rows to a Parquet file, with the `command` that asked for them."""
+        write_bench(Path(path), self.rows, self.spec_json, command)
+
+    def record(self, path: str | Path, command: Sequence[str] = ()) -> None:
+        """Write all rows and the machine to a JSON file, for `compare` in a later call."""
+        write_record(Path(path), self.rows, self.spec_json, command)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw error over time to a .svg or .png file."""
+        draw_precision(self.rows, self.name, Path(path))
+
+
+def bench(
+    spec: SpecInput,
+    *,
+    settings: Settings = (),
+    repeats: int = 5,
+    target_error: float | None = None,
+    keep: Sequence[str] = (),
+    against: Tabular | None = None,
+    first_station: tuple[float, float] = (0.0, 0.0),
+    tip_offset: tuple[float, float] = (0.0, 0.0),
+    compare: str | Path | None = None,
+    watch: Callable[[Row], None] = lambda row: None,
+) -> BenchResult:
+    """Measure error against run time, beside what else there is; needs mpmath.
+
+    `target_error` in mm; `keep` names what the plan leaves out and is put back; `against` are
+    known tips, for the model's own error; `compare` names a record of the same finger. `watch`
+    sees each row as it is measured. Takes from seconds to minutes.
+    Raises SpecError for a wrong spec or data, UsageError for wrong choices.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> bench(uniform_finger(2, **STUDY), keep=["hinges"])
+    Traceback (most recent call last):
+        ...
+    dpgcli.errors.UsageError: keep hinges: this scene leaves out bars, every-unit, every-column
+    """
+    check_installed("dpg bench", "mpmath")
+    given = scene_input(spec, settings)
+    known = None if against is None else states_of(given.scene.finger, against)
+    then = None if compare is None else _recorded(Path(compare), given.json)
+    frame = Frame(first_station, tip_offset)
+    write = partial(write_states, spec_json="{}")
+    study = Bench(given.scene, repeats, tuple(keep), target_error, known, frame, write)
+    study.check()
+    rows = []
+    for row in study.rows():
+        watch(row)
+        rows.append(row)
+    return BenchResult(given.name, given.json, tuple(rows), target_error, then)
+
+
+def _recorded(path: Path, spec_json: str) -> tuple[Row, ...]:
+    """The rows of a record of the same finger."""
+    facts = read_record(path)
+    changed = differences({"spec": str(facts.get("spec"))}, {"spec": spec_json})
+    if changed:
+        what = f" {path}: of another finger, differs in {', '.join(changed)}"
+        raise UsageError(Field("compare"), what)
+    return tuple(facts["rows"])

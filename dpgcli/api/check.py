@@ -1,0 +1,48 @@
+"""`check`: hold a table of designs against requirements."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from dpgcli.api.tables import Table
+from dpgcli.errors import UsageError
+from dpgcli.files.table_reader import designs_in, read_designs
+from dpgcli.sweeps.gate import Verdict, check_designs
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DesignsInput: TypeAlias = str | Path | Table | Any
+"""The designs.parquet of a sweep, or its content: of pandas, of Arrow, or a Table."""
+
+
+def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[Verdict, ...]:
+    """Hold every design of a table against requirements, one verdict each.
+
+    Raises UsageError for what is no table of designs or no requirement, NothingSelectedError
+    where every design is excluded.
+
+    >>> designs = {"design": [0, 1], "height_mm": [5.5, 6.5], "calibration": ["given"] * 2,
+    ...            "status": ["stable"] * 2, "reason": [""] * 2, "n_stable": [8, 8]}
+    >>> verdict, = check(designs, "height_mm > 6")
+    >>> verdict.is_met, [failure.design for failure in verdict.failures()]
+    (False, [0])
+    """
+    texts = (require,) if isinstance(require, str) else tuple(require)
+    return check_designs(designs_of(designs)[0], texts)
+
+
+def designs_of(designs: DesignsInput) -> "tuple[pd.DataFrame, dict[str, str]]":
+    """A table of designs as a data frame, and the unit of each column."""
+    import pandas as pd
+    import pyarrow as pa
+
+    if isinstance(designs, str | Path):
+        return read_designs(Path(designs))
+    rows: Any = designs.arrow if isinstance(designs, Table) else designs
+    if not isinstance(rows, pa.Table):
+        try:
+            rows = pa.Table.from_pandas(pd.DataFrame(rows), preserve_index=False)
+        except (ValueError, TypeError, pa.ArrowException) as error:
+            raise UsageError(f"expected a table of designs: {error}") from error
+    return designs_in(rows, "the table")

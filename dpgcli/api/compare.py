@@ -1,0 +1,109 @@
+"""`compare`: predictions beside finite elements or measurements."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.api.inputs import Settings, SpecInput, scene_input
+from dpgcli.api.tables import Table
+from dpgcli.arrays import Columns
+from dpgcli.benchmark.timing import measured
+from dpgcli.calibration import comparison
+from dpgcli.calibration.comparison import Comparison
+from dpgcli.calibration.known import Frame, KnownStates, lattice_states
+from dpgcli.files.calibration import Calibration
+from dpgcli.files.csv_file import Tabular, name_of
+from dpgcli.files.known_states import states_of
+from dpgcli.mechanics.finger import Finger
+from dpgcli.reports.comparison import comparison_summary, draw_comparison
+from dpgcli.states.columns import Column
+
+REPEATS = 5
+
+
+@dataclass(frozen=True)
+class CompareResult:
+    """Known states and the lattice's own, `calibrated` by another calibration if there is one."""
+
+    name: str
+    finger: Finger
+    known: KnownStates
+    found: Comparison
+    calibrated: Comparison | None
+
+    @cached_property
+    def rows(self) -> Columns:
+        """Arrays by column."""
+        return comparison.rows(self.known, self.found, self.calibrated)
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """What is predicted, known, and off."""
+        return comparison.columns(self.rows)
+
+    @property
+    def table(self) -> Table:
+        """A row for each known state."""
+        return Table.of(self.columns, self.rows)
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """Worst and mean errors of states that are in both, and the ratio of run times."""
+        law = self.finger.law.description
+        lines = [*comparison_summary(self.found, self.calibrated, law), *self._times()]
+        if self.known.unused:
+            lines.append(f"columns not used: {', '.join(self.known.unused)}")
+        return tuple(lines)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw shapes and known tips to a .svg or .png file."""
+        draw_comparison(self.known, self.found, self.calibrated, self.name, Path(path))
+
+    def _times(self) -> Iterator[str]:
+        """What a state took in the data and takes here, where the data say."""
+        if not np.isfinite(self.known.seconds).any():
+            return
+        patterns = self.known.patterns
+        taken = measured(lambda: lattice_states(self.finger, patterns, Frame()), REPEATS)
+        own = taken.wall / patterns.shape[1]
+        theirs = float(np.nanmean(self.known.seconds))
+        ratio = f"{theirs / own:,.0f} times as long"
+        yield f"{theirs:.3g} s a state in the data, {own:.2g} s here: {ratio}"
+
+
+def compare(
+    spec: SpecInput,
+    data: Tabular,
+    *,
+    settings: Settings = (),
+    calibration: str | Path | Calibration | None = None,
+    shapes: Tabular | None = None,
+    first_station: tuple[float, float] = (0.0, 0.0),
+    tip_offset: tuple[float, float] = (0.0, 0.0),
+) -> CompareResult:
+    """Hold predictions against finite elements or measurements.
+
+    `data` has `pattern` and what is known of it; `shapes` the layer's points: see
+    `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
+    what the data call the tip, from the last node along the phalanx and to its left (mm). With a
+    `calibration` its values are compared, too. Raises SpecError for a wrong spec or data.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> known = {"pattern": ["00"], "tip_x_mm": [27.0], "tip_y_mm": [1.0]}
+    >>> compare(uniform_finger(2, **STUDY), known).table["error_mm"].tolist()
+    [1.0]
+    """
+    given = scene_input(spec, settings)
+    finger, frame = given.scene.finger, Frame(first_station, tip_offset)
+    known = states_of(finger, data, shapes)
+    better = None if calibration is None else given.recalibrated(calibration).finger
+    return CompareResult(
+        name_of(data),
+        finger,
+        known,
+        comparison.compare(finger, known, frame),
+        None if better is None else comparison.compare(better, known, frame),
+    )

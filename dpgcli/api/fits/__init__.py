@@ -1,0 +1,1 @@
+"""Calibrations from curves, tables and known states, as functions."""

@@ -1,0 +1,78 @@
+"""`fit_finger`: lattice values from known states of a whole finger."""
+
+from collections.abc import Sequence
+from functools import partial
+
+from dpgcli.api.fits.result import (
+    NO_GEOMETRY,
+    FitResult,
+    GeometryInput,
+    check_loss,
+    fit_result,
+    with_geometry,
+)
+from dpgcli.api.inputs import Settings, SpecInput, chosen, scene_input
+from dpgcli.calibration.choices import LEVER, Loss, Target
+from dpgcli.calibration.finger import FingerFit
+from dpgcli.calibration.fits import Fit
+from dpgcli.calibration.known import Frame
+from dpgcli.files.calibration import DataFile
+from dpgcli.files.calibration.results import finger_method, fitted
+from dpgcli.files.csv_file import Tabular, name_of
+from dpgcli.files.known_states import states_of
+from dpgcli.reports.comparison import draw_fitted
+from dpgcli.reports.fits import FINGER_UNITS, finger_summary, value_rows
+
+
+def fit_finger(
+    spec: SpecInput,
+    states: Tabular,
+    *,
+    free: Sequence[str] = (LEVER,),
+    target: str = "tips",
+    settings: Settings = (),
+    first_station: tuple[float, float] = (0.0, 0.0),
+    tip_offset: tuple[float, float] = (0.0, 0.0),
+    geometry: GeometryInput = None,
+    loss: str = "linear",
+    loss_scale: float | None = None,
+    bootstrap: int = 0,
+    seed: int = 0,
+) -> FitResult[Fit]:
+    """Fit lattice values, the same in all units, to "tips" or "angles" of known states.
+
+    `states` has `pattern`, `tip_x_mm` and `tip_y_mm` or `tip_angle_rad`; see
+    `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
+    what the data call the tip, from the last node along the phalanx and to its left (mm).
+    Raises SpecError for a wrong spec or data, UsageError for wrong choices, FitError for a fit
+    that fails.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> finger = uniform_finger(1, **STUDY)  # struts of 10.75 mm: its tip turns by -0.30302 rad
+    >>> states = {"pattern": ["1"], "tip_angle_rad": [-0.30302]}
+    >>> round(fit_finger(finger, states, target="angles").values["segment_height_mm"], 3)
+    10.75
+    """
+    given = scene_input(spec, settings)
+    base = given.scene.finger
+    where = with_geometry(geometry, given.spec.finger.geometry if given.spec else None)
+    known = states_of(base, states)
+    weighted = chosen(Loss, "loss", loss)
+    check_loss(weighted, loss_scale)
+    met, frame = chosen(Target, "target", target), Frame(first_station, tip_offset)
+    study = FingerFit(base, known, frame, tuple(free), met, weighted, loss_scale)
+    found = study.fit(bootstrap, seed)
+    name = name_of(states)
+    source = DataFile(file=name, sha256=known.sha256, rows=known.patterns.shape[1])
+    return fit_result(
+        found,
+        {
+            **fitted(found, FINGER_UNITS[met], source, only_free=True),
+            "method": finger_method(study, found, bootstrap, seed),
+            "geometry": where,
+        },
+        value_rows(found),
+        partial(finger_summary, study, found),
+        (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),
+        partial(draw_fitted, study, found, name),
+    )

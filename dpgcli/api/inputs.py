@@ -1,0 +1,160 @@
+"""What functions take: specs as paths, data or values, settings by key, places in some data."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import util
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+from dpgcli.design.dimensions import LARGEST, SMALLEST
+from dpgcli.design.scene import Scene
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.scene_file import (
+    Spec,
+    canonical,
+    canonical_json,
+    checked,
+    read_scene,
+    recalibrated,
+    scene_of,
+)
+from dpgcli.files.scene_file.problems import checked_keys
+from dpgcli.files.scene_file.references import with_calibrations
+from dpgcli.files.scene_file.settings import with_settings
+from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.mechanics.finger import Finger
+
+Settings: TypeAlias = Mapping[str, object] | Sequence[str]
+"""Values by dotted key of a spec, or "key=value" texts."""
+
+E = TypeVar("E", bound=StrEnum)
+
+
+@dataclass(frozen=True)
+class SceneInput:
+    """A scene, and the spec that it was read from: none for a value that was handed in.
+
+    `name` is the spec's in messages, `files` are those that were read.
+    """
+
+    name: str
+    scene: Scene
+    spec: Spec | None = None
+    document: Document | None = None
+    files: tuple[Path, ...] = ()
+
+    @property
+    def json(self) -> str:
+        """The spec as one line of JSON, as tables keep it."""
+        return "{}" if self.spec is None else canonical_json(self.spec)
+
+    def recalibrated(self, calibration: str | Path | Calibration) -> Scene:
+        """The scene with a calibration's values in the place of its own."""
+        if self.document is None:
+            raise UsageError(Field("calibration"), " changes a spec, not a finger's values")
+        if not isinstance(calibration, Calibration):
+            path = Path(calibration)
+            calibration = read_calibration(path).model_copy(update={"file": path.name})
+        return scene_of(checked(recalibrated(self.document, calibration)))
+
+
+SpecInput: TypeAlias = str | Path | Mapping[str, Any] | Scene | Finger | SceneInput
+"""A spec's file, its data, or the value that it stands for."""
+
+
+def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
+    """Read a spec, or take what was read.
+
+    Raises SpecError with all problems of the spec, UsageError for settings beside a value.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> scene_input(uniform_finger(3, **STUDY)).scene.finger.n_units
+    3
+    """
+    if isinstance(spec, SceneInput | Scene | Finger):
+        if settings:
+            raise UsageError(Field("settings"), " change a spec, not a finger's values")
+        if isinstance(spec, SceneInput):
+            return spec
+        return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
+    if isinstance(spec, Mapping):
+        name, own = "spec", tuple[Path, ...]()
+        document = spec_document(spec, settings)
+    else:
+        name, own = str(spec), (Path(spec),)
+        document = read_scene(spec, setting_texts(settings))
+    found = checked(document)
+    return SceneInput(name, scene_of(found), found, document, (*own, *document.files))
+
+
+def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
+    """A spec key by key, as `files.scene_file.read_keys`: calibrations need not exist yet."""
+    if isinstance(spec, Mapping):
+        return checked_keys(_without_calibrations(spec, settings))
+    return checked_keys(with_settings(read_document(spec), setting_texts(settings)))
+
+
+def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
+    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    return with_calibrations(_without_calibrations(data, settings), Path())
+
+
+def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
+    return with_settings(Document("spec", plain(data), {}), setting_texts(settings))
+
+
+def setting_texts(settings: Settings) -> tuple[str, ...]:
+    """Settings as "key=value" texts.
+
+    >>> setting_texts({"finger.units": 3, "finger.linear_stiffness_N_per_mm": float("inf")})
+    ('finger.units=3', 'finger.linear_stiffness_N_per_mm=".inf"')
+    """
+    if not isinstance(settings, Mapping):
+        return tuple(settings)
+    values = {key: json.dumps(canonical(plain(value))) for key, value in settings.items()}
+    return tuple(f"{key}={text}" for key, text in values.items())
+
+
+def plain(value: Any) -> Any:
+    """Data as a YAML file would hold them: calibrations as sections, NumPy's numbers as Python's.
+
+    >>> import numpy as np
+    >>> plain({"finger": {"units": np.int64(3), "calibration": ("published",)}})
+    {'finger': {'units': 3, 'calibration': ['published']}}
+    """
+    if isinstance(value, Calibration):
+        return value.model_dump(exclude_none=True)
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    item = getattr(value, "item", None)  # of NumPy's scalars
+    return value if item is None else item()
+
+
+def check_installed(what: str, package: str) -> None:
+    """Raise UsageError if what is asked for needs a package that is not there."""
+    if util.find_spec(package) is None:
+        raise UsageError(f"{what} needs {package}: pip install {package}")
+
+
+def check_positive(field: str, value: float | None) -> None:
+    """Raise UsageError for a number, if there is one, that is not above zero or out of reach."""
+    if value is not None and not SMALLEST <= value <= LARGEST:
+        raise UsageError(
+            Field(field), f" {value:g}: expected a number > 0, from {SMALLEST:g} to {LARGEST:g}"
+        )
+
+
+def chosen(kind: type[E], field: str, value: str) -> E:
+    """A member of an enumeration by its text. Raises UsageError for another text."""
+    try:
+        return kind(value)
+    except ValueError:
+        known = ", ".join(map(str, kind))
+        raise UsageError(Field(field), f" {value!r}: expected {known}") from None

@@ -1,0 +1,159 @@
+"""`predict` and `explain`: the stable states of a finger or gripper."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
+from dpgcli.api.tables import Table
+from dpgcli.arrays import Columns
+from dpgcli.design.scene import Scene
+from dpgcli.errors import Field, UsageError
+from dpgcli.states import plan
+from dpgcli.states import predict as states
+from dpgcli.states.plan import Plan, Request
+from dpgcli.states.predict import Prediction, Summary
+from dpgcli.states.rungs import DEFAULT_TOLERANCE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_DRAWN = 64  # shapes that one can tell apart
+
+
+@dataclass(frozen=True)
+class PredictResult:
+    """Every state that was asked for, certified; what happened to one is its row's status.
+
+    `prediction` has the plan and a summary, `blocks` the rows in the plan's columns.
+    """
+
+    given: SceneInput
+    prediction: Prediction
+    blocks: tuple[Columns, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """What was decided: method, columns, what is left out and why."""
+        return self.prediction.plan
+
+    @property
+    def summary(self) -> Summary:
+        """Counts by status, largest residual (N) and tip error (mm), times (s)."""
+        return self.prediction.summary
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each state."""
+        return Table.of(self.plan.columns, *self.blocks)
+
+    def to_arrow(self) -> Any:
+        """The states as a `pyarrow.Table`."""
+        return self.table.to_arrow()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The states as a `pandas.DataFrame`."""
+        return self.table.to_pandas()
+
+    def save(self, path: str | Path) -> None:
+        """Write the states to a Parquet file, the bytes of `dpg predict --output`.
+
+        What differs between runs goes into a `.run.json` beside it. Raises OutputError.
+        """
+        from dpgcli.files.output import Mark, check_outputs, run_file
+        from dpgcli.files.prediction import write_prediction
+
+        table = Path(path)
+        check_outputs(self.given.files, (table, Mark.TABLE), (run_file(table), Mark.FACTS))
+        write_prediction(self.prediction, table, self.given.json, self.blocks)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw the states, 64 at most, to a .svg or .png file."""
+        check_drawable(self.plan.n_states)
+        draw(self.given.scene, self.plan.request.patterns, Path(path))
+
+
+def predict(
+    spec: SpecInput,
+    *,
+    settings: Settings = (),
+    patterns: str | Sequence[str] = (),
+    columns: str | Sequence[str] = "default",
+    formulation: str = "chain",
+    tolerance: float | None = None,
+    target_error: float | None = None,
+) -> PredictResult:
+    """Predict and certify stable states.
+
+    `settings` change keys of the spec; `patterns` are globs such as "1*1", none for all states;
+    `columns` names columns or groups of them. `tolerance` is the largest residual over the forces
+    in play; a `target_error` (mm, of the tips) takes the cheapest way that is bounded by it.
+    Raises SpecError for a wrong spec, UsageError for wrong choices, NothingSelectedError where no
+    pattern matches.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> states = predict(uniform_finger(3, **STUDY), patterns="1*1").table
+    >>> states["pattern"].tolist(), states["status"].tolist()
+    (['101', '111'], ['stable', 'stable'])
+    """
+    given = scene_input(spec, settings)
+    request = request_of(patterns, columns, formulation, tolerance, target_error)
+    prediction = states.predict(given.scene, request)
+    return PredictResult(given, prediction, tuple(prediction.blocks()))
+
+
+def explain(
+    spec: SpecInput,
+    *,
+    settings: Settings = (),
+    patterns: str | Sequence[str] = (),
+    columns: str | Sequence[str] = "default",
+    formulation: str = "chain",
+    tolerance: float | None = None,
+    target_error: float | None = None,
+) -> Plan:
+    """Decide what `predict` would do, and leave out, and why; arguments and errors are the same.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> plan = explain(uniform_finger(5, **STUDY))
+    >>> plan.n_states, plan.terms, plan.omissions[1].why.partition(";")[0]
+    (32, ('bistable', 'hinge'), 'k_L is infinite')
+    """
+    given = scene_input(spec, settings)
+    request = request_of(patterns, columns, formulation, tolerance, target_error)
+    return plan.explain(given.scene, request)
+
+
+def request_of(
+    patterns: str | Sequence[str],
+    columns: str | Sequence[str],
+    formulation: str,
+    tolerance: float | None,
+    target_error: float | None,
+) -> Request:
+    """What is asked of a scene."""
+    names = columns.split(",") if isinstance(columns, str) else columns
+    return Request(
+        patterns=(patterns,) if isinstance(patterns, str) else tuple(patterns),
+        columns=tuple(name.strip() for name in names if name.strip()),
+        formulation=formulation,
+        tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
+        target_error=target_error,
+    )
+
+
+def check_drawable(n_states: int) -> None:
+    """Raise UsageError for more shapes than one can see."""
+    if n_states > MOST_DRAWN:
+        what = f" draws at most {MOST_DRAWN} states, not {n_states:,}: select with "
+        raise UsageError(Field("plot"), what, Field("patterns"))
+
+
+def draw(scene: Scene, patterns: tuple[str, ...], path: Path) -> None:
+    """Draw the states with these patterns."""
+    from dpgcli.reports.figures import draw_states
+
+    request = Request(patterns, columns=("pattern", "status", "nodes"))
+    draw_states(states.predict(scene, request), path)

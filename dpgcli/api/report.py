@@ -1,0 +1,87 @@
+"""`report`: a design space on one page."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.content import opened
+from dpgcli.files.output import Mark, is_own, whole_file
+from dpgcli.files.parts import FINGERPRINT
+from dpgcli.files.table_reader import read_designs, read_run
+from dpgcli.files.table_writer import read_metadata
+from dpgcli.reports.page import html, markdown
+from dpgcli.studies.sweep import DESIGNS, REPORT, RUN
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PAGES = {".md": markdown, ".html": html}
+AT_END = "<!-- written by dpg -->"
+
+Say = Callable[[str], None]
+
+
+def silent(_: str) -> None:
+    """Say nothing."""
+
+
+def report(folder: str | Path, *, format: str = "md") -> str:
+    """Summarize the design space in a sweep's folder: what is best, what failed and why.
+
+    A page of Markdown ("md"), or of HTML that needs no other file ("html").
+    Raises UsageError for another format, or where the folder has no table of designs.
+
+    >>> report("nowhere")
+    Traceback (most recent call last):
+        ...
+    dpgcli.errors.UsageError: cannot read nowhere/designs.parquet: No such file or directory
+    """
+    if f".{format}" not in PAGES:
+        raise UsageError(Field("format"), f" {format!r}: expected md or html")
+    return page(Path(folder), f".{format}", silent)[1]
+
+
+def page(folder: Path, kind: str, say: Say) -> "tuple[pd.DataFrame, str]":
+    """The designs in a folder, and their page; `say` hears of facts that are left out."""
+    designs, units = read_designs(folder / DESIGNS)
+    return designs, PAGES[kind](designs, units, _facts(folder, say))
+
+
+def summarize(folder: Path, *, is_new: bool, say: Say = silent) -> "tuple[pd.DataFrame, str]":
+    """The designs of a finished sweep and their page, written into its folder if need be."""
+    designs, text = page(folder, ".md", say)
+    path = folder / REPORT
+    if is_new or not path.exists() or _is_outdated(path, text):
+        write_page(path, text)
+    return designs, text
+
+
+def write_page(path: Path, text: str) -> None:
+    """Write a page, at its end the mark by which `dpg` knows it."""
+    with whole_file(path, Mark.REPORT) as temporary:
+        temporary.write_bytes(_bytes(text))
+
+
+def _facts(folder: Path, say: Say) -> dict[str, Any] | None:
+    """The facts of the run that made the tables in a folder, if they are there."""
+    facts = read_run(folder / RUN)
+    made = read_metadata(folder / DESIGNS).get(FINGERPRINT)
+    if facts is not None and facts.get("fingerprint") != made:
+        say(f"{folder / RUN} is not of the run that made these tables: left out")
+        return None
+    return facts
+
+
+def _is_outdated(path: Path, text: str) -> bool:
+    """Whether a report of `dpg` says anything else, as that of tables before these."""
+    content = _bytes(text)
+    try:
+        with opened(path) as stream:
+            return stream.read(len(content) + 1) != content and is_own(path, Mark.REPORT)
+    except OSError:  # whatever that is, it is no report
+        return False
+
+
+def _bytes(text: str) -> bytes:
+    return f"{text}\n{AT_END}\n".encode(errors="backslashreplace")

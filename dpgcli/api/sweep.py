@@ -1,0 +1,265 @@
+"""`sweep` and `merge`: every design of a space, in two tables."""
+
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from dpgcli.api.inputs import Settings, plain, setting_texts, spec_document
+from dpgcli.api.report import Say, silent, summarize
+from dpgcli.api.tables import Table
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.output import check_not_read, check_outputs, sole_use
+from dpgcli.files.parts import PartStore
+from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
+from dpgcli.files.table_reader import read_run, read_undamaged
+from dpgcli.files.yaml_file import Document
+from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
+from dpgcli.studies.run import run
+from dpgcli.studies.sweep import (
+    DESIGNS,
+    RUN,
+    STATES,
+    Progress,
+    Shard,
+    Study,
+    assemble,
+    drop_half_written,
+    outputs,
+    stores,
+)
+from dpgcli.sweeps import cluster, executors
+from dpgcli.sweeps.executors import Workplace
+
+EXECUTORS = ("processes", "serial", "dask")
+WAIT = 300.0  # s
+ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The tables of a sweep; of a shard there are none before `merge`.
+
+    `n_failed` designs killed their worker, twice. `report` is the page on the space.
+    """
+
+    folder: Path
+    n_failed: int
+    report: str = ""
+
+    @cached_property
+    def designs(self) -> Table:
+        """A row for each design: what became of it, and its metrics."""
+        return Table(read_undamaged(self.folder / DESIGNS))
+
+    @cached_property
+    def states(self) -> Table:
+        """A row for each state of each design."""
+        return Table(read_undamaged(self.folder / STATES))
+
+
+def sweep(
+    sweep: str | Path | Mapping[str, Any],
+    output: str | Path | None = None,
+    *,
+    settings: Settings = (),
+    tolerance: float | None = None,
+    target_error: float | None = None,
+    jobs: int | None = None,
+    executor: str = "processes",
+    scheduler: str | None = None,
+    wait: float | None = None,
+    shard: str | Shard | None = None,
+    restart: bool = False,
+    force: bool = False,
+    watch: Callable[[Progress], None] = lambda progress: None,
+) -> SweepResult:
+    """Evaluate every design of a space: `sweep` is its file, or the data of one.
+
+    In data the `base` may be a spec's data, too. The tables go into the folder `output`, where
+    another call goes on; without one they are in the result alone. The other arguments are those
+    of `dpg sweep`; `watch` sees the progress. Processes import the program that starts them: put
+    its work under `if __name__ == "__main__"`, or take executor="serial".
+    Raises SpecError for a wrong sweep, UsageError for wrong choices, OutputError, WorkplaceError.
+
+    >>> lattice = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
+    ...            "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
+    ...            "hinge_stiffness_N_mm_per_rad": 24.2}
+    >>> finger = {"units": 2, "linear_stiffness_N_per_mm": 1e4, "lattice": lattice}
+    >>> space = [{"key": "finger.lattice.stroke_mm", "values": [2.5, 3.5]}]
+    >>> result = sweep({"base": {"finger": finger}, "space": space}, executor="serial")
+    >>> result.designs["n_stable"].tolist(), len(result.states)
+    ([4, 4], 8)
+    """
+    place = Place(executor, jobs, scheduler, wait)
+    part = shard_of(shard)
+    if output is None and part is not None:
+        raise UsageError("a ", Field("shard"), " is kept in a folder: give ", Field("output"))
+    with _folder(output) as folder:
+        study = study_of(sweep, folder, settings, tolerance, target_error)
+        check_not_read(study.sweep.files, [path for path, _ in outputs(folder)])
+        with sole_use(folder):
+            drop_half_written(folder)
+            is_new = run(
+                study,
+                part,
+                lambda: study.compute(place.workplace(silent), watch, part),
+                restart=restart,
+                force=force,
+                is_sent=place.is_sent,
+                settings=setting_texts(settings),
+                warn=silent,
+                tell=silent,
+            )
+            result = _result(study, part, is_new)
+        if output is None:
+            _ = result.designs, result.states  # before their folder goes
+    return result
+
+
+@contextmanager
+def _folder(output: str | Path | None) -> Iterator[Path]:
+    if output is not None:
+        yield Path(output)
+        return
+    with TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
+    if part is not None:
+        return SweepResult(study.folder, study.n_failed)
+    designs, text = summarize(study.folder, is_new=is_new)
+    return SweepResult(study.folder, int((designs["status"] == "failed").sum()), text)
+
+
+def study_of(
+    sweep: str | Path | Mapping[str, Any],
+    folder: Path,
+    settings: Settings = (),
+    tolerance: float | None = None,
+    target_error: float | None = None,
+) -> Study:
+    """A sweep ready to run into a folder."""
+    exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
+    check_exactness(exactness, target_error)
+    return Study(_read(sweep, settings), folder, exactness, target_error)
+
+
+def _read(sweep: str | Path | Mapping[str, Any], settings: Settings) -> Sweep:
+    texts = setting_texts(settings)
+    if not isinstance(sweep, Mapping):
+        return read_sweep(Path(sweep), texts)
+    base, data = sweep.get("base"), plain(sweep)
+    if not isinstance(base, Mapping):
+        return sweep_in(Document("sweep", data, {}), Path(), texts)
+    document = Document("sweep", {**data, "base": "base"}, {})
+    return sweep_in(document, Path(), texts, base=spec_document(base, settings))
+
+
+def shard_of(shard: str | Shard | None) -> Shard | None:
+    """A part of a sweep in words, K/N.
+
+    >>> shard_of("3/16")
+    Shard(number=3, count=16)
+    """
+    if shard is None or isinstance(shard, Shard):
+        return shard
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", shard)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise UsageError(Field("shard"), f" {shard}: expected K/N with K from 1 to N, such as 3/16")
+    return Shard(int(match[1]), int(match[2]))
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where designs are evaluated: by how many processes, or by which Dask scheduler's workers.
+
+    `wait` (s) is how long a worker of Dask may be waited for. Raises UsageError for what does not
+    go together.
+    """
+
+    executor: str = "processes"
+    jobs: int | None = None
+    scheduler: str | None = None
+    wait: float | None = None
+
+    def __post_init__(self) -> None:
+        dask, scheduler = Field("executor"), Field("scheduler")
+        if self.executor not in EXECUTORS:
+            raise UsageError(dask, f" {self.executor!r}: expected {', '.join(EXECUTORS)}")
+        if self.is_sent != (self.scheduler is not None):
+            raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
+        if self.scheduler is not None and re.fullmatch(ADDRESS, self.scheduler) is None:
+            raise UsageError(scheduler, f" {self.scheduler}: expected tcp://host:port")
+        if self.scheduler is None and self.wait is not None:
+            raise UsageError(Field("wait"), " is for the workers of ", dask, " dask")
+
+    @property
+    def is_sent(self) -> bool:
+        """Whether designs are sent to other machines."""
+        return self.executor == "dask"
+
+    def workplace(self, say: Say) -> Workplace:
+        """The workers, found or about to be started; `say` hears of those that are waited for."""
+        if self.scheduler is not None:
+            return self._cluster(self.scheduler, say)
+        n_workers = self.jobs or os.cpu_count() or 1
+        if self.executor == "serial" or n_workers == 1:
+            return executors.serial()
+        return executors.processes(n_workers)
+
+    def _cluster(self, scheduler: str, say: Say) -> Workplace:
+        try:
+            return cluster.dask_cluster(scheduler, WAIT if self.wait is None else self.wait, say)
+        except ImportError as error:
+            what = " dask needs Dask: pip install distributed"
+            raise UsageError(Field("executor"), what) from error
+        except (OSError, ValueError) as error:
+            what = f" {scheduler}: no scheduler or no worker answers"
+            why = f"{what}: {str(error) or 'time is up'}"
+            raise UsageError(Field("scheduler"), why) from error
+
+
+def merge(shards: Sequence[str | Path], output: str | Path) -> SweepResult:
+    """Join the folders of shards into the tables of the whole sweep.
+
+    Raises UsageError for folders without a shard, damage, gaps and overlaps, and parts of
+    different sweeps.
+
+    >>> merge(["nowhere"], "whole")
+    Traceback (most recent call last):
+        ...
+    dpgcli.errors.UsageError: nowhere: expected the output of one dpg sweep shard, found no shard
+    """
+    return merged([Path(folder) for folder in shards], Path(output), silent)
+
+
+def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:
+    """The same; `say` hears of what the report leaves out."""
+    found = [_store(shard) for shard in shards]
+    with sole_use(folder):
+        drop_half_written(folder)
+        check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
+        read_run(folder / RUN)  # what no report can be made beside is refused before the work
+        assemble(found, folder)
+        designs, text = summarize(folder, is_new=True, say=say)
+        for store in found:
+            if store.folder.parent.parent.samefile(folder):
+                store.drop()
+    return SweepResult(folder, int((designs["status"] == "failed").sum()), text)
+
+
+def _store(folder: Path) -> PartStore:
+    """The parts of the one shard in a folder."""
+    here = stores(folder)
+    if len(here) != 1:
+        what = "no shard" if not here else "several sweeps"
+        expected = f"{folder}: expected the output of one dpg sweep "
+        raise UsageError(expected, Field("shard"), f", found {what}")
+    return here[0]

@@ -1,0 +1,44 @@
+"""Options that the fits share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dpgcli.calibration.choices import Loss
+from dpgcli.cli.printing import Format
+
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Write the calibration to this YAML file")
+]
+Printed = Annotated[Format, typer.Option("--format", help="How to print the values")]
+Plot = Annotated[
+    Path | None, typer.Option("--plot", help="Draw data, fit and residuals: a .svg or .png file")
+]
+Bootstrap = Annotated[
+    int,
+    typer.Option(
+        "--bootstrap", metavar="N", min=0, max=100_000, help="95 % intervals from N resampled fits"
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]
+LossOption = Annotated[Loss, typer.Option("--loss", help="How residuals count")]
+LossScale = Annotated[
+    float | None,
+    typer.Option(
+        "--loss-scale", help="Residual from which a robust loss counts less  [default: the data's]"
+    ),
+]
+GeometryValues = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-g",
+        "--geometry",
+        metavar="KEY=VALUE",
+        help="Where the values hold: a key of a spec's geometry; repeatable",
+    ),
+]
+GeometrySpec = Annotated[
+    Path | None,
+    typer.Option("--spec", metavar="SPEC", help="Take the geometry from this spec's finger"),
+]

@@ -1,0 +1,1 @@
+"""From dimensions and calibrations to lattices, for many designs at once."""

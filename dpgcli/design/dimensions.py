@@ -1,0 +1,225 @@
+"""Dimensions and lattice values of a batch of designs, as their specs give them.
+
+Lengths, moduli and stiffnesses lie within 1e-12 to 1e12, so that any power of them that the model
+takes stays far from overflow; the linear stiffness, a stiff limit, may reach 1e18.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.design.calibrations import Calibration
+from dpgcli.design.geometry import chamber_width
+from dpgcli.design.problems import Issue, Problems, number, of_design
+from dpgcli.text import KeyPath, dotted
+
+UNITS = "finger.units"
+LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
+SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
+MAX_UNITS = 64
+AGREEMENT = 1e-6  # of a value given twice
+UNIT_RANGE = re.compile(r"([0-9]{1,4})(?: *- *([0-9]{1,4}))?")
+BOUNDS = {  # where they are not those of a length
+    "units": (1.0, float(MAX_UNITS)),
+    "force_linearity": (0.0, 1.0),
+    "hinge_stiffness_N_mm_per_rad": (0.0, LARGEST),
+    "mounting_angle_deg": (-90.0, 90.0),
+}
+SUFFIXES = {  # units in the names of keys
+    "_N_mm_per_rad": "N mm/rad",
+    "_N_per_mm": "N/mm",
+    "_mm": "mm",
+    "_MPa": "MPa",
+    "_deg": "°",
+}
+Sizes = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Section:
+    """Dimensions and lattice values that are given of some units, by key; (design,) or (1,)."""
+
+    geometry: Sizes = field(default_factory=dict)
+    lattice: Sizes = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Design:
+    """A batch of designs that are given by the same keys, with arrays (design,), or (1,) for all.
+
+    `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
+    values by key, none without one. The calibrations are in the order in which they count.
+    """
+
+    units: int
+    finger: Section
+    overrides: Mapping[str, Section] = field(default_factory=dict)
+    linear_stiffness: Array | None = None
+    calibrations: tuple[str | Calibration, ...] = ()
+    law: str | None = None
+    gripper: Sizes = field(default_factory=dict)
+    n_designs: int = 1
+
+    def with_values(self, columns: Sizes) -> "Design":
+        """The designs with values (design,) at dotted keys of a spec, but its number of units.
+
+        >>> length = {"finger.overrides.4-5.geometry.chamber_length_mm": np.array([9.0, 10.0])}
+        >>> Design(5, Section()).with_values(length).overrides["4-5"].geometry
+        {'chamber_length_mm': array([ 9., 10.])}
+        """
+        design = self
+        for key, column in columns.items():
+            design = replace(design, n_designs=len(column))
+            design = design._with_value(key.split("."), column * 1.0)
+        return design
+
+    def _with_value(self, path: list[str], column: Array) -> "Design":
+        *parents, key = path
+        if parents == ["gripper"]:
+            return replace(self, gripper={**self.gripper, key: column})
+        if path == ["finger", LINEAR_STIFFNESS]:
+            return replace(self, linear_stiffness=column)
+        section = parents[-1]
+        if parents[1] != "overrides":
+            return replace(self, finger=_changed(self.finger, section, key, column))
+        units = parents[2]
+        own = _changed(self.overrides.get(units, Section()), section, key, column)
+        return replace(self, overrides={**self.overrides, units: own})
+
+
+def _changed(part: Section, section: str, key: str, column: Array) -> Section:
+    if section == "geometry":
+        return replace(part, geometry={**part.geometry, key: column})
+    return replace(part, lattice={**part.lattice, key: column})
+
+
+def are_possible(key: str, values: Array) -> Flags:
+    """Whether a key of a spec, by its last part, can have these values by themselves."""
+    if key == LINEAR_STIFFNESS:
+        return ((values >= SMALLEST) & (values <= STIFFEST)) | np.isposinf(values)
+    low, high = BOUNDS.get(key, (SMALLEST, LARGEST))
+    is_whole = (key != "units") | (values == np.rint(values))
+    return np.asarray((values >= low) & (values <= high) & is_whole)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Units that share all values: what the spec gives them, and which of it an override gave."""
+
+    units: tuple[int, ...]
+    calibrations: tuple[str | Calibration, ...]
+    geometry: Sizes
+    lattice: Sizes
+    override: str | None = None
+    own_geometry: frozenset[str] = frozenset()
+    own_lattice: frozenset[str] = frozenset()
+
+    def path(self, section: str, key: str) -> KeyPath:
+        """Where the spec sets, or would set, a value of these units."""
+        own = self.own_geometry if section == "geometry" else self.own_lattice
+        if self.override is not None and key in own:
+            return ("finger", "overrides", self.override, section, key)
+        return ("finger", section, key)
+
+
+def groups_of(design: Design) -> list[Group]:
+    """The units without an override, none perhaps, and those of each override."""
+    taken = {unit for text in design.overrides for unit in unit_range(text)}
+    units = tuple(unit for unit in range(1, design.units + 1) if unit not in taken)
+    whole, sizes = design.finger, sizes_of(design.finger.geometry)
+    return [
+        Group(units, design.calibrations, sizes, whole.lattice),
+        *(
+            Group(
+                unit_range(text),
+                design.calibrations,
+                {**sizes, **own.geometry},
+                {**whole.lattice, **own.lattice},
+                text,
+                frozenset(own.geometry),
+                frozenset(own.lattice),
+            )
+            for text, own in design.overrides.items()
+        ),
+    ]
+
+
+def sizes_of(given: Sizes) -> dict[str, Array]:
+    """The dimensions that are given, the chamber's width from the unit cell if need be."""
+    sizes = dict(given)
+    if "chamber_width_mm" not in sizes and "unit_cell_mm" in sizes:
+        sizes["chamber_width_mm"] = chamber_width(sizes["unit_cell_mm"])
+    return sizes
+
+
+def unit_range(text: str) -> tuple[int, ...]:
+    """The units that the key of an override names, empty if it names none.
+
+    >>> unit_range("4"), unit_range("4-6"), unit_range("6-4")
+    ((4,), (4, 5, 6), ())
+    """
+    match = UNIT_RANGE.fullmatch(text)
+    if match is None:
+        return ()
+    first = int(match[1])
+    return tuple(range(first, int(match[2] or first) + 1))
+
+
+def range_issues(n_units: int, overrides: Iterable[str]) -> list[Issue]:
+    """Malformed, foreign or overlapping unit ranges of overrides."""
+    found: list[Issue] = []
+    taken: dict[int, str] = {}
+    for text in overrides:
+        path = ("finger", "overrides", text)
+        units = unit_range(text)
+        if not units or units[0] < 1 or units[-1] > n_units:
+            hint = 'write "4" or "4-5"'
+            found.append(Issue(path, f"units within 1-{n_units}", dotted((text,)), hint))
+        elif overlap := [taken[unit] for unit in units if unit in taken]:
+            expected = "each unit in one override"
+            found.append(Issue(path, expected, f"units also in {dotted((overlap[0],))}"))
+        else:
+            taken.update(dict.fromkeys(units, text))
+    return found
+
+
+def check_widths(sizes: Sizes, problems: Problems) -> None:
+    """Note where the widths of the unit cell and of the chamber disagree."""
+    if "unit_cell_mm" not in sizes:
+        return
+    cell = sizes["unit_cell_mm"]
+    derived = chamber_width(cell)
+    given = sizes.get("chamber_width_mm", derived)
+    rule = "chamber width = unit cell - 2 mm (two walls of 1 mm)"
+
+    def too_narrow(design: int) -> Issue:
+        path = ("finger", "geometry", "unit_cell_mm")
+        return Issue(path, "a length > 2 mm", number(of_design(cell, design)), rule)
+
+    def another(design: int) -> Issue:
+        expected = f"{number(of_design(derived, design))} as unit_cell_mm has it"
+        path = ("finger", "geometry", "chamber_width_mm")
+        return Issue(path, expected, number(of_design(given, design)), rule)
+
+    is_narrow = np.real(derived) <= 0.0
+    problems.add(is_narrow, too_narrow)
+    problems.add(~is_narrow & ~agree(given, derived), another)
+
+
+def agree(given: Array, derived: Array) -> Flags:
+    """Whether a given value is the derived one, but for rounding by people."""
+    first, second = np.real(given), np.real(derived)
+    largest = np.maximum(np.abs(first), np.abs(second))
+    return np.asarray(np.abs(first - second) <= AGREEMENT * largest)
+
+
+def unit_of(key: str) -> str:
+    """The unit in a key's name, none where it has none.
+
+    >>> unit_of("finger.lattice.segment_height_mm")
+    'mm'
+    """
+    return next((unit for suffix, unit in SUFFIXES.items() if key.endswith(suffix)), "")

@@ -1,0 +1,143 @@
+"""Which law the domes of a design follow, and the curve behind it."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.design.calibrations import Calibration, DomeCurve
+from dpgcli.design.problems import Issue
+from dpgcli.design.rules import (
+    BISTABLE_STIFFNESS,
+    DERIVATIONS,
+    FORCE_LINEARITY,
+    STROKE,
+    Derivation,
+)
+from dpgcli.mechanics.curve import AT_REST, FEWEST_POINTS, bridged, spline
+from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+
+WHERE = ("finger", "law")
+HINT = "dpg fit bistable writes one"
+NEXT_TO_NOTHING = 0.01  # of a curve's energies
+NEAR_START = 4.0  # first travels: as far the slope is like that from rest to the first point
+STEEPER = 1.5  # than any slope nearby: no dome's own
+NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
+
+
+@dataclass(frozen=True)
+class Domes:
+    """How domes answer, and by which rules their values come about.
+
+    `calibration` has the curve, if there is one. `travel` is that of the inverted dome at rest
+    (mm), at a dome height of `height` (mm, if it is known), for domes with a travel of their own;
+    else 0.
+    """
+
+    law: Law = PUBLISHED
+    derivations: tuple[Derivation, ...] = DERIVATIONS
+    calibration: Calibration | None = None
+    travel: float = 0.0
+    height: float | None = None
+
+    def carries(self, key: str, calibration: str | Calibration) -> bool:
+        """Whether a fitted value's standard error reaches the finger.
+
+        The k_b and stroke of the file that gives the curve only normalize it: their errors cancel.
+        """
+        return calibration is not self.calibration or key not in NORMALS
+
+    def travel_at(self, height: Array | None) -> Array:
+        """Travel of an inverted dome of another height, which it grows with (finite elements)."""
+        if self.height is None or height is None:
+            return np.array([self.travel])
+        return self.travel * height / self.height
+
+
+def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Domes | Issue:
+    """The law of a name, with the first curve among the calibrations."""
+    if law in (None, "published"):
+        return Domes()
+    curves = (c for c in calibrations if isinstance(c, Calibration) and c.curve is not None)
+    calibration = next(curves, None)
+    if law == "push_only" and calibration is None:
+        return Domes(PushOnly(PUBLISHED))
+    if calibration is None or calibration.curve is None:
+        return Issue(WHERE, "a calibration with a curve beside law: tabulated", "none", HINT)
+    if issue := _curve_issue(calibration, calibration.curve):
+        return issue
+    stiffness, stroke = (calibration.values.get(key) for key in NORMALS)
+    if stiffness is None or stroke is None:
+        expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
+        return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
+    if law == "tabulated":
+        return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
+    return _pushing(calibration, calibration.curve, stiffness.value)
+
+
+def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
+    """Too few points, or a first one whose energy cannot be counted from rest."""
+    travels, energies = np.array(curve.travel), np.array(curve.energy)
+    begins_before = travels[0] < 0.0
+    n_points = len(travels)
+    if begins_before:
+        n_points = 1 + int((travels > AT_REST * np.ptp(travels)).sum())
+    if n_points < FEWEST_POINTS:
+        from_rest = " from rest on" if begins_before else ""
+        found = f"{n_points}{from_rest} in {calibration.file}"
+        return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
+    start, energy = travels[0], energies[0]
+    if start <= 0.0 or abs(energy) <= NEXT_TO_NOTHING * np.ptp(energies):
+        return None
+    near = travels[1:] <= max(NEAR_START * start, travels[FEWEST_POINTS - 1])
+    steepest = np.abs(np.diff(energies) / np.diff(travels))[near].max()
+    if abs(energy) <= STEEPER * steepest * start:
+        return None
+    expected = "a curve that begins at rest, travel 0, or whose energies are counted from there"
+    found = f"{energy:g} mJ at {start:g} mm in {calibration.file}"
+    return Issue(WHERE, expected, found, "add the point at travel 0 to the curve")
+
+
+def _no_well(calibration: Calibration) -> Issue:
+    return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+
+
+def _tabulated(
+    calibration: Calibration, curve: DomeCurve, stiffness: float, stroke: float
+) -> Domes | Issue:
+    shape = spline(*_points(curve, stroke / curve.opening_per_travel, stiffness * stroke**2))
+    if not np.isfinite(shape.rests[1]):
+        return _no_well(calibration)
+    rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return Domes(Tabulated(shape), rules, calibration)
+
+
+def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Domes | Issue:
+    travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
+    if not np.isfinite(travel):
+        return _no_well(calibration)
+    shape = spline(*_points(curve, travel, stiffness * travel**2))
+    height = calibration.geometry.get("dome_height_mm")
+    domes = Domes(PushOnly(Tabulated(shape)), (), calibration, travel, height)
+    stroke = replace(
+        STROKE,
+        value=partial(_stroke_in_contact, domes),
+        rule="travel of the inverted dome - dome height - unit separation (contact)",
+        not_from=calibration,
+    )
+    rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
+    return replace(domes, derivations=tuple(rules))
+
+
+def _stroke_in_contact(domes: Domes, height: Array, separation: Array) -> Array:
+    return domes.travel_at(height) - height - separation
+
+
+def _points(curve: DomeCurve, travel: float, energy: float) -> tuple[tuple[float, ...], ...]:
+    """Travels and energies over a travel and an energy, from rest on, gaps bridged."""
+    travels, energies = np.array(curve.travel), np.array(curve.energy)
+    if travels[0] > 0.0:
+        travels, energies = (np.concatenate(([0.0], values)) for values in (travels, energies))
+    travels, energies = bridged(travels, energies, curve.gaps)
+    return tuple((travels / travel).tolist()), tuple((energies / energy).tolist())

@@ -1,0 +1,258 @@
+"""From designs to lattices: values unit by unit, their sources, and what is wrong, in one pass."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.design.calibrations import Calibration
+from dpgcli.design.dimensions import (
+    LINEAR_STIFFNESS,
+    Design,
+    Group,
+    Section,
+    check_widths,
+    groups_of,
+    range_issues,
+)
+from dpgcli.design.domes import Domes, domes_of
+from dpgcli.design.problems import Issue, Problems, number, of_design
+from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
+from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source
+from dpgcli.design.uncertainty import Share, uncertainty_of
+from dpgcli.design.values import value_of
+from dpgcli.mechanics.finger import KEYS, Finger
+from dpgcli.text import KeyPath
+
+SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
+NO_BARS = Issue(
+    ("finger", LINEAR_STIFFNESS),
+    "a stiffness > 0 in N/mm, or .inf",
+    "nothing",
+    "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+)
+Pairs = Sequence[tuple[Group, Value]]
+
+
+@dataclass(frozen=True, eq=False)
+class Resolution:
+    """Lattice values by key and group of units, how domes answer, and what is wrong."""
+
+    design: Design
+    domes: Domes
+    values: Mapping[str, Pairs]
+    problems: Problems
+
+    @cached_property
+    def are_wrong(self) -> Flags:
+        """Designs that no finger can have, (design,)."""
+        return self.problems.are_met(self.design.n_designs)
+
+    @property
+    def gravest_origins(self) -> Indices:
+        """What to trust least of each design's values, (design,), places in `ORIGINS`.
+
+        Values that the geometry alone fixes count as given.
+        """
+        gravest = np.zeros(self.design.n_designs, np.int64)
+        derived, given = map(ORIGINS.index, (Origin.DERIVED, Origin.GIVEN))
+        for _, value in (pair for pairs in self.values.values() for pair in pairs):
+            gravest = np.maximum(gravest, np.where(value.origin == derived, given, value.origin))
+        return gravest
+
+    @cached_property
+    def lattice(self) -> dict[str, Array]:
+        """The finger's arrays by name, (1 or unit, 1 or design); senseless for what is wrong."""
+        units = self.design.units
+        arrays = {
+            KEYS[key]: _by_unit(units, [(group, value.numbers) for group, value in pairs])
+            for key, pairs in self.values.items()
+        }
+        if FORCE_LINEARITY not in self.domes.derivations:
+            arrays["force_linearity"] = np.zeros((1, 1))
+        if self.domes.travel:
+            travels = [
+                (group, self.domes.travel_at(group.geometry.get("dome_height_mm")))
+                for group, _ in self.values[STROKE.key]
+            ]
+            arrays["dome_travel"] = _by_unit(units, travels)
+        return arrays
+
+    def scene(self) -> Scene:
+        """What a single design describes, if nothing is wrong with it."""
+        batch = self.batch(np.zeros(1, np.int64))
+        gripper, layer = batch.gripper, batch.layer_thickness
+        return Scene(
+            batch.finger,
+            tuple(self._sources()),
+            gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
+            None if layer is None else np.asarray(layer).item(),
+            uncertainty_of(self.design.calibrations, self._shares()),
+        )
+
+    def batch(self, designs: Indices) -> Scene:
+        """What some of the designs describe, none of them wrong, with arrays by design.
+
+        Their bars are all rigid or none are; sources and uncertainty are left out.
+        """
+        arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
+        finger = Finger(self.design.units, **arrays, law=self.domes.law)
+        layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
+        thickness = None if layer is None else _picked(layer, designs)
+        return Scene(finger, (), self._gripper(designs), thickness)
+
+    def alike(self, designs: Indices) -> list[Indices]:
+        """Some of the designs, none of them wrong, apart by whether their bars are rigid."""
+        if not len(designs):
+            return []
+        is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
+        return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+
+    def _gripper(self, designs: Indices) -> Gripper | None:
+        given = self.design.gripper
+        if not given:
+            return None
+        angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
+        return Gripper(_picked(given["base_spacing_mm"], designs), _picked(angle, designs))
+
+    def _sources(self) -> Iterator[Source]:
+        """One source for each key and each set of units that got the same value the same way."""
+        everyone = tuple(range(1, self.design.units + 1))
+        for key, pairs in self.values.items():
+            same: dict[Source, tuple[int, ...]] = {}
+            for group, value in pairs:
+                units = everyone if key in SHARED else group.units
+                source = _source(key, value)
+                same[source] = (*same.get(source, ()), *units)
+            for source, units in sorted(same.items(), key=lambda item: min(item[1])):
+                yield replace(source, units=_ranges(units))
+
+    def _shares(self) -> Iterator[Share]:
+        """Standard errors of what comes from calibration files, unit by unit."""
+        calibrations, units = self.design.calibrations, self.design.units
+        for key, pairs in self.values.items():
+            errors = {
+                place: [(g, _error(v) if v.file == place else np.zeros(1)) for g, v in pairs]
+                for place in {v.file for _, v in pairs if v.file is not None and _error(v).any()}
+            }
+            for place, by_group in errors.items():
+                if self.domes.carries(key, calibrations[place]):
+                    yield Share(place, key, _by_unit(units, by_group))
+
+
+def resolve(design: Design) -> Resolution:
+    """The lattices of a batch of designs, where their values come from, and what is wrong.
+
+    >>> section = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
+    ...     "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
+    ...     "hinge_stiffness_N_mm_per_rad": 24.2}
+    >>> lattice = {key: np.array([value]) for key, value in section.items()}
+    >>> base = Design(2, Section(lattice=lattice), linear_stiffness=np.array([np.inf]))
+    >>> found = resolve(base.with_values({"finger.lattice.stroke_mm": np.array([3.0, 3.5])}))
+    >>> found.lattice["stroke"], found.are_wrong
+    (array([[3. , 3.5]]), array([False, False]))
+    """
+    problems = Problems()
+    for issue in range_issues(design.units, design.overrides):
+        problems.everywhere(issue)
+    check_widths(design.finger.geometry, problems)
+    domes = domes_of(design.law, design.calibrations)
+    if isinstance(domes, Issue):
+        problems.everywhere(domes)
+        return Resolution(design, Domes(), {}, problems)
+    _check_linearities(design, domes, problems)
+    every = groups_of(design)
+    base, groups = every[0], [group for group in every if group.units]
+    values: dict[str, Pairs] = {}
+    for derivation in domes.derivations:
+        chosen = [base] if derivation is SEGMENT_HEIGHT else groups
+        found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
+        values[derivation.key] = [(g, value) for g, value in found if value is not None]
+    bars = _bars(design, base)
+    if bars is None:
+        problems.everywhere(NO_BARS)
+    else:
+        values[LINEAR_STIFFNESS] = [(base, bars)]
+    return Resolution(design, domes, values, problems)
+
+
+def _check_linearities(design: Design, domes: Domes, problems: Problems) -> None:
+    """Note force linearities beside a law that has none."""
+    if FORCE_LINEARITY in domes.derivations:
+        return
+    paths: dict[KeyPath, Section] = {("finger", "lattice"): design.finger}
+    for units, own in design.overrides.items():
+        paths["finger", "overrides", units, "lattice"] = own
+    for path, section in paths.items():
+        given = section.lattice.get(FORCE_LINEARITY.key)
+        if given is not None:
+            where = (*path, FORCE_LINEARITY.key)
+            problems.add(np.ones(1, bool), partial(_linearity_issue, where, design.law, given))
+
+
+def _linearity_issue(where: KeyPath, law: str | None, given: Array, design: int) -> Issue:
+    hint = "the shape of the curve is that of its calibration"
+    return Issue(where, f"none beside law: {law}", number(of_design(given, design)), hint)
+
+
+def _bars(design: Design, base: Group) -> Value | None:
+    """The stiffness of the bars: given, or fitted."""
+    if design.linear_stiffness is not None:
+        return all_by(design.linear_stiffness, Origin.GIVEN, "as given")
+    for place, calibration in enumerate(base.calibrations):
+        if isinstance(calibration, Calibration) and LINEAR_STIFFNESS in calibration.values:
+            fitted = calibration.values[LINEAR_STIFFNESS]
+            value = all_by(np.array([fitted.value]), Origin.CALIBRATED, f"from {calibration.file}")
+            error = fitted.standard_error
+            return replace(
+                value, standard_error=None if error is None else np.array([error]), file=place
+            )
+    return None
+
+
+def _by_unit(n_units: int, pairs: Sequence[tuple[Group, Array]]) -> Array:
+    """Values by unit, (unit, design), or (1, design) where all units share them."""
+    numbers = np.broadcast_arrays(*(values for _, values in pairs))
+    if all(np.array_equal(numbers[0], other) for other in numbers[1:]):
+        return numbers[0][None]
+    rows = {
+        unit: row for (group, _), row in zip(pairs, numbers, strict=True) for unit in group.units
+    }
+    return np.stack([rows[unit] for unit in range(1, n_units + 1)])
+
+
+def _picked(values: Array, designs: Indices) -> Array:
+    """Values of some designs along the last axis."""
+    if values.shape[-1] == 1:
+        return np.repeat(values, len(designs), axis=-1)
+    return np.take(values, designs, axis=-1)
+
+
+def _error(value: Value) -> Array:
+    return np.zeros(1) if value.standard_error is None else value.standard_error
+
+
+def _source(key: str, value: Value) -> Source:
+    """How the value of the first design came about, the units left out."""
+    error = value.standard_error
+    return Source(
+        key,
+        "",
+        of_design(value.numbers, 0),
+        ORIGINS[int(of_design(value.origin, 0))],
+        value.rule_of(0),
+        None if error is None else of_design(error, 0),
+    )
+
+
+def _ranges(units: tuple[int, ...]) -> str:
+    """Units as a spec writes them: `1-3`, `5`, `1-3,5`."""
+    runs: list[list[int]] = []
+    for unit in sorted(units):
+        if runs and unit == runs[-1][-1] + 1:
+            runs[-1][1:] = [unit]
+        else:
+            runs.append([unit])
+    return ",".join("-".join(map(str, run)) for run in runs)

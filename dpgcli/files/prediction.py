@@ -1,0 +1,38 @@
+"""A prediction in files: the table of its states, and what differs between runs beside it."""
+
+import platform
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from dpgcli.arrays import Columns
+from dpgcli.files.output import run_file
+from dpgcli.files.table_writer import write_run, write_states
+from dpgcli.states.predict import Prediction
+
+
+def write_prediction(
+    prediction: Prediction,
+    table: Path,
+    spec_json: str,
+    rows: Iterable[Columns],
+    command: Sequence[str] = (),
+) -> None:
+    """Write rows, as they come, and then what the run came to, with the `command` behind it."""
+    write_states(prediction, table, spec_json, rows)
+    summary = prediction.summary
+    write_run(
+        run_file(table),
+        {
+            "table": table.name,
+            "states": {status.text: n for status, n in summary.statuses.items()},
+            "finger_solves": summary.n_finger_solves,
+            "worst_residual_N": summary.residual,
+            "worst_tip_error_mm": summary.tip_error,
+            "seconds": summary.seconds,
+            "cpu_seconds": summary.cpu_seconds,
+            "machine": platform.machine(),
+            "host": platform.node(),
+            "python": platform.python_version(),
+            "command": list(command),
+        },
+    )

@@ -1,0 +1,298 @@
+"""Families of stiff and extreme variants of a finger, each of which varies one property."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
+from dpgcli.states.margins import last_where, limits, margins
+from dpgcli.states.patterns import inverted_units, texts
+from dpgcli.states.rungs import DEFAULT_TOLERANCE
+from dpgcli.states.settle import settle
+from dpgcli.states.units import Units
+from dpgcli.states.wells import inverted_wells
+
+ALL_PATTERNS_UP_TO = 4  # units
+N_GRADED = 4  # units
+LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
+FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
+CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
+CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
+FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
+    "straight": ((0.0, 0.0), "0"),
+    "inverted": ((0.15, 0.15), "1"),
+    "folded inward": ((-3.0, -3.0), "0"),
+    "folded outward": ((2.9, 2.9), "1"),
+    "mirrored at the near strut": ((-1.7, 0.3), "0"),
+    "mirrored at the far strut": ((0.3, -1.7), "0"),
+}
+
+
+@dataclass(frozen=True)
+class Start:
+    """The start of a search; by default, the pattern's own geometric guess.
+
+    Else each inverted unit is opened by `strokes` strokes, or the corners of every unit, near
+    and far, are at `corners` (rad).
+    """
+
+    strokes: float | None = None
+    corners: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A finger of one design with the patterns to solve; none stand for `few_patterns`.
+
+    The solver gets lengths in another unit, with `scale` of these units in a mm.
+    """
+
+    label: str
+    finger: Finger
+    patterns: tuple[str, ...] = ()
+    start: Start = Start()
+    scale: float = 1.0
+
+
+class Family(NamedTuple):
+    """Variants of a base finger in one property."""
+
+    name: str
+    variants: Callable[[Finger], Iterator[Variant]]
+
+
+def repeated(finger: Finger, n_units: int) -> Finger:
+    """A finger of n units that repeats those of another in turn."""
+    return finger.with_units([unit % finger.n_units for unit in range(n_units)])
+
+
+def changed(finger: Finger, **values: Array | float) -> Finger:
+    """The finger with other values, one for all units or one for each."""
+    columns = {name: np.reshape(np.asarray(v, float), (-1, 1)) for name, v in values.items()}
+    return finger.changed(**columns)
+
+
+def rigid(finger: Finger) -> Finger:
+    """The finger with bars that keep their lengths."""
+    return changed(finger, linear_stiffness=np.inf)
+
+
+def _with_bars(finger: Finger, ratio: float) -> Finger:
+    """The finger with bars so many times as stiff as its stiffest dome."""
+    return changed(finger, linear_stiffness=ratio * finger.bistable_stiffness.max())
+
+
+def _both(label: str, finger: Finger, **more: Any) -> Iterator[Variant]:
+    """The finger as it is, and with rigid bars."""
+    yield Variant(label, finger, **more)
+    if not finger.is_rigid:
+        yield Variant(f"{label}, k_L = ∞", rigid(finger), **more)
+
+
+def few_patterns(n_units: int, *, with_ground: bool = False) -> tuple[str, ...]:
+    """All units inverted, and every other one; of a long finger one unit in four.
+
+    With all inverted a long finger would run into itself.
+
+    >>> few_patterns(3), few_patterns(1, with_ground=True)
+    (('111', '101'), ('1', '0'))
+    """
+    if n_units >= LONG_FINGER:
+        return (("1000" * n_units)[:n_units],)
+    ground = ("0" * n_units,) if with_ground else ()
+    patterns = ("1" * n_units, ("10" * n_units)[:n_units], *ground)
+    return tuple(dict.fromkeys(patterns))
+
+
+def _patterns(base: Finger) -> Iterator[Variant]:
+    n = base.n_units
+    if n <= ALL_PATTERNS_UP_TO:
+        flags = inverted_units(np.arange(2**n, dtype=np.uint64), n)
+        chosen = tuple(text.decode() for text in texts(flags))
+    else:
+        ends = "1".ljust(n, "0"), "1".rjust(n, "0")
+        halves = ("1" * (n // 2)).ljust(n, "0"), ("1" * (n // 2)).rjust(n, "0")
+        chosen = ("0" * n, "1" * n, ("10" * n)[:n], ("01" * n)[:n], *ends, *halves)
+    yield Variant("as given", base, chosen)
+
+
+def _stiffness(base: Finger) -> Iterator[Variant]:
+    patterns = few_patterns(base.n_units, with_ground=True)
+    for exponent in range(16):
+        yield Variant(f"k_L/k_b = 1e{exponent}", _with_bars(base, 10.0**exponent), patterns)
+    yield Variant("k_L = ∞", rigid(base), patterns)
+
+
+def _linearity(base: Finger) -> Iterator[Variant]:
+    for value in (0.0, 1e-12, 1e-3, 0.03, 0.06, 0.09, 0.095, 0.1, 1 / 9, 0.12, 0.5, 1.0):
+        bent = changed(base, force_linearity=value)
+        patterns = few_patterns(base.n_units, with_ground=value > 0.1)
+        yield from _both(f"α = {value:.4g}", bent, patterns=patterns)
+
+
+def _stroke(base: Finger) -> Iterator[Variant]:
+    """Strokes up to half a turn of one unit; a softer hinge lets wide openings rest."""
+    for value in (1e-3, 1e-2, 0.1, 1.0):
+        yield from _both(f"d = {value:g} mm", changed(base, stroke=value))
+    height = base.segment_height.max()
+    for ratio, part in product((0.3, 0.6, 0.9, 1.1, 1.3, 1.6, 1.9, 2.2, 2.7), (1.0, 1e-2)):
+        hinge = part * base.hinge_stiffness
+        wide = changed(base, stroke=ratio * height, hinge_stiffness=hinge)
+        yield from _both(f"d = {ratio:g} H, {part:g} k_θ", wide)
+
+
+def _length(base: Finger) -> Iterator[Variant]:
+    for n in (1, 2, 5, 8, 13, 32, 64):
+        yield from _both(f"n = {n}", repeated(base, n))
+    yield Variant(
+        f"n = {LONG_FINGER}, in a ring", repeated(base, LONG_FINGER), ("1" * LONG_FINGER,)
+    )
+
+
+def _hinge(base: Finger) -> Iterator[Variant]:
+    for value in (0.0, 1e-9, 1e-6, 1e-3, 1.0, 10.0, 100.0, 1e6, 1e12):
+        bent = changed(base, hinge_stiffness=value)
+        patterns = few_patterns(base.n_units, with_ground=True)
+        yield from _both(f"k_θ = {value:g} N mm/rad", bent, patterns=patterns)
+
+
+def _scale(base: Finger) -> Iterator[Variant]:
+    for unit, scale in (("m", 1e-3), ("µm", 1e3), ("km", 1e-6), ("nm", 1e6)):
+        yield from _both(f"in {unit}", base, scale=scale)
+
+
+def _graded(base: Finger) -> Iterator[Variant]:
+    """Four units that differ by orders of magnitude, step by step or by turns."""
+    finger = repeated(base, N_GRADED)
+    steps, by_turns = np.logspace(-3.0, 3.0, N_GRADED), np.resize([1e-3, 1e3], N_GRADED)
+    fingers = {}
+    for words, factors in (("from 1e-3 to 1e3", steps), ("1e-3 and 1e3 by turns", by_turns)):
+        domes = factors[:, None] * finger.bistable_stiffness
+        hinges = factors[:, None] * finger.hinge_stiffness
+        fingers[f"k_b × {words}"] = changed(finger, bistable_stiffness=domes)
+        fingers[f"k_θ × {words}"] = changed(finger, hinge_stiffness=hinges)
+        both = changed(finger, bistable_stiffness=domes, hinge_stiffness=hinges)
+        fingers[f"k_b and k_θ × {words}"] = both
+    strokes, lengths = np.logspace(-2.0, 0.8, N_GRADED), np.logspace(2.0, -0.5, N_GRADED)
+    fingers["d from 0.01 to 6.3 mm"] = changed(finger, stroke=strokes)
+    fingers["L from 100 to 0.3 mm"] = changed(finger, segment_length=lengths)
+    linearities = np.resize([0.0, 0.2], N_GRADED)
+    fingers["α = 0 and 0.2 by turns"] = changed(finger, force_linearity=linearities)
+    for label, graded in fingers.items():
+        patterns = dict.fromkeys((*few_patterns(N_GRADED), _all_that_can(graded)))
+        yield from _both(label, graded, patterns=tuple(patterns))
+
+
+def _all_that_can(finger: Finger) -> str:
+    """The pattern with every unit inverted that has a second well with rigid bars."""
+    exists = np.broadcast_to(inverted_wells(finger).exists, (finger.n_units, 1))
+    return "".join("01"[has_well] for has_well in exists[:, 0].tolist())
+
+
+def _wells(base: Finger) -> Iterator[Variant]:
+    """Wells of nearly the same energy: α and the hinge's stiffness nearly zero."""
+    for linearity, part in ((1e-2, 1e-2), (1e-4, 1e-4), (1e-8, 1e-4), (0.0, 1e-4), (1e-12, 1e-6)):
+        hinge = part * base.hinge_stiffness
+        even = changed(base, force_linearity=linearity, hinge_stiffness=hinge)
+        yield from _both(f"α = {linearity:g}, {part:g} k_θ", even)
+
+
+def _guess(base: Finger) -> Iterator[Variant]:
+    """Starts away from the geometric guess, which between stiff bars is the answer already."""
+    for strokes in (0.5, 0.6, 0.75, 0.9, 1.0, 1.25, 1.5, 2.0):
+        yield from _both(
+            f"{strokes:g} stroke{'s' * (strokes != 1.0)}", base, start=Start(strokes=strokes)
+        )
+    for ratio in (1e6, 1e9, 1e12):
+        stiff = _with_bars(base, ratio)
+        yield Variant(f"1 stroke, k_L/k_b = {ratio:g}", stiff, start=Start(strokes=1.0))
+
+
+def _fold(base: Finger) -> Iterator[Variant]:
+    """The weakest unit alone, at and beyond the loss of its second well."""
+    unit = base.with_units([int(np.argmin(margins(base).force_linearity))])
+    folds = limits(unit)
+    stiff = _with_bars(unit, 1e9)
+    for name in FOLD_SYMBOLS:
+        limit = float(getattr(folds, name)[0])
+        yield from _approach("k_L = ∞", rigid(unit), name, limit)
+        yield from _approach("k_L/k_b = 1e9", stiff, name, limit)
+    soft = _with_bars(unit, 10.0)
+    yield from _approach("k_L/k_b = 10", soft, "force_linearity", _last_linearity(soft))
+    if not unit.is_rigid:
+        yield from _approach("own k_L", unit, "force_linearity", _last_linearity(unit))
+
+
+def _approach(bars: str, finger: Finger, name: str, limit: float) -> Iterator[Variant]:
+    """Variants with a value near its limit, on both sides; none without a limit."""
+    for distance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, -1e-12, -1e-7, -1e-2):
+        if limit > 0.0:
+            at = changed(finger, **{name: limit * (1.0 - distance)})
+            side = f"fold − {distance:g}" if distance > 0.0 else f"fold + {-distance:g}"
+            yield Variant(f"{FOLD_SYMBOLS[name]} at {side}, {bars}", at, ("1",))
+
+
+def _last_linearity(unit: Finger) -> float:
+    """The largest α with which a unit with elastic bars still rests beyond its barrier."""
+
+    def rests(linearity: Array) -> Flags:
+        units = Units.of(changed(unit, force_linearity=linearity))
+        settled = settle(units, chain_potential, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
+        is_stable: Flags = settled.status[0] == Status.STABLE
+        return is_stable
+
+    return last_where(rests, np.array(0.0), np.array(1.0)).item()
+
+
+def _crossed(base: Finger) -> Iterator[Variant]:
+    """Units equally near to their loss of bistability, between bars from soft to very stiff."""
+    grades = np.linspace(0.7, 1.4, N_GRADED)
+    uniform, graded = repeated(base, N_GRADED), repeated(base.with_units([0]), N_GRADED)
+    fingers = {
+        "1 unit": base.with_units([0]),
+        "1 unit of short stroke": changed(
+            base.with_units([0]), stroke=0.07 * base.segment_height[0]
+        ),
+        f"{N_GRADED} units": uniform,
+        f"{N_GRADED} graded units": changed(
+            graded,
+            stroke=grades * graded.stroke[0],
+            bistable_stiffness=grades[::-1] * graded.bistable_stiffness[0],
+        ),
+    }
+    for (label, finger), distance in product(fingers.items(), CROSSED_DISTANCES):
+        near = changed(finger, force_linearity=limits(finger).force_linearity * (1.0 - distance))
+        side = f"{label}, α at fold {'−' if distance > 0.0 else '+'} {abs(distance):g}"
+        for ratio in CROSSED_RATIOS:
+            yield Variant(f"{side}, k_L/k_b = {ratio:g}", _with_bars(near, ratio))
+        yield Variant(f"{side}, k_L = ∞", rigid(near))
+
+
+def _mirror(base: Finger) -> Iterator[Variant]:
+    """One unit from impossible shapes, each next to a minimum of the equations."""
+    unit = base.with_units([0])
+    for name, (corners, pattern) in FOLDED_STARTS.items():
+        yield from _both(f"from {name}", unit, patterns=(pattern,), start=Start(corners=corners))
+
+
+PATTERNS = Family("patterns", _patterns)  # states of the finger as it is given
+FAMILIES = (
+    Family("stiffness", _stiffness),  # k_L/k_b from 1 to 1e15, and infinite
+    Family("linearity", _linearity),  # α from 0 through the loss of bistability to 1
+    Family("stroke", _stroke),  # d from 1e-3 mm to more than twice the height
+    Family("length", _length),  # 1 to 64 units
+    Family("hinge", _hinge),  # k_θ from 0 to 1e12 N mm/rad
+    Family("scale", _scale),  # lengths in m, µm, km and nm give the answer in mm
+    Family("graded", _graded),  # units that differ by orders of magnitude
+    Family("wells", _wells),  # two wells of nearly the same energy
+    Family("guess", _guess),  # searches that begin at 0.5 to 2 strokes
+    Family("fold", _fold),  # α, k_θ and d at the loss of bistability, to 1e-12 of it
+    Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
+    Family("mirror", _mirror),  # searches that begin folded through or mirrored
+)

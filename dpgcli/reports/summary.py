@@ -1,0 +1,263 @@
+"""The summary of a design space: sections of text and tables, which `page` renders.
+
+Same table and facts, same sections: what differs between runs comes from the facts alone.
+"""
+
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.design.scene import Origin
+from dpgcli.sweeps.gate import swept_names
+
+METRICS = {  # whether the largest value is the best one, or else the one nearest zero
+    "workspace_area_mm2": True,
+    "n_distinct_tips": True,
+    "reach_max_mm": True,
+    "reach_min_mm": False,
+    "stiffness_min_N_per_mm": True,
+    "stiffness_max_N_per_mm": True,
+    "min_barrier_mJ": True,
+    "aperture_max_mm": True,
+    "aperture_min_mm": False,
+}
+ERRORS = ("max_residual_N", "max_tip_error_mm")
+STATUSES = ("stable", "partly_stable", "invalid", "excluded", "failed")
+BOUNDARY_STATUSES = ("stable", "partly_stable", "invalid")
+WITHOUT_REASON = {
+    "excluded": "a constraint is not met",
+    "partly_stable": "some patterns have no certified state; states.parquet says why",
+}
+RELATIVE_EQUALITY = 1e-9  # relative
+MOST_ROWS = 30
+LONGEST_LIST = 500  # characters
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+class Table(NamedTuple):
+    """Cells of text under a head."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+class Section(NamedTuple):
+    """Paragraphs and tables under a title."""
+
+    title: str
+    blocks: Sequence[str | Table]
+
+
+@dataclass(frozen=True)
+class DesignSpace:
+    """A table of designs with the units of its columns, and its numbers as text."""
+
+    designs: pd.DataFrame
+    units: Mapping[str, str]
+
+    @property
+    def swept(self) -> list[str]:
+        return swept_names(self.designs)
+
+    @property
+    def usable(self) -> pd.DataFrame:
+        """Designs that have a state, thus metrics."""
+        return self.designs[self.designs["n_stable"] > 0]
+
+    def of_status(self, *statuses: str) -> pd.DataFrame:
+        return self.designs[self.designs["status"].isin(statuses)]
+
+    def shown(self, name: str, value: float) -> str:
+        """A value of a column with its unit."""
+        text = str(value) if isinstance(value, int | np.integer) else f"{value:.5g}"
+        return f"{text} {self.units.get(name, '')}".rstrip()
+
+    def span(self, name: str, designs: pd.DataFrame) -> str:
+        """Smallest to largest value of a column."""
+        column: Any = designs[name]
+        low, high = column.min(), column.max()
+        return self.shown(name, low) if low == high else f"{low:.5g} … {self.shown(name, high)}"
+
+    def number(self, row: Any) -> str:
+        """The number of the design in a row."""
+        return str(self.designs.at[row, "design"])
+
+    def point(self, row: Any) -> list[str]:
+        """The swept values of the design in a row."""
+        return [self.shown(name, self.designs[name][row]) for name in self.swept]
+
+    def label(self, name: str) -> str:
+        """A column in words, for an axis.
+
+        >>> DesignSpace(pd.DataFrame(), {"dome_height_mm": "mm"}).label("dome_height_mm")
+        'dome height (mm)'
+        """
+        unit = self.units.get(name, "")
+        spelled = unit.replace("/", "_per_").replace("²", "2").replace(" ", "_").replace("°", "deg")
+        words = name.removesuffix(f"_{spelled}").removeprefix("n_").replace("_", " ")
+        return f"{words} ({unit})" if unit else words
+
+
+def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Section]:
+    """All sections about a space; `facts` are those of the run that made it."""
+    counted = Section("Design space", [_extent(space)])
+    if not len(space.designs):
+        return [counted, *_times(facts)]
+    return [
+        counted,
+        Section("Designs by status and calibration", [_counts(space)]),
+        Section("Best and worst designs", _extremes(space)),
+        Section("What failed and why", _failures(space)),
+        Section("Where bistability ends", _bistability(space)),
+        Section("Largest numerical error", _errors(space)),
+        *_times(facts),
+    ]
+
+
+def _extent(space: DesignSpace) -> str:
+    n_designs = len(space.designs)
+    if not n_designs:
+        return "0 designs."
+    spans = [
+        f"{name} ({space.span(name, space.designs)}, {space.designs[name].nunique():,} values)"
+        for name in space.swept
+    ]
+    return f"{n_designs:,} designs over {', '.join(spans)}."
+
+
+def _counts(space: DesignSpace) -> Table:
+    counts = pd.crosstab(space.designs["status"], space.designs["calibration"])
+    kinds = [*(o.value for o in Origin if o.value in counts), *(k for k in counts if k == "")]
+    head = ["status", "designs", *(kind or "not solved" for kind in kinds)]
+    rows = [
+        [status, *(f"{n:,}" for n in (counts.loc[status].sum(), *counts.loc[status, kinds]))]
+        for status in STATUSES
+        if status in counts.index
+    ]
+    return Table(head, rows)
+
+
+def _extremes(space: DesignSpace) -> list[str | Table]:
+    metrics = {name: order for name, order in METRICS.items() if name in space.designs}
+    rows = [row for name, order in metrics.items() for row in _extreme_rows(space, name, order)]
+    small = [name for name, is_largest_best in metrics.items() if not is_largest_best]
+    text = "The largest value counts as best"
+    text += f", of {' and '.join(small)} the one nearest zero." if small else "."
+    return [text, Table(["metric", "", "value", "design", *space.swept], rows)]
+
+
+def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[list[str]]:
+    values = space.usable[name].dropna()
+    if values.empty:
+        return
+    merit = values if is_largest_best else -values.abs()
+    ends = {"best": merit.max(), "worst": merit.min()}
+    if is_alike(merit):
+        ends = {"all alike": merit.max()}
+    for word, end in ends.items():
+        alike = values.index[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
+        others = f" and {len(alike) - 1:,} more" if len(alike) > 1 else ""
+        value = space.shown(name, values[alike[0]])
+        yield [name, word, value, space.number(alike[0]) + others, *space.point(alike[0])]
+
+
+def is_alike(values: Any) -> bool:
+    """Whether values differ by no more than rounding."""
+    return bool(np.isclose(values.max(), values.min(), rtol=RELATIVE_EQUALITY, atol=0))
+
+
+def _failures(space: DesignSpace) -> list[str | Table]:
+    """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
+    others = space.of_status(*STATUSES[1:])
+    if others.empty:
+        return ["Every design is stable."]
+    masked = others["reason"].map(lambda reason: NUMBER.sub("#", reason))
+    groups = [(len(g), g.index[0]) for _, g in others.groupby([others["status"], masked])]
+    rows = []
+    for count, row in sorted(groups, key=lambda group: (-group[0], group[1])):
+        status, reason = others.loc[row, ["status", "reason"]]
+        why = reason or WITHOUT_REASON.get(status, "")
+        rows.append([status, f"{count:,}", why, space.number(row), *space.point(row)])
+    head = ["status", "designs", "reason, as of the example", "example", *space.swept]
+    return shortened(Table(head, rows[:MOST_ROWS]), len(rows))
+
+
+def _bistability(space: DesignSpace) -> list[str | Table]:
+    judged = space.of_status(*BOUNDARY_STATUSES)
+    found = [status for status in BOUNDARY_STATUSES if (judged["status"] == status).any()]
+    if found == ["stable"]:
+        return ["Nowhere in this space: every design in it is stable."]
+    if "stable" not in found:
+        return ["No design in this space is stable."]
+    rows = [
+        [name, *(space.span(name, judged[judged["status"] == status]) for status in found)]
+        for name in space.swept
+    ]
+    return [Table(["range of", *found], rows), *_boundary(space, judged)]
+
+
+def _boundary(space: DesignSpace, judged: pd.DataFrame) -> list[str | Table]:
+    """Runs of stable designs along one swept value, for each value of the other."""
+    if not 1 <= len(space.swept) <= 2:
+        return []
+    *fixed, along = sorted(space.swept, key=lambda name: judged[name].nunique())
+    if fixed and judged[fixed[0]].nunique() > MOST_ROWS:
+        return []
+    rows = []
+    for line in (g for _, g in judged.groupby(fixed)) if fixed else [judged]:
+        line = line.sort_values(along, kind="stable")
+        at = [space.span(name, line) for name in fixed]
+        runs = list(_stable_runs(line[along].to_numpy(), (line["status"] == "stable").to_numpy()))
+        rows += [
+            [*at, *("–" if value is None else space.shown(along, value) for value in run)]
+            for run in runs or [(None, None, None, None)]
+        ]
+    head = [*fixed, "not stable up to", "stable from", "stable to", "not stable from"]
+    text = f"Along {along}; – where the space ends first or nothing is stable."
+    return [text, *shortened(Table(head, rows[:MOST_ROWS]), len(rows))]
+
+
+def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None, ...]]:
+    """The value before each run of stable ones, its first and last, and the value behind it."""
+    ends = np.flatnonzero(np.diff(is_stable.astype(int), prepend=0, append=0))
+    padded = [None, *values.tolist(), None]
+    for start, stop in ends.reshape(-1, 2).tolist():
+        yield padded[start], padded[start + 1], padded[stop], padded[stop + 1]
+
+
+def _errors(space: DesignSpace) -> list[str | Table]:
+    rows = []
+    for name in ERRORS:
+        values: Any = space.usable[name].dropna() if name in space.designs else ()
+        if len(values):
+            row = values.idxmax()
+            value = space.shown(name, values[row])
+            rows.append([name, value, space.number(row), *space.point(row)])
+    return [Table(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]
+
+
+def _times(facts: Mapping[str, Any] | None) -> list[Section]:
+    rows = [[key.replace("_", " "), _fact(key, value)] for key, value in (facts or {}).items()]
+    return [Section("The run", [Table(["", "value"], rows)])] if rows else []
+
+
+def _fact(key: str, value: Any) -> str:
+    if isinstance(value, list):
+        text = shlex.join(map(str, value)) or "none"
+        return text if len(text) < LONGEST_LIST else f"{text[:LONGEST_LIST]} …"
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_fact(name, part)}" for name, part in value.items())
+    unit = " s" if key.endswith("seconds") else "/s" if key.endswith("_per_second") else ""
+    return (f"{value:.5g}" if isinstance(value, float) else str(value)) + unit
+
+
+def shortened(table: Table, n_rows: int) -> list[str | Table]:
+    """A table, and a line that counts the rows left out."""
+    n_more = n_rows - len(table.rows)
+    return [table, f"And {n_more:,} more."] if n_more else [table]

@@ -1,0 +1,300 @@
+"""Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
+from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
+from dpgcli.design.resolve import resolve
+from dpgcli.design.scene import ORIGINS, Scene
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.quantities import Quantity, declared
+from dpgcli.states.rungs import exactnesses
+from dpgcli.states.units import Units
+from dpgcli.sweeps.designs import design_states
+from dpgcli.sweeps.expressions import Expression
+from dpgcli.sweeps.metrics import DESIGN_COLUMNS
+from dpgcli.sweeps.space import Space
+
+Numbers = NDArray[Any]
+
+
+class DesignStatus(StrEnum):
+    """What became of a design."""
+
+    STABLE = "stable"
+    PARTLY_STABLE = "partly_stable"
+    INVALID = "invalid"
+    EXCLUDED = "excluded"
+    FAILED = "failed"
+
+
+DESIGN_STATUS_MEANINGS = {
+    DesignStatus.STABLE: "every pattern has its certified state",
+    DesignStatus.PARTLY_STABLE: "some patterns have none",
+    DesignStatus.INVALID: "no such finger can exist; `reason` says why",
+    DesignStatus.EXCLUDED: "a constraint is not met",
+    DesignStatus.FAILED: "evaluating it killed its worker, twice",
+}
+
+
+class Tables(NamedTuple):
+    """Rows of states and of designs."""
+
+    states: Columns
+    designs: Columns
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Evaluates designs around a base, given the values of its keys that change.
+
+    `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
+    a design that has a value which its key cannot have, from its values. `values` are the columns
+    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest rung
+    that is bounded by it.
+    """
+
+    base: Design
+    known: Mapping[str, float]
+    reason_against: Callable[[Mapping[str, float]], str]
+    values: Mapping[str, Column]
+    constraints: tuple[Expression, ...]
+    tolerance: float
+    target_error: float | None = None
+
+    @property
+    def groups(self) -> frozenset[Group]:
+        gripper = {Group.GRIPPER} if self.base.gripper else set()
+        return frozenset({Group.STATES, Group.STIFFNESS, *gripper})
+
+    @property
+    def state_columns(self) -> tuple[Column, ...]:
+        """Columns of the table of states: the design, its values, what `predict` gives."""
+        return (DESIGN, *self.values.values(), CALIBRATION, *self.quantities)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is told of each state."""
+        every = declared(1, (), bool(self.base.gripper))
+        return tuple(quantity for quantity in every if quantity.group in self.groups)
+
+    @property
+    def design_columns(self) -> tuple[Column, ...]:
+        """Columns of the table of designs."""
+        metrics = (c for c in DESIGN_COLUMNS if c.group in self.groups)
+        rung = () if self.target_error is None else RUNG_COLUMNS
+        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
+
+    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Iterator[Tables]:
+        """Rows of designs numbered from `start` on, with these values by key.
+
+        One design comes in blocks of its states, the row of the design with the last.
+        """
+        keep_freed_memory()
+        n_designs = len(next(iter(values.values())))
+        allowed = self.allowed(values)
+        batches, origins, reasons = self._resolved(values, allowed)
+        names = np.array([b"", *(origin.encode() for origin in ORIGINS)])
+        described = {**self._described(start, values), "calibration": names[origins + 1]}
+        waiting: list[_Solved] = []
+        for part in (part for batch in batches for part in self._solved(*batch)):
+            if part.metrics is None and n_designs == 1:
+                yield Tables(self._state_rows(described, [part]), self._no_designs)
+            else:
+                waiting.append(part)
+        yield Tables(
+            self._state_rows(described, waiting),
+            self._design_rows(described, waiting, allowed, reasons),
+        )
+
+    def _resolved(
+        self, values: Mapping[str, Numbers], allowed: Flags
+    ) -> "tuple[list[tuple[Indices, Scene]], Indices, dict[int, str]]":
+        """Designs that share a batch, by their places, with what they describe.
+
+        And by place the gravest origin among a design's values, in `ORIGINS`, −1 for those that are
+        wrong, and what is wrong with them.
+        """
+        batches: list[tuple[Indices, Scene]] = []
+        origins = np.full(len(allowed), -1)
+        possible = allowed & self._are_possible(values)
+        reasons = {
+            place: self.reason_against({k: _said(k, v[place].item()) for k, v in values.items()})
+            for place in np.flatnonzero(allowed & ~possible).tolist()
+        }
+        for places, design in self._designs(values, np.flatnonzero(possible)):
+            found = resolve(design)
+            for index in np.flatnonzero(found.are_wrong).tolist():
+                issues = found.problems.of(index)
+                reasons[int(places[index])] = "; ".join(issue.statement for issue in issues)
+            right = np.flatnonzero(~found.are_wrong)
+            origins[places[right]] = found.gravest_origins[right]
+            batches += [(places[alike], found.batch(alike)) for alike in found.alike(right)]
+        return batches, origins, reasons
+
+    def _designs(
+        self, values: Mapping[str, Numbers], places: Indices
+    ) -> Iterator[tuple[Indices, Design]]:
+        """The designs at some places, by their number of units."""
+        columns = {key: column[places] for key, column in values.items()}
+        units = columns.pop(UNITS, np.full(len(places), self.base.units))
+        for n_units in np.unique(units).tolist():
+            here = np.flatnonzero(units == n_units)
+            own = {key: column[here] for key, column in columns.items()}
+            base = replace(self.base, units=int(n_units), n_designs=len(here))
+            yield places[here], base.with_values(own)
+
+    def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
+        """Which designs have only values that their keys can have."""
+        own = (key.removeprefix("gripper.") for key in values if key.startswith("gripper."))
+        gripper = {*self.base.gripper, *own}
+        is_placed = not gripper or "base_spacing_mm" in gripper
+        possible = np.full(len(next(iter(values.values()))), is_placed)
+        for key, column in values.items():
+            possible &= are_possible(key.rsplit(".", 1)[-1], column)
+        return possible
+
+    def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
+        """The rows of one design that cannot be evaluated at all."""
+        described = {**self._described(design, values), "calibration": np.array([b""])}
+        rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
+        rows["status"] = np.array([DesignStatus.FAILED.encode()])
+        return Tables(self._state_rows(described, []), rows)
+
+    @property
+    def _no_designs(self) -> Columns:
+        return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.design_columns}
+
+    def _described(self, start: int, values: Mapping[str, Numbers]) -> Columns:
+        numbers = np.arange(start, start + len(next(iter(values.values()))))
+        return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
+
+    def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
+        """Which designs meet all constraints; names may be dotted keys or their last part."""
+        n_designs = len(next(iter(values.values())))
+        known: dict[str, Any] = {**self.known, **values}
+        short = {key.rsplit(".", 1)[-1]: value for key, value in known.items()}
+        allowed = np.ones(n_designs, bool)
+        for rule in self.constraints:
+            met = np.asarray(rule({**short, **known}), float)
+            allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
+        return allowed
+
+    def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
+        found = exactnesses(Units.of(scene.finger), self.tolerance, self.target_error)
+        for some, exactness in found:
+            alike = scene if len(some) == len(places) else scene.take_lanes(some)
+            for block in design_states(alike, exactness, self.quantities):
+                if block.metrics is not None and exactness.rung is not None:
+                    name = np.full(len(block.places), exactness.rung.name, "S24")
+                    block.metrics["rung"] = name
+                    block.metrics["error_bound_mm"] = exactness.error_bounds[block.places]
+                yield _Solved(places[some][block.places], block.rows, block.metrics)
+
+    def _state_rows(self, described: Columns, solved: "list[_Solved]") -> Columns:
+        """Rows of all groups, brought back into the order of the designs."""
+        if not solved:
+            return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.state_columns}
+        repeats = [len(part.rows["pattern"]) // len(part.places) for part in solved]
+        owner = np.concatenate(
+            [np.repeat(part.places, n) for part, n in zip(solved, repeats, strict=True)]
+        )
+        order: slice | Indices = slice(None)
+        if (owner[1:] < owner[:-1]).any():
+            order = np.argsort(owner, kind="stable")
+            owner = owner[order]
+        return {
+            column.name: described[column.name][owner]
+            if column.name in described
+            else np.concatenate([part.rows[column.name] for part in solved])[order]
+            for column in self.state_columns
+        }
+
+    def _design_rows(
+        self,
+        described: Columns,
+        solved: "list[_Solved]",
+        allowed: NDArray[np.bool_],
+        reasons: Mapping[int, str],
+    ) -> Columns:
+        n_designs = len(described["design"])
+        stable, partly, invalid, excluded, _ = (status.encode() for status in DesignStatus)
+        status = np.where(allowed, invalid, excluded).astype("S16")
+        rows = dict(described)
+        finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
+        for column in self.design_columns[len(described) + 2 :]:
+            values = np.full(n_designs, EMPTY.get(column.kind, np.nan), _dtype(column.kind))
+            for places, metrics in finished:
+                values[places] = metrics[column.name]
+            rows[column.name] = values
+        for places, metrics in finished:
+            complete = metrics["n_stable"] == metrics["n_states"]
+            status[places] = np.where(complete, stable, partly)
+        rows["status"] = status
+        texts = [text.encode() for text in reasons.values()]
+        reason = np.zeros(n_designs, f"S{max(map(len, texts), default=1)}")
+        reason[list(reasons)] = texts
+        rows["reason"] = reason
+        return {column.name: rows[column.name] for column in self.design_columns}
+
+
+DESIGN = Column("design", "", "number in the order of the space", Group.STATES, Kind.COUNT)
+CALIBRATION = Column(
+    "calibration", "", "gravest origin of a spring constant", Group.STATES, Kind.TEXT
+)
+STATUS = Column("status", "", "what became of the design", Group.STATES, Kind.TEXT)
+RUNG_COLUMNS = (
+    Column("rung", "", "way chosen for the target error", Group.STATES, Kind.TEXT),
+    Column("error_bound_mm", "mm", "bound on the tips' error before the work", Group.STATES),
+)
+EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
+REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TEXT)
+
+
+class _Solved(NamedTuple):
+    """Designs at some places of a chunk: rows of their states, and, with the last, metrics."""
+
+    places: Numbers
+    rows: Columns
+    metrics: Columns | None
+
+
+def value_columns(space: Space) -> dict[str, Column]:
+    """A column for each key of a space: named by its last part where that is enough.
+
+    What some units override keeps its whole key: the last part is that of the others too.
+    """
+    last = [key.rsplit(".", 1)[-1] for key in space.keys]
+    first = space.designs(0, 1)
+    return {
+        key: Column(
+            short if last.count(short) == 1 and ".overrides." not in key else key,
+            unit_of(key),
+            f"value of {key}",
+            Group.STATES,
+            Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
+        )
+        for key, short in zip(space.keys, last, strict=True)
+    }
+
+
+def _said(key: str, value: float) -> float:
+    """A value as a spec has it: numbers of units are whole, in a list with fractions, too."""
+    return int(value) if key == UNITS and float(value).is_integer() else value
+
+
+def _dtype(kind: Kind) -> str:
+    types = {
+        Kind.PATTERN: "S1",
+        Kind.STATUS: "u1",
+        Kind.TEXT: "S24",
+        Kind.COUNT: "i8",
+        Kind.FLAG: "?",
+    }
+    return types.get(kind, "f8")

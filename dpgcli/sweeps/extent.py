@@ -1,0 +1,132 @@
+"""How much a sweep is, before it is begun: its longest finger, states, time; what is too much."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.design.dimensions import MAX_UNITS, UNITS
+from dpgcli.errors import UsageError
+from dpgcli.states.costs import UNIT_STATE_SECONDS
+from dpgcli.states.patterns import MOST_SELECTED
+from dpgcli.sweeps.executors import chunked
+from dpgcli.sweeps.space import Space
+
+DESIGN_SECONDS = 2e-5  # of a design, its states aside; measured
+BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
+PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
+MOST_CHUNKS = 10**6  # days of work, and a file each
+MOST_SENT = 2**22  # states of a design, about 250 MB
+MOST_ASKED = 10**6  # designs that are held against constraints before the work
+LONG = 15  # units, from which on the longest finger matters
+ASKED_AT_ONCE = 2**14
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a sweep takes; constraints count where there are long fingers that they may exclude.
+
+    `base_units` is the number of units where the space leaves it alone. `allowed` says, if there
+    are constraints, which designs meet them, from their values by key.
+    """
+
+    space: Space
+    base_units: int
+    allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]] | None = None
+
+    @cached_property
+    def most_units(self) -> int:
+        """Units of the longest finger."""
+        longest = max(self._units, default=1)
+        size = self.space.size
+        if longest < LONG or self.allowed is None or size > MOST_ASKED:
+            return longest
+        return max(self._allowed_units(self.allowed), default=1)
+
+    @property
+    def n_states(self) -> int:
+        """States of all designs up to the longest, had no constraint anything against them."""
+        size, longest = self.space.size, self.most_units
+        states = sum(count << n for n, count in self._units.items() if n <= longest)
+        return states * size // len(self._axis)
+
+    @property
+    def bytes_needed(self) -> int:
+        """Of the disk, at most at once."""
+        return 2 * self.n_states * BYTES_PER_STATE
+
+    @property
+    def bytes_in_memory(self) -> int:
+        """Of the largest process: libraries and blocks, the axes, the table of designs at the end.
+
+        Workers hold one block of states each, a third of that.
+        """
+        space = self.space
+        numbers = sum(len(axis) * len(axis.values) for axis in space.axes)
+        of_designs = space.size * (DESIGN_BYTES + VALUE_BYTES * len(space.keys))
+        return PROCESS_BYTES + 8 * numbers + of_designs
+
+    @property
+    def seconds(self) -> float:
+        """Of one core; rough, good to a factor of two either way."""
+        of_states = self.n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
+        return self.space.size * DESIGN_SECONDS + of_states
+
+    def check(self, chunk_size: int, *, is_sent: bool) -> None:
+        """Refuse what no machine should begin; raises UsageError.
+
+        `is_sent` says that workers send what they have done, each design in one piece.
+        """
+        size, n_chunks = self.space.size, self.space.size // chunk_size
+        if n_chunks > MOST_CHUNKS:
+            raise UsageError(
+                f"{size:,} designs in {n_chunks:,} chunks of work: expected at most "
+                f"{MOST_CHUNKS:,}; take fewer values or units"
+            )
+        n_states, most = 2**self.most_units, MOST_SENT if is_sent else MOST_SELECTED
+        if n_states > most:
+            what = "that a worker of a cluster can send" if is_sent else "that a design may have"
+            raise UsageError(
+                f"a finger of {self.most_units} units has {n_states:,} states, more than the "
+                f"{most:,} {what}: take fewer units, or exclude long fingers by a constraint"
+            )
+
+    @property
+    def _axis(self) -> NDArray[Any]:
+        """The numbers of units at the points of their axis, or that of the base."""
+        swept = (axis.values[UNITS] for axis in self.space.axes if UNITS in axis.values)
+        return next(swept, np.array([self.base_units]))
+
+    @cached_property
+    def _units(self) -> dict[int, int]:
+        return _counted(self._axis)
+
+    def _allowed_units(
+        self, are_allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]]
+    ) -> Iterator[int]:
+        """Numbers of units that some design has which no constraint excludes."""
+        space = self.space
+        for chunk in chunked([(0, space.size)], ASKED_AT_ONCE):
+            values = space.designs(chunk.start, chunk.stop)
+            allowed = are_allowed(values)
+            units = values.get(UNITS, np.full(len(allowed), self.base_units))
+            yield from _counted(units[allowed])
+
+
+def size_text(n_bytes: float) -> str:
+    """A number of bytes as people say it."""
+    for unit in ("bytes", "KiB", "MiB", "GiB"):
+        if n_bytes < 1024:
+            return f"{n_bytes:.2g} {unit}" if n_bytes < 10 else f"{n_bytes:.0f} {unit}"
+        n_bytes /= 1024
+    return f"{n_bytes:,.4g} TiB"
+
+
+def _counted(units: NDArray[Any]) -> dict[int, int]:
+    """How many of these numbers of units are which, of those that a finger can have."""
+    possible = units[(units >= 1) & (units <= MAX_UNITS)]
+    values, counts = np.unique(possible.astype(np.int64), return_counts=True)
+    return dict(zip(values.tolist(), counts.tolist(), strict=True))

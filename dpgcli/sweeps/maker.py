@@ -1,0 +1,72 @@
+"""Who makes the numbers of a sweep: versions and code, so that nobody else's are taken for them."""
+
+import os
+import pkgutil
+import platform
+import sys
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import dpgcli
+from dpgcli.code import PACKAGE, sha256_of_code
+from dpgcli.errors import WorkplaceError
+from dpgcli.sweeps.executors import Workplace
+
+NO_NUMBERS = (
+    "api",
+    "benchmark",
+    "cli",
+    "hard_cases",
+    "reference",
+    "reports",
+)  # parts of the package that no number passes through
+
+
+class Maker(NamedTuple):
+    """Versions of the package and of NumPy, and the SHA-256 of the package's code."""
+
+    dpg: str
+    numpy: str
+    code: str
+
+    def __str__(self) -> str:
+        return f"dpg {self.dpg}, NumPy {self.numpy}, code {self.code[:8]}"
+
+
+def code_of(package: Path) -> str:
+    """SHA-256 of all modules of a package that its numbers come from.
+
+    Not `NO_NUMBERS`, so that work on what is printed leaves finished parts as they are.
+    """
+    return sha256_of_code(package, NO_NUMBERS)
+
+
+# who works in this process, found when it began to: its files may have changed since
+HERE = Maker(dpgcli.__version__, np.__version__, code_of(PACKAGE))
+# asked with a function that every Python has: one of this package would end a worker without it
+WHO = partial(pkgutil.resolve_name, f"{__name__}:HERE")
+
+
+def check_maker(maker: Maker) -> None:
+    """Raise WorkplaceError in a worker that is not the one who is to make the numbers."""
+    if maker != HERE:
+        where = f"{platform.node()}, process {os.getpid()}, Python in {sys.prefix}"
+        raise WorkplaceError(_mixed(f"a worker ({where})", str(HERE), maker))
+
+
+def check_workers(workplace: Workplace) -> None:
+    """Ask all workers that are there; raises WorkplaceError for the first that is another."""
+    for worker, maker in workplace.ask(WHO).items():
+        if maker != HERE:
+            says = str(maker) if isinstance(maker, Maker) else f"another dpg, or none ({maker!r})"
+            raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE))
+
+
+def _mixed(who: str, has: str, maker: Maker) -> str:
+    return (
+        f"{who} has {has}, but this sweep is of {maker}: their numbers may differ; "
+        "install one package everywhere and restart its workers"
+    )
