@@ -102,7 +102,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     text = io.StringIO()
     yaml.dump(content, text)
     with whole_file(path, Mark.CALIBRATION) as new:
-        new.write_bytes(sealed(text.getvalue()).encode())
+        new.write_text(sealed(text.getvalue()), encoding="utf-8", newline="\n")
 
 
 def read_calibration(path: str | Path) -> Calibration:
@@ -111,8 +111,8 @@ def read_calibration(path: str | Path) -> Calibration:
     What `dpg fit` wrote has its SHA-256 in the last line: values that were cut off would else be
     taken from the next calibration, in silence. Files of an earlier version have none.
 
-    >>> read_calibration("configs/calibration/push_3.5mm.yaml").has("stroke_mm")
-    True
+    >>> read_calibration("configs/calibration/push_3.5mm.yaml").values["stroke_mm"].value
+    3.5
     """
     file, text = read_text(path)
     is_whole = is_whole_text(text)
