@@ -111,7 +111,7 @@ def read_calibration(path: str | Path) -> Calibration:
     What `dpg fit` wrote has its SHA-256 in the last line: values that were cut off would else be
     taken from the next calibration, in silence. Files of an earlier version have none.
 
-    >>> read_calibration("configs/calibration/push_3.5mm.yaml").values["stroke_mm"].value
+    >>> read_calibration("configs/calibration/push_3.5mm.yaml").values.stroke_mm.value
     3.5
     """
     file, text = read_text(path)
