@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
@@ -104,7 +103,7 @@ def test_tip_error_covers_the_true_error_of_random_four_unit_fingers(
     random = np.random.default_rng(seed)
     finger = graded_finger(4, seed, 12.84 * 10.0 ** random.uniform(1, 9))
     inverted = random.random((4, 1)) < 0.6
-    error, stated = true_and_stated_errors(finger, inverted, Chain, extended_state)
+    error, stated = true_and_stated_errors(finger, inverted, chain_potential, extended_state)
     assert error <= stated < 1e-9
 
 
