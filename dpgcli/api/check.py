@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from dpgcli.api.tables import Table
 from dpgcli.errors import UsageError
 from dpgcli.files.table_reader import designs_in, read_designs
-from dpgcli.sweeps.gate import Verdict, check_designs
+from dpgcli.sweeps.gate import RequirementVerdict, check_designs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,7 +16,7 @@ DesignsInput: TypeAlias = str | Path | Table | Any
 """The designs.parquet of a sweep, or its content: of pandas, of Arrow, or a Table."""
 
 
-def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[Verdict, ...]:
+def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[RequirementVerdict, ...]:
     """Hold every design of a table against requirements, one verdict each.
 
     Raises UsageError for what is no table of designs or no requirement, NothingSelectedError

@@ -34,7 +34,7 @@ from dpgcli.studies.sweep import (
     stores,
 )
 from dpgcli.sweeps import cluster, executors
-from dpgcli.sweeps.executors import Workplace
+from dpgcli.sweeps.executors import Backend
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
@@ -205,7 +205,7 @@ class Place:
         """Whether designs are sent to other machines."""
         return self.executor == "dask"
 
-    def workplace(self, say: Say) -> Workplace:
+    def workplace(self, say: Say) -> Backend:
         """The workers, found or about to be started; `say` hears of those that are waited for."""
         if self.scheduler is not None:
             return self._cluster(self.scheduler, say)
@@ -214,7 +214,7 @@ class Place:
             return executors.serial()
         return executors.processes(n_workers)
 
-    def _cluster(self, scheduler: str, say: Say) -> Workplace:
+    def _cluster(self, scheduler: str, say: Say) -> Backend:
         try:
             return cluster.dask_cluster(scheduler, WAIT if self.wait is None else self.wait, say)
         except ImportError as error:

@@ -18,7 +18,7 @@ class Table:
     """Rows of named columns; unit and meaning of each are in the Arrow field's metadata.
 
     >>> from dpgcli.states.columns import Group
-    >>> tip = Column("tip_x_mm", "mm", "x of the tip", Group.STATES)
+    >>> tip = Column("tip_x_mm", "mm", "x of the tip")
     >>> table = Table.of((tip,), {"tip_x_mm": np.array([40.5, 38.0])})
     >>> table, table["tip_x_mm"].tolist(), table.units["tip_x_mm"]
     (Table(2 rows: tip_x_mm), [40.5, 38.0], 'mm')

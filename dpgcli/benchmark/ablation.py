@@ -34,7 +34,7 @@ class Ablation(NamedTuple):
     bound: float
 
 
-def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Plan, Trial]:
+def check_ablation(scene: Scene, name: str, target_error: float | None) -> tuple[Plan, Trial]:
     """The plan, and the trial that restores a simplification by its name.
 
     Raises UsageError for a name that is none of `ABLATIONS`, or that the scene does not leave out.
@@ -55,12 +55,12 @@ def check_kept(scene: Scene, name: str, target_error: float | None) -> tuple[Pla
     return plan, kept
 
 
-def kept_ways(scene: Scene, name: str, target_error: float | None) -> tuple[Ablation, Ablation]:
+def ablations(scene: Scene, name: str, target_error: float | None) -> tuple[Ablation, Ablation]:
     """The prediction as planned, for the target error (mm) if any, and with one part restored.
 
-    Raises UsageError as `check_kept` does.
+    Raises UsageError as `check_ablation` does.
     """
-    plan, kept = check_kept(scene, name, target_error)
+    plan, kept = check_ablation(scene, name, target_error)
     planned = Trial(scene, _request(plan))
     rows, other = (predict(v.scene, v.request).arrays() for v in (planned, kept))
     both = (rows["status"] == "stable") & (other["status"] == "stable")

@@ -14,8 +14,13 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, keep_freed_memory
-from dpgcli.benchmark.ablation import check_kept, kept_ways
-from dpgcli.benchmark.methods import Found, Way, other_ways, ways
+from dpgcli.benchmark.ablation import ablations, check_ablation
+from dpgcli.benchmark.methods import (
+    BenchmarkMethod,
+    BenchmarkResult,
+    package_methods,
+    third_party_methods,
+)
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
@@ -25,14 +30,14 @@ from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
@@ -46,28 +51,28 @@ REFERENCE_DIGITS = 50
 Row = dict[str, Any]
 
 COLUMNS = (
-    Column("group", "", "what was varied", Group.STATES, Kind.TEXT),
-    Column("way", "", "how the states were found", Group.STATES, Kind.TEXT),
-    Column("n_units", "", "units of the finger", Group.STATES, Kind.COUNT),
-    Column("n_designs", "", "designs in a call", Group.STATES, Kind.COUNT),
-    Column("stiffness_ratio", "", "k_L over the largest k_b", Group.STATES),
-    Column("n_states", "", "states in a call", Group.STATES, Kind.COUNT),
-    Column("certified", "", "whether the way certifies what it finds", Group.STATES, Kind.FLAG),
-    Column("n_missing", "", "states not found, of those that exist", Group.STATES, Kind.COUNT),
-    Column("max_tip_error_mm", "mm", "largest error of a tip", Group.STATES),
-    Column("rms_tip_error_mm", "mm", "root mean square of the tips' errors", Group.STATES),
-    Column("max_angle_error_rad", "rad", "largest error of a tip angle", Group.STATES),
-    Column("rms_angle_error_rad", "rad", "root mean square of the angles' errors", Group.STATES),
-    Column("max_energy_error_mJ", "mJ", "largest error of an energy", Group.STATES),
-    Column("rms_energy_error_mJ", "mJ", "root mean square of the energies' errors", Group.STATES),
-    Column("bound_mm", "mm", "bound on the change of a tip, known before", Group.STATES),
-    Column("seconds", "s", "wall time of a call, median", Group.STATES),
-    Column("seconds_min", "s", "wall time of a call, smallest", Group.STATES),
-    Column("seconds_max", "s", "wall time of a call, largest", Group.STATES),
-    Column("cpu_seconds", "s", "CPU time of a call, median", Group.STATES),
-    Column("seconds_per_state", "s", "wall time of a call over its states", Group.STATES),
-    Column("relative_time", "", "shortest such time over a fixed NumPy kernel's", Group.STATES),
-    Column("peak_MiB", "MiB", "largest memory allocated in a call", Group.STATES),
+    Column("group", "", "what was varied", kind=Kind.TEXT),
+    Column("way", "", "how the states were found", kind=Kind.TEXT),
+    Column("n_units", "", "units of the finger", kind=Kind.COUNT),
+    Column("n_designs", "", "designs in a call", kind=Kind.COUNT),
+    Column("stiffness_ratio", "", "k_L over the largest k_b"),
+    Column("n_states", "", "states in a call", kind=Kind.COUNT),
+    Column("certified", "", "whether the way certifies what it finds", kind=Kind.FLAG),
+    Column("n_missing", "", "states not found, of those that exist", kind=Kind.COUNT),
+    Column("max_tip_error_mm", "mm", "largest error of a tip"),
+    Column("rms_tip_error_mm", "mm", "root mean square of the tips' errors"),
+    Column("max_angle_error_rad", "rad", "largest error of a tip angle"),
+    Column("rms_angle_error_rad", "rad", "root mean square of the angles' errors"),
+    Column("max_energy_error_mJ", "mJ", "largest error of an energy"),
+    Column("rms_energy_error_mJ", "mJ", "root mean square of the energies' errors"),
+    Column("bound_mm", "mm", "bound on the change of a tip, known before"),
+    Column("seconds", "s", "wall time of a call, median"),
+    Column("seconds_min", "s", "wall time of a call, smallest"),
+    Column("seconds_max", "s", "wall time of a call, largest"),
+    Column("cpu_seconds", "s", "CPU time of a call, median"),
+    Column("seconds_per_state", "s", "wall time of a call over its states"),
+    Column("relative_time", "", "shortest such time over a fixed NumPy kernel's"),
+    Column("peak_MiB", "MiB", "largest memory allocated in a call"),
 )
 
 
@@ -97,7 +102,7 @@ class Bench:
         check_law(self.finger)
         check_exactness(DEFAULT_TOLERANCE, self.target_error)
         for name in self.keep:
-            check_kept(self.scene, name, self.target_error)
+            check_ablation(self.scene, name, self.target_error)
 
     def rows(self) -> Iterator[Row]:
         """Measure, group by group, a row at a time."""
@@ -114,7 +119,7 @@ class Bench:
         if not self.finger.is_rigid:
             most = max(1, PEER_STATES // math.ceil(self.finger.n_units / MANY_UNITS))
             few = slice(None, None, -(-patterns.shape[1] // most))
-            for way in other_ways(self.finger, patterns[:, few]):
+            for way in third_party_methods(self.finger, patterns[:, few]):
                 yield self._row(way, _only(reference, few))
         if self.known is not None:
             yield self._model_error(self.known)
@@ -130,18 +135,18 @@ class Bench:
         """The package's ways in a batch as large as those of a sweep."""
         n_copies = max(1, BATCH // patterns.shape[1])
         tiled = np.tile(patterns, (1, n_copies))
-        for way in ways(self.finger, tiled):
+        for way in package_methods(self.finger, tiled):
             yield self._row(way, reference)
 
     def _alone(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
         """The same for this finger's states only."""
-        for way in ways(self.finger, patterns):
+        for way in package_methods(self.finger, patterns):
             yield self._row(way._replace(group="one finger"), reference)
 
-    def _row(self, way: Way, reference: ExtendedStates) -> Row:
+    def _row(self, way: BenchmarkMethod, reference: ExtendedStates) -> Row:
         found = way.run()
         n_states = reference.energy.shape[0]
-        first = Found(found.pose[:, :n_states], found.energy[:n_states])
+        first = BenchmarkResult(found.pose[:, :n_states], found.energy[:n_states])
         return {
             **self._facts(way.group, way.name, way.n_states),
             "certified": way.certifies,
@@ -202,7 +207,7 @@ class Bench:
             inverted = np.tile(patterns, n_designs)
 
             def whole(finger: Finger = finger, lanes: Any = lanes, on: Flags = inverted) -> None:
-                units = Units.of(finger).take_lanes(lanes)
+                units = UnitSolutions.of(finger).take_lanes(lanes)
                 settled = settle(units, chain_potential, on, DEFAULT_TOLERANCE)
                 tip(settled, with_compliance=True)
 
@@ -222,7 +227,7 @@ class Bench:
             finger = short.with_bars(ratio * float(short.bistable_stiffness.max()))
             reference = extended_states(finger, patterns, digits=REFERENCE_DIGITS)
             wanted = (f"chain, {DEFAULT_TOLERANCE:g}", f"lattice, {DEFAULT_TOLERANCE:g}")
-            for way in ways(finger, patterns):
+            for way in package_methods(finger, patterns):
                 if way.name in wanted:
                     yield {
                         **self._row(way, reference),
@@ -246,7 +251,7 @@ class Bench:
 
     def _kept(self, name: str) -> Iterator[Row]:
         """The scene as planned, and with one thing put back that the plan leaves out."""
-        for way in kept_ways(self.scene, name, self.target_error):
+        for way in ablations(self.scene, name, self.target_error):
             yield {
                 **self._facts("kept", way.name, way.n_states),
                 **_times(measured(way.run, self.repeats), way.n_states),
@@ -256,7 +261,7 @@ class Bench:
             }
 
 
-def errors(found: Found, reference: ExtendedStates) -> Row:
+def errors(found: BenchmarkResult, reference: ExtendedStates) -> Row:
     """Errors of what was found, over the states that exist."""
     exists = reference.is_minimum & reference.in_pattern
     is_found = np.isfinite(found.pose).all(axis=0)

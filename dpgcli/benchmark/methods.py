@@ -22,34 +22,36 @@ from dpgcli.states.guess import geometric_guess, stroke_guess
 from dpgcli.states.rungs import DEFAULT_TOLERANCE, RUNGS
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 PEER_START_STROKES = 1.0  # opening of inverted units in the peers' starting shape
 
 
-class Found(NamedTuple):
+class BenchmarkResult(NamedTuple):
     """Tips x, y (mm) and angle (rad), (3, state), energies (mJ), (state,), NaN if missing."""
 
     pose: Array
     energy: Array
 
 
-class Way(NamedTuple):
+class BenchmarkMethod(NamedTuple):
     """One method; `run` solves `n_states` states and returns tips and energies."""
 
     name: str
     group: str
-    run: Callable[[], Found]
+    run: Callable[[], BenchmarkResult]
     n_states: int
     certifies: bool = False
 
 
-def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
+def package_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod]:
     """The package's methods for these patterns, (unit, state), of one finger."""
     n_states = inverted.shape[1]
 
-    def way(name: str, run: Callable[[], Found], *, certifies: bool = True) -> Way:
-        return Way(name, "ladder", run, n_states, certifies)
+    def way(
+        name: str, run: Callable[[], BenchmarkResult], *, certifies: bool = True
+    ) -> BenchmarkMethod:
+        return BenchmarkMethod(name, "ladder", run, n_states, certifies)
 
     rigid = finger.with_bars(np.inf)
     yield way("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
@@ -67,23 +69,25 @@ def ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
         yield way(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
 
 
-def other_ways(finger: Finger, inverted: Flags) -> Iterator[Way]:
+def third_party_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod]:
     """Third-party minimizers, one state at a time, each prepared for the finger."""
     lattice, network = Lattice(finger), SpringNetwork.of(finger)
     starts = lattice.of_shape(stroke_guess(finger, inverted, PEER_START_STROKES))
     for peer in peers():
         solve_one = peer.prepare(finger)
 
-        def run(solve_one: Callable[[Array], Array] = solve_one) -> Found:
+        def run(solve_one: Callable[[Array], Array] = solve_one) -> BenchmarkResult:
             nodes = np.stack([solve_one(start) for start in starts.T], axis=1)
-            return Found(tip_pose(nodes), np.array([network.energy(shape) for shape in nodes.T]))
+            return BenchmarkResult(
+                tip_pose(nodes), np.array([network.energy(shape) for shape in nodes.T])
+            )
 
-        yield Way(peer.name, "peer", run, inverted.shape[1])
+        yield BenchmarkMethod(peer.name, "peer", run, inverted.shape[1])
 
 
-def _looked_up(finger: Finger, inverted: Flags) -> Found:
+def _looked_up(finger: Finger, inverted: Flags) -> BenchmarkResult:
     """Each unit's own well, with its bars' answer to first order, put together: no solve."""
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     chain = Chain(finger)
     shape = geometric_guess(finger, inverted, units.first_order)
     coordinates = chain.of_shape(shape)
@@ -92,7 +96,7 @@ def _looked_up(finger: Finger, inverted: Flags) -> Found:
     energy = _energy(finger, shape, openings)
     in_wells = (openings > units.wells.barrier) == inverted
     is_there = (in_wells & (units.wells.exists | ~inverted)).all(axis=0)
-    return Found(np.where(is_there, pose, np.nan), np.where(is_there, energy, np.nan))
+    return BenchmarkResult(np.where(is_there, pose, np.nan), np.where(is_there, energy, np.nan))
 
 
 def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
@@ -108,12 +112,14 @@ def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
 
 def _solver(
     finger: Finger, inverted: Flags, formulate: Formulate, tolerance: float
-) -> Callable[[], Found]:
-    def run() -> Found:
-        settled = settle(Units.of(finger), formulate, inverted, tolerance)
+) -> Callable[[], BenchmarkResult]:
+    def run() -> BenchmarkResult:
+        settled = settle(UnitSolutions.of(finger), formulate, inverted, tolerance)
         is_stable = settled.status == Status.STABLE
         pose = tip(settled, with_compliance=False).pose
         energy = np.asarray(sum(settled.equilibrium.energies.values()))
-        return Found(np.where(is_stable, pose, np.nan), np.where(is_stable, energy, np.nan))
+        return BenchmarkResult(
+            np.where(is_stable, pose, np.nan), np.where(is_stable, energy, np.nan)
+        )
 
     return run

@@ -42,7 +42,7 @@ UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quanti
 
 
 @dataclass(frozen=True)
-class Choice:
+class BistableOptions:
     """Options of a fit: mapping, quantity, part of the record, loss; `fixed` are values by key."""
 
     opening: Opening
@@ -117,7 +117,7 @@ def rests(values: Array) -> laws.Rests:
     return laws.PUBLISHED.rests(laws.Dome(stiffness, linearity, stroke, contact=np.zeros(())))
 
 
-def fit_bistable(record: Record, choice: Choice) -> BistableFit:
+def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     """Fit the published law to a record of a dome.
 
     Raises FitError if the record lacks what is asked for, or the fit fails.
@@ -143,7 +143,7 @@ def fit_bistable(record: Record, choice: Choice) -> BistableFit:
     return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result)))
 
 
-def _observed(record: Record, choice: Choice) -> Array:
+def _observed(record: Record, choice: BistableOptions) -> Array:
     """The observations to fit: energies in mJ, or forces along the travel in N."""
     if choice.quantity is Quantity.WORK:
         return work(record)
@@ -164,7 +164,7 @@ def _factor(opening: Opening, well: float | None) -> float:
     return opening.amount / well
 
 
-def _fitted(opening: Array, observed: Array, factor: float, choice: Choice) -> Fit:
+def _fitted(opening: Array, observed: Array, factor: float, choice: BistableOptions) -> Fit:
     size = 1.0 if UNITS[choice.quantity] == "mJ" else factor
     return fit(
         _parameters(opening, observed / size, choice),
@@ -178,7 +178,7 @@ def _fitted(opening: Array, observed: Array, factor: float, choice: Choice) -> F
     )
 
 
-def _parameters(opening: Array, observed: Array, choice: Choice) -> list[Parameter]:
+def _parameters(opening: Array, observed: Array, choice: BistableOptions) -> list[Parameter]:
     """Parameters with starts: the best of a few strokes and linearities, at the best stiffness."""
     fixed = choice.fixed or {}
     largest = float(np.abs(opening).max())
@@ -212,7 +212,7 @@ def _stroke(start: float, largest: float, *, is_free: bool) -> Parameter:
     return Parameter(STROKE, start, STROKE_BOUNDS[0] * largest, STROKE_BOUNDS[1] * largest)
 
 
-def _energies(record: Record, observed: Array, choice: Choice) -> tuple[Array, Array]:
+def _energies(record: Record, observed: Array, choice: BistableOptions) -> tuple[Array, Array]:
     """The dome's energy by travel. Raises FitError if it is not known."""
     if not choice.is_quasi_static and rings(record):
         raise FitError("its energies are those of a ringing dome")

@@ -44,7 +44,7 @@ class Rule(StrEnum):
     STROKE = "stroke"
 
 
-class Method(StrEnum):
+class GridMethod(StrEnum):
     """The method between the geometries of a grid."""
 
     SCALING = "scaling"

@@ -7,7 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 
 POINTS_AT_ONCE = 2**12
@@ -111,12 +111,12 @@ def distances(points: Array, line: Array) -> Array:
 
 
 def _number_column(name: str, unit: str, description: str) -> Column:
-    return Column(name, unit, description, Group.STATES)
+    return Column(name, unit, description)
 
 
 COLUMNS = (
-    Column("pattern", "", "activation pattern", Group.STATES, Kind.PATTERN),
-    Column("status", "", "stable where certified, else why not", Group.STATES, Kind.STATUS),
+    Column("pattern", "", "activation pattern", kind=Kind.PATTERN),
+    Column("status", "", "stable where certified, else why not", kind=Kind.STATUS),
     _number_column("tip_x_mm", "mm", "predicted tip"),
     _number_column("tip_y_mm", "mm", "predicted tip"),
     _number_column("known_x_mm", "mm", "known tip"),

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
 from dpgcli.arrays import Array, Flags, total
-from dpgcli.calibration.choices import Method
+from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.calibration.interpolants import Multilinear, ThinPlates
 from dpgcli.design.calibrations import Estimate
@@ -81,10 +81,10 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Law:
+class GridLaw:
     """A way between points, for all their quantities."""
 
-    method: Method
+    method: GridMethod
     points: Points
 
     def at(self, key: str, geometry: Array) -> Estimate:
@@ -96,7 +96,7 @@ class Law:
 
         >>> heights = np.array([[1.0], [2.0], [4.0]])
         >>> points = Points(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})
-        >>> found = Law(Method.SCALING, points).at("area", np.array([[3.0], [8.0]]))
+        >>> found = GridLaw(GridMethod.SCALING, points).at("area", np.array([[3.0], [8.0]]))
         >>> found.value.round(9).tolist(), found.is_inside.tolist()
         ([27.0, 192.0], [True, False])
         """
@@ -135,7 +135,7 @@ class Law:
         known, geometry = self.points.quantities, self.points.geometry
         errors = {key: np.full(len(geometry), np.nan) for key in known}
         for place in range(len(geometry)):
-            rest = Law(self.method, self.points.without(place))
+            rest = GridLaw(self.method, self.points.without(place))
             with suppress(FitError):  # too few to go without one
                 for key, values in known.items():
                     guess = rest._value(key, geometry[place : place + 1])
@@ -143,13 +143,13 @@ class Law:
         return errors
 
     def _value(self, key: str, geometry: Array) -> Array:
-        if self.method is Method.SCALING:
+        if self.method is GridMethod.SCALING:
             terms = self.scaling(key).values[:, None] * self._design(geometry).T
             return np.asarray(np.exp(total(terms)))
         return np.asarray(np.exp(self._interpolants[key](np.log(geometry))))
 
     def _relative_error(self, key: str, geometry: Array) -> Array:
-        if self.method is Method.INTERPOLATION:
+        if self.method is GridMethod.INTERPOLATION:
             return np.full(len(geometry), self.leave_one_out(key)[1])
         found, terms = self.scaling(key), self._design(np.real(geometry)).T
         n_spare = found.n_points - len(found.values)

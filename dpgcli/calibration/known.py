@@ -12,7 +12,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
 
     The layer's line lies as far to the left of the stations as the data's tip does.
     """
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     settled = settle(units, chain_potential, patterns, DEFAULT_TOLERANCE)
     is_state = settled.status == Status.STABLE
     chain, values = settled.potential.coordinates, settled.equilibrium.coordinates

@@ -13,7 +13,7 @@ from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat, escaped
 from dpgcli.text import printable
 
 if TYPE_CHECKING:
-    from dpgcli.sweeps.gate import Verdict
+    from dpgcli.sweeps.gate import RequirementVerdict
 
 MOST_LINES = 20
 LARGEST_SUMMARY = 2**20  # bytes; GitHub refuses more
@@ -49,14 +49,14 @@ def check(
         raise typer.Exit(code)
 
 
-def code_of(verdicts: Sequence["Verdict"], *, is_written: bool) -> ExitCode:
+def code_of(verdicts: Sequence["RequirementVerdict"], *, is_written: bool) -> ExitCode:
     """How a command ends that held requirements: what they say comes before its summary."""
     if not all(verdict.is_met for verdict in verdicts):
         return ExitCode.REQUIREMENT
     return ExitCode.DONE if is_written else ExitCode.USAGE
 
 
-def print_verdicts(verdicts: Sequence["Verdict"], listed_as: ProblemFormat) -> None:
+def print_verdicts(verdicts: Sequence["RequirementVerdict"], listed_as: ProblemFormat) -> None:
     """Print verdicts."""
     _PRINTERS[listed_as](verdicts)
 
@@ -83,7 +83,7 @@ def append_summary(path: Path, text: str) -> bool:
     return True
 
 
-def _print_text(verdicts: Sequence["Verdict"]) -> None:
+def _print_text(verdicts: Sequence["RequirementVerdict"]) -> None:
     for verdict in verdicts:
         put(str(verdict))
         for failure in verdict.failures(MOST_LINES):
@@ -92,13 +92,13 @@ def _print_text(verdicts: Sequence["Verdict"]) -> None:
             print(f"  and {len(verdict.rows) - MOST_LINES:,} more")
 
 
-def _print_json(verdicts: Sequence["Verdict"]) -> None:
+def _print_json(verdicts: Sequence["RequirementVerdict"]) -> None:
     import json
 
     print(json.dumps([_record(verdict) for verdict in verdicts], indent=2))
 
 
-def _print_github(verdicts: Sequence["Verdict"]) -> None:
+def _print_github(verdicts: Sequence["RequirementVerdict"]) -> None:
     messages = [
         f"{printable(verdict.requirement.text)}: {failure}"
         for verdict in verdicts
@@ -118,7 +118,7 @@ _PRINTERS = {
 }
 
 
-def _record(verdict: "Verdict") -> dict[str, Any]:
+def _record(verdict: "RequirementVerdict") -> dict[str, Any]:
     """A verdict as JSON values; null for what is not a finite number."""
     import math
     from dataclasses import asdict

@@ -76,7 +76,7 @@ def dome(
 ) -> None:
     """Invert a dome by pressure: energy against pole travel."""
     from dpgcli.calibration.fe import models
-    from dpgcli.calibration.fe.dome import Dome, impossible
+    from dpgcli.calibration.fe.dome import DomeShape, impossible
     from dpgcli.errors import UsageError
 
     _check_positive(
@@ -84,7 +84,7 @@ def dome(
     )
     _check_poisson(poisson)
     height, thickness, modulus = _dimensions(spec, settings, DOME_KEYS, quiet)
-    shape = Dome(height, thickness, modulus, poisson, base_diameter, rim_radius)
+    shape = DomeShape(height, thickness, modulus, poisson, base_diameter, rim_radius)
     if reason := impossible(shape):
         raise UsageError(f"no mesh of this dome: {reason} (--base-diameter, --rim-radius)")
     peak = models.expected_peak(shape) if pressure is None else pressure

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dpgcli.api.sweep import Place
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
-    from dpgcli.sweeps.gate import Verdict
+    from dpgcli.sweeps.gate import RequirementVerdict
 
 
 class ExecutorName(StrEnum):
@@ -210,7 +210,7 @@ def _judge(
         print(text, end="")
         if study.target_error is not None:
             say(_chosen(designs))
-    verdicts: Sequence[Verdict] = check_requirements(designs, rules) if rules else ()
+    verdicts: Sequence[RequirementVerdict] = check_requirements(designs, rules) if rules else ()
     print_verdicts(verdicts, ProblemFormat.TEXT)
     summary = text + ("\n" + verdicts_markdown(verdicts) if rules else "")
     is_written = summary_file is None or append_summary(summary_file, summary)

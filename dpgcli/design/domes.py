@@ -16,7 +16,7 @@ from dpgcli.design.rules import (
     Derivation,
 )
 from dpgcli.mechanics.curve import AT_REST, FEWEST_POINTS, bridged, spline
-from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 
 WHERE = ("finger", "law")
 HINT = "dpg fit bistable writes one"
@@ -35,7 +35,7 @@ class Domes:
     else 0.
     """
 
-    law: Law = PUBLISHED
+    law: DomeLaw = PUBLISHED
     derivations: tuple[Derivation, ...] = DERIVATIONS
     calibration: Calibration | None = None
     travel: float = 0.0

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dpgcli.errors import SpecError
-from dpgcli.files.places import Place, located
+from dpgcli.files.places import Location, located
 from dpgcli.text import control_character
 
 MAX_BYTES = 256 * 1024  # of what people write
 TOP_LEVEL = rb"""(?:^(?:\xef\xbb\xbf)?|\A\s*\{(?s:.*\W))["']?%s["']?\s*:(?:\s|$)"""
 
 
-def content_of(path: Path, place: Place, most: int | None = None, hint: str = "") -> bytes:
+def content_of(path: Path, place: Location, most: int | None = None, hint: str = "") -> bytes:
     """The bytes of a file, at most `most`; of a regular file, which has an end, all by default.
 
     Raises SpecError for what cannot be read.
@@ -43,7 +43,7 @@ def content_of(path: Path, place: Place, most: int | None = None, hint: str = ""
         raise SpecError((located(place, "file", "a readable file", found.lower()),)) from None
 
 
-def _piped(path: Path, place: Place, most: int, hint: str) -> bytes:
+def _piped(path: Path, place: Location, most: int, hint: str) -> bytes:
     """What comes out of a pipe, as that of `<(...)`.
 
     Raises OSError for one that nobody has open to write to: it would be waited for, in silence.
@@ -79,14 +79,14 @@ def quoted_if(path: Path, key: str, expected: str) -> Iterator[None]:
     try:
         yield
     except SpecError:
-        place = Place(str(path))
+        place = Location(str(path))
         content = content_of(path, place, MAX_BYTES)
         if re.search(TOP_LEVEL % key.encode(), content, re.MULTILINE) or not content:
             raise
         raise SpecError((located(place, "file", expected, "something else"),)) from None
 
 
-def bounded(stream: BinaryIO, place: Place, most: int, hint: str = "") -> bytes:
+def bounded(stream: BinaryIO, place: Location, most: int, hint: str = "") -> bytes:
     """What a stream holds, at most `most` bytes; raises SpecError for more."""
     content = stream.read(most + 1)
     if len(content) > most:
@@ -94,18 +94,18 @@ def bounded(stream: BinaryIO, place: Place, most: int, hint: str = "") -> bytes:
     return content
 
 
-def _too_large(place: Place, most: int, found: str, hint: str) -> SpecError:
+def _too_large(place: Location, most: int, found: str, hint: str) -> SpecError:
     return SpecError((located(place, "file", f"at most {most // 1024:,} KiB", found, hint),))
 
 
-def decoded(content: bytes, place: Place) -> str:
+def decoded(content: bytes, place: Location) -> str:
     """The text of a file. Raises SpecError for what is not UTF-8."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = content[: error.start]
         column = len(before) - (before.rfind(b"\n") + 1) + 1
-        here = Place(place.file, before.count(b"\n") + 1, column)
+        here = Location(place.file, before.count(b"\n") + 1, column)
         found = f"byte 0x{content[error.start]:02x}"
         problem = located(here, "file", "text in UTF-8", found, "save the file as UTF-8")
         raise SpecError((problem,)) from None

@@ -17,7 +17,7 @@ from dpgcli.arrays import Array
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import content_of, decoded
-from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.files.places import Location, in_order, located, shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +57,7 @@ class Sheet:
     ) -> Problem:
         """A problem in a row, or with the whole file."""
         line = None if row is None else self.lines[row]
-        return located(Place(self.file, line), key, expected, found, hint)
+        return located(Location(self.file, line), key, expected, found, hint)
 
     def numbers(self, names: Sequence[str], *, may_lack: bool = False) -> dict[str, Array]:
         """Columns as numbers by name; empty cells are NaN if they may be lacking.
@@ -86,7 +86,7 @@ class Sheet:
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else ""
         expected, found = f"a column {' or '.join(wanted)}", ", ".join(self.names)
-        return located(Place(self.file), "header", expected, found, hint)
+        return located(Location(self.file), "header", expected, found, hint)
 
 
 def name_of(source: Tabular) -> str:
@@ -102,7 +102,7 @@ def _content(source: Tabular) -> tuple[str, bytes]:
     """What the source is called in messages, and its text as CSV."""
     if isinstance(source, str | Path):
         hint = "a curve or a table of states is short"
-        return str(source), content_of(Path(source), Place(str(source)), MAX_BYTES, hint)
+        return str(source), content_of(Path(source), Location(str(source)), MAX_BYTES, hint)
     import pandas as pd
 
     convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
@@ -122,18 +122,20 @@ def read_sheet(source: Tabular) -> Sheet:
     file, content = _content(source)
     rows: list[list[str]] = []
     lines, problems = [], []
-    text = io.StringIO(decoded(content, Place(file)), newline=None)
+    text = io.StringIO(decoded(content, Location(file)), newline=None)
     for number, line in enumerate(map(str.strip, text), start=1):
         if line and not (COMMENT.match(line) if rows else line.startswith("#")):
             try:
                 cells = next(csv.reader([line], skipinitialspace=True, strict=True))
             except csv.Error as error:
-                problems.append(located(Place(file, number), "row", "cells of a CSV", str(error)))
+                problems.append(
+                    located(Location(file, number), "row", "cells of a CSV", str(error))
+                )
                 continue
             rows.append([cell.strip() for cell in cells])
             lines.append(number)
     if not rows and not problems:
-        problems.append(located(Place(file), "file", "a header and rows", "nothing"))
+        problems.append(located(Location(file), "file", "a header and rows", "nothing"))
     if problems:
         raise SpecError(in_order(problems))
     digest = hashlib.sha256(content).hexdigest()
@@ -145,7 +147,7 @@ def read_sheet(source: Tabular) -> Sheet:
 
 
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
-    top = Place(sheet.file, header)
+    top = Location(sheet.file, header)
     if len(sheet.names) == 1 and (foreign := [c for c in ";\t" if c in sheet.names[0]]):
         hint = "and write decimal points"
         yield located(top, "header", "columns separated by commas", shown(foreign[0]), hint)

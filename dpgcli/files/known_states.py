@@ -10,7 +10,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
-from dpgcli.files.places import Place, in_order, located
+from dpgcli.files.places import Location, in_order, located
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -81,7 +81,7 @@ def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) ->
 
 def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
     """Raise SpecError for what cannot be a finger this long (mm): tips, shapes and angles."""
-    place = Place(str(source) if isinstance(source, str | Path) else FRAME)
+    place = Location(str(source) if isinstance(source, str | Path) else FRAME)
     problems = []
     points = [shape for shape in known.shapes if shape.size]
     shapes = np.concatenate(points, axis=1) if points else np.zeros((2, 0))

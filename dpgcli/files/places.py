@@ -10,7 +10,7 @@ from dpgcli.text import MAX_SHOWN, shortened
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Where something stands: line and column from 1, none for what is not in a file."""
 
     file: str
@@ -18,7 +18,7 @@ class Place:
     column: int | None = None
 
 
-def located(place: Place, key: str, expected: str, found: str, hint: str = "") -> Problem:
+def located(place: Location, key: str, expected: str, found: str, hint: str = "") -> Problem:
     """A problem at a place."""
     return Problem(place.file, place.line, place.column, key, expected, found, hint)
 

@@ -17,7 +17,7 @@ from ruamel.yaml.reader import ReaderError
 
 from dpgcli.errors import Field, Problem, SpecError
 from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
-from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.files.places import Location, in_order, located, shown
 from dpgcli.text import MAX_SHOWN, KeyPath, dotted, shortened
 
 MAX_NODES = 10_000
@@ -41,17 +41,17 @@ class Document:
 
     file: str
     data: dict[str, Any]
-    places: dict[KeyPath, Place]
+    places: dict[KeyPath, Location]
     problems: tuple[Problem, ...] = ()
     files: tuple[Path, ...] = ()
     prefix: KeyPath = ()
 
-    def place(self, path: KeyPath) -> Place:
+    def place(self, path: KeyPath) -> Location:
         """Where the key stands, or the nearest section around it."""
         for length in range(len(path), -1, -1):
             if place := self.places.get(path[:length]):
                 return place
-        return Place(self.file)
+        return Location(self.file)
 
     def section(self, path: KeyPath, data: dict[str, Any]) -> "Document":
         """A section as a document of its own, whose keys still have their full names."""
@@ -89,13 +89,13 @@ def read_document(path: str | os.PathLike[str]) -> Document:
 def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
     """Name of a YAML file in messages, and its text. Raises SpecError for what is none."""
     name = os.fspath(path)
-    place = Place("<stdin>" if name == "-" else shortened(name, 4096))
+    place = Location("<stdin>" if name == "-" else shortened(name, 4096))
     return place.file, decoded(_content(name, place), place)
 
 
 def parse_document(file: str, text: str) -> Document:
     """The document in a text; `file` is its name in messages."""
-    walk = _Walk(Place(file))
+    walk = _Walk(Location(file))
     start, data = walk.read(text)
     if not isinstance(data, dict):
         wrong = located(start, "document", "a mapping of keys to values", shown(data))
@@ -103,7 +103,7 @@ def parse_document(file: str, text: str) -> Document:
     return Document(file, data, {(): start, **walk.places}, in_order(walk.problems))
 
 
-def parse_value(text: str, place: Place) -> Any:
+def parse_value(text: str, place: Location) -> Any:
     """One value, such as the right side of a setting, by the rules of the files."""
     walk = _Walk(place)
     _, data = walk.read(text)
@@ -112,7 +112,7 @@ def parse_value(text: str, place: Place) -> Any:
     return data
 
 
-def _content(name: str, place: Place) -> bytes:
+def _content(name: str, place: Location) -> bytes:
     """The bytes of a file or of standard input, never more than the limit."""
     hint = "a spec is short text"
     if name == "-":
@@ -124,8 +124,8 @@ def _content(name: str, place: Place) -> bytes:
 class _Walk:
     """Turns the node graph of one text into plain data; cycles and alias bombs meet its limits."""
 
-    start: Place
-    places: dict[KeyPath, Place] = field(default_factory=dict)
+    start: Location
+    places: dict[KeyPath, Location] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     n_visited: int = 0
 
@@ -133,7 +133,7 @@ class _Walk:
         self.yaml = YAML(typ="safe", pure=True)
         self.yaml.max_depth = MAX_DEPTH + 1
 
-    def read(self, text: str) -> tuple[Place, Any]:
+    def read(self, text: str) -> tuple[Location, Any]:
         """Where the text's value starts, and the value; an empty text is None."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -142,15 +142,15 @@ class _Walk:
                 return self.at(0, 0), None
             return self.marked(node), self.value(node)
 
-    def marked(self, node: Node) -> Place:
+    def marked(self, node: Node) -> Location:
         """Where a node starts, if its text has lines of its own."""
         return self.at(node.start_mark.line, node.start_mark.column)
 
-    def at(self, line: int, column: int) -> Place:
+    def at(self, line: int, column: int) -> Location:
         """A place in the text from line and column counted from 0."""
         if isinstance(self.start.file, Field):  # which has no lines
             return self.start
-        return Place(self.start.file, line + 1, column + 1)
+        return Location(self.start.file, line + 1, column + 1)
 
     def composed(self, text: str) -> Node | None:
         """The root node of a text, none if it is empty."""
@@ -205,7 +205,7 @@ class _Walk:
 
     def mapping(self, node: MappingNode, path: KeyPath, depth: int) -> dict[str, Any]:
         """Own keys first, so that they win over merged ones in data and in places."""
-        lines: dict[str, Place] = {}
+        lines: dict[str, Location] = {}
         own: dict[str, Any] = {}
         merged: Node | None = None
         for key_node, value_node in node.value:
@@ -243,7 +243,7 @@ class _Walk:
             return None
         return name
 
-    def is_repeated(self, key: str, node: Node, path: KeyPath, lines: dict[str, Place]) -> bool:
+    def is_repeated(self, key: str, node: Node, path: KeyPath, lines: dict[str, Location]) -> bool:
         place = self.marked(node)
         if key not in lines:
             lines[key] = place
@@ -270,7 +270,7 @@ class _Walk:
             self.wrong(place, path, "a number below 1e308", shown(node.value))
         return number
 
-    def wrong(self, place: Place, path: KeyPath, expected: str, found: str) -> None:
+    def wrong(self, place: Location, path: KeyPath, expected: str, found: str) -> None:
         self.problems.append(located(place, dotted(path), expected, found))
 
 

@@ -15,7 +15,7 @@ from dpgcli.states.margins import last_where, limits, margins
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
 ALL_PATTERNS_UP_TO = 4  # units
@@ -242,7 +242,7 @@ def _last_linearity(unit: Finger) -> float:
     """The largest α with which a unit with elastic bars still rests beyond its barrier."""
 
     def rests(linearity: Array) -> Flags:
-        units = Units.of(changed(unit, force_linearity=linearity))
+        units = UnitSolutions.of(changed(unit, force_linearity=linearity))
         settled = settle(units, chain_potential, np.ones((1, 1), bool), DEFAULT_TOLERANCE)
         is_stable: Flags = settled.status[0] == Status.STABLE
         return is_stable

@@ -7,12 +7,12 @@ import numpy as np
 
 from dpgcli.arrays import Columns
 from dpgcli.hard_cases.verdicts import Outcome, Verdict
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 
 
 def _column(name: str, unit: str, description: str, kind: Kind = Kind.NUMBER) -> Column:
-    return Column(name, unit, description, Group.STATES, kind)
+    return Column(name, unit, description, kind=kind)
 
 
 STRESS_COLUMNS = (

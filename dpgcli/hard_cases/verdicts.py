@@ -21,7 +21,7 @@ from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
 FOLD_DISTANCE = 1e-8  # of α: so close to the loss of bistability, errors are good to a factor of
@@ -109,7 +109,7 @@ def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
 def answered(case: Case) -> Answer:
     """Solve a case in its own unit of length; the answer is in mm."""
     scale = case.variant.scale
-    units = Units.of(scaled(case.variant.finger, scale))
+    units = UnitSolutions.of(scaled(case.variant.finger, scale))
     settled = _settled(case, units)
     equilibrium = settled.equilibrium
     at_tip = tip(settled, with_compliance=False)
@@ -145,7 +145,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
     return finger.changed(**changes)
 
 
-def _settled(case: Case, units: Units) -> Settled:
+def _settled(case: Case, units: UnitSolutions) -> Settled:
     """Solve from the case's start: its corner angles, its strokes, or the solver's own guess."""
     begin, shape = case.variant.start, None
     if begin.corners is not None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Response, take_lanes
-from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, Law
+from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, DomeLaw
 
 ARRAYS = (
     "segment_length",
@@ -61,7 +61,7 @@ class Finger:
     linear_stiffness: Array
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
-    law: Law = PUBLISHED
+    law: DomeLaw = PUBLISHED
 
     def __post_init__(self) -> None:
         for name, values in self.arrays().items():

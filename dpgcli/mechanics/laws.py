@@ -95,7 +95,7 @@ class Attached:
         return Touching(-everywhere, everywhere)
 
 
-class Law(Protocol):
+class DomeLaw(Protocol):
     """A dome's law: energy, force and stiffness by the extension of its spring."""
 
     @property

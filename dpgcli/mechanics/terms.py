@@ -20,7 +20,7 @@ Formulate = Callable[[Finger], FingerPotential]
 class DomeSprings:
     """The law of domes with the constants of some fingers' domes, by extension (mm)."""
 
-    law: laws.Law
+    law: laws.DomeLaw
     domes: laws.Dome
 
     def __call__(self, scalar: Array) -> Response:

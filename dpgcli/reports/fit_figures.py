@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.bistable import UNITS, BistableFit, Choice, law
+from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, law
 from dpgcli.calibration.hinge import HingeFit
 from dpgcli.files.measured import Moments
 from dpgcli.reports.drawing import figure_to, titled
@@ -48,7 +48,7 @@ def draw_fit(figure: FitFigure, path: Path) -> None:
         above.legend()
 
 
-def bistable_figure(found: BistableFit, choice: Choice, name: str) -> FitFigure:
+def bistable_figure(found: BistableFit, choice: BistableOptions, name: str) -> FitFigure:
     """The dome's curve with the bistable law through it."""
     unit = UNITS[choice.quantity]
     along = np.linspace(min(0.0, float(found.travel.min())), float(found.travel.max()), 400)

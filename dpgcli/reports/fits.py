@@ -7,27 +7,27 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Columns
-from dpgcli.calibration.bistable import UNITS, BistableFit, Choice, rests
-from dpgcli.calibration.choices import Method, Rule, Target
+from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, rests
+from dpgcli.calibration.choices import GridMethod, Rule, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.grid import Law
+from dpgcli.calibration.grid import GridLaw
 from dpgcli.calibration.hinge import HingeFit
 from dpgcli.design.dimensions import unit_of
 from dpgcli.files.measured import GridTable
-from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.columns import Column, Kind
 
 FINGER_UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad"}
 VALUE_COLUMNS = (
-    Column("key", "", "key of a spec's lattice section", Group.STATES, Kind.TEXT),
-    Column("value", "", "the fitted or fixed value", Group.STATES),
-    Column("standard_error", "", "its standard error", Group.STATES),
-    Column("unit", "", "unit of both", Group.STATES, Kind.TEXT),
-    Column("status", "", "free, fixed or at its bound", Group.STATES, Kind.TEXT),
+    Column("key", "", "key of a spec's lattice section", kind=Kind.TEXT),
+    Column("value", "", "the fitted or fixed value"),
+    Column("standard_error", "", "its standard error"),
+    Column("unit", "", "unit of both", kind=Kind.TEXT),
+    Column("status", "", "free, fixed or at its bound", kind=Kind.TEXT),
 )
 INTERVAL_COLUMNS = (
-    Column("lower", "", "lower end of the 95 % bootstrap interval", Group.STATES),
-    Column("upper", "", "upper end of the 95 % bootstrap interval", Group.STATES),
+    Column("lower", "", "lower end of the 95 % bootstrap interval"),
+    Column("upper", "", "upper end of the 95 % bootstrap interval"),
 )
 
 
@@ -49,16 +49,16 @@ def value_rows(fit: Fit) -> tuple[tuple[Column, ...], Columns]:
     return VALUE_COLUMNS + INTERVAL_COLUMNS, rows
 
 
-def quantity_rows(law: Law) -> tuple[tuple[Column, ...], Columns]:
+def quantity_rows(law: GridLaw) -> tuple[tuple[Column, ...], Columns]:
     """Columns, and a row for each quantity of a grid.
 
     Its law if it has one, and how well others predict a point.
     """
     quantities = list(law.points.quantities)
     left_out = np.array([law.leave_one_out(key) for key in quantities]).reshape(-1, 2).T
-    columns = [Column("quantity", "", "what is known at the points", Group.STATES, Kind.TEXT)]
+    columns = [Column("quantity", "", "what is known at the points", kind=Kind.TEXT)]
     rows: dict[str, Any] = {"quantity": np.array(quantities)}
-    if law.method is Method.SCALING:
+    if law.method is GridMethod.SCALING:
         fits = [law.scaling(key) for key in quantities]
         rows["at_reference"] = np.exp([fit.values[0] for fit in fits])
         rows["standard_error_percent"] = 100.0 * np.array([f.standard_errors[0] for f in fits])
@@ -67,8 +67,7 @@ def quantity_rows(law: Law) -> tuple[tuple[Column, ...], Columns]:
             rows[f"error_{key}"] = np.array([fit.standard_errors[place] for fit in fits])
     rows["left_out_largest_percent"], rows["left_out_rms_percent"] = 100.0 * left_out
     columns += [
-        Column(name, "%" if name.endswith("percent") else "", "", Group.STATES)
-        for name in list(rows)[1:]
+        Column(name, "%" if name.endswith("percent") else "", "") for name in list(rows)[1:]
     ]
     return tuple(columns), rows
 
@@ -90,7 +89,7 @@ def quality(fit: Fit, unit: str) -> str:
     return text
 
 
-def bistable_summary(found: BistableFit, choice: Choice) -> Iterator[str]:
+def bistable_summary(found: BistableFit, choice: BistableOptions) -> Iterator[str]:
     """Quality, the assumed mapping, and the inverted wells of law and data."""
     how = "as given"
     if choice.opening.rule is Rule.STROKE:
@@ -130,7 +129,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
         )
 
 
-def grid_summary(law: Law, table: GridTable) -> Iterator[str]:
+def grid_summary(law: GridLaw, table: GridTable) -> Iterator[str]:
     """The number of points, their keys, and the values that all points share."""
     points = law.points
     reference = ", ".join(
@@ -139,4 +138,4 @@ def grid_summary(law: Law, table: GridTable) -> Iterator[str]:
     text = f"{len(points.geometry)} points over {', '.join(points.over)}"
     same = ", ".join(f"{key} {value:g}" for key, value in table.constant.items())
     text += f"; all at {same}" if same else ""
-    yield text + (f"; reference {reference}" if law.method is Method.SCALING else "")
+    yield text + (f"; reference {reference}" if law.method is GridMethod.SCALING else "")

@@ -9,7 +9,7 @@ from markdown_it import MarkdownIt
 
 from dpgcli.reports.maps import figures
 from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
-from dpgcli.sweeps.gate import Verdict
+from dpgcli.sweeps.gate import RequirementVerdict
 from dpgcli.text import printable
 
 # what would be markup: an underscore inside a word is not, nor is & alone
@@ -51,7 +51,7 @@ def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, An
     )
 
 
-def verdicts_markdown(verdicts: Sequence[Verdict]) -> str:
+def verdicts_markdown(verdicts: Sequence[RequirementVerdict]) -> str:
     """Verdicts on requirements as Markdown, with the first designs that fail each."""
     lines: list[str | Table] = []
     for verdict in verdicts:

@@ -11,7 +11,7 @@ from dpgcli.equilibrium.newton import Equilibrium
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.crossing import crosses_itself, outline
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import Wells
 
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))  # below it, rounding may decide
@@ -79,7 +79,7 @@ class Settled:
 
 
 def certified(
-    units: Units,
+    units: UnitSolutions,
     potential: FingerPotential,
     inverted: Flags,
     equilibrium: Equilibrium,
@@ -105,7 +105,7 @@ def certified(
 
 
 def certify(
-    settled: Settled, units: Units, tolerance: float, own: slice = slice(None)
+    settled: Settled, units: UnitSolutions, tolerance: float, own: slice = slice(None)
 ) -> NDArray[np.uint8]:
     """The gravest reason why a lane is not a certified state of its pattern, `Status` codes."""
     equilibrium = settled.equilibrium

@@ -28,7 +28,7 @@ from dpgcli.states.rungs import (
     exactnesses,
 )
 from dpgcli.states.solved import Surroundings
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
@@ -112,7 +112,7 @@ class Plan:
         return frozenset(column.group for column in self.columns)
 
     @property
-    def units(self) -> Units:
+    def units(self) -> UnitSolutions:
         """The finger's units, as they are solved."""
         return self.exactness.units
 
@@ -149,7 +149,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     request = request or Request()
     _check(scene, request)
     n = scene.finger.n_units
-    scene_units = Units.of(scene.finger)
+    scene_units = UnitSolutions.of(scene.finger)
     needs_bars = any(quantity.needs_bars for quantity in _asked_for(request))
     ((_, exactness),) = exactnesses(
         scene_units, request.tolerance, request.target_error, needs_bars=needs_bars
@@ -277,7 +277,7 @@ def _why_left_out(group: Group, n_states: int) -> str:
 
 
 def _split(
-    units: Units,
+    units: UnitSolutions,
     potential: FingerPotential,
     request: Request,
     is_whole: bool,
@@ -302,20 +302,20 @@ def _split(
 def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> bool:
     """Whether halves with that much context fit, tried on the units around the cut."""
     around = finger.section(n_inner - context - 1, n_inner + context + 1)
-    trial = Split(Units.of(around), context + 1, context, tolerance)
+    trial = Split(UnitSolutions.of(around), context + 1, context, tolerance)
     return all((s.status != Status.NOT_CONVERGED).all() for s in paired_states(trial))
 
 
-def _flexibility(units: Units) -> float:
+def _flexibility(units: UnitSolutions) -> float:
     """What the bars do to the tip (mm); rigid ones: what a stiffness of 1000 springs would."""
     finger = units.finger
     if finger.is_rigid:
-        units = Units.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))
+        units = UnitSolutions.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))
     return float(bar_flexibility(units)[0])
 
 
 def _omissions(
-    scene: Scene, units: Units, split: Split | None, n_solves: int, exactness: Exactness
+    scene: Scene, units: UnitSolutions, split: Split | None, n_solves: int, exactness: Exactness
 ) -> tuple[Omission, ...]:
     finger = units.finger
     n = finger.n_units

@@ -13,7 +13,7 @@ from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows
 from dpgcli.states.settle import settle
 from dpgcli.states.solved import ALONE, SolvedFingers, Surroundings
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 
 def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
@@ -45,7 +45,7 @@ class RowRequest:
     has_bars: bool = True
 
 
-def solved_rows(units: Units, inverted: Flags, request: RowRequest) -> Columns:
+def solved_rows(units: UnitSolutions, inverted: Flags, request: RowRequest) -> Columns:
     """Rows of these patterns, (unit, state), each solved and certified as a whole finger.
 
     The units have one design, or one for each state.

@@ -23,7 +23,7 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.tip import TIP_ROUNDING
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
@@ -72,7 +72,7 @@ class Exactness:
     `scene_units` are those of the fingers as they were given.
     """
 
-    scene_units: Units
+    scene_units: UnitSolutions
     tolerance: float
     rung: Rung | None = None
 
@@ -82,11 +82,11 @@ class Exactness:
         return self.rung is not None and self.rung.drops_bars
 
     @cached_property
-    def units(self) -> Units:
+    def units(self) -> UnitSolutions:
         """The units of the fingers as they are solved."""
         if not self.drops_bars:
             return self.scene_units
-        return Units.of(self.scene_units.finger.with_bars(np.inf))
+        return UnitSolutions.of(self.scene_units.finger.with_bars(np.inf))
 
     @cached_property
     def error_bounds(self) -> Array:
@@ -103,7 +103,7 @@ class Exactness:
 
 
 def exactnesses(
-    units: Units, tolerance: float, target_error: float | None, *, needs_bars: bool = False
+    units: UnitSolutions, tolerance: float, target_error: float | None, *, needs_bars: bool = False
 ) -> Iterator[tuple[Indices, Exactness]]:
     """How exactly to solve which designs: by the tolerance, or each as the target error allows.
 
@@ -123,7 +123,7 @@ def exactnesses(
         yield places, Exactness(some, RUNGS[index].tolerance, RUNGS[index])
 
 
-def error_bounds(units: Units) -> Array:
+def error_bounds(units: UnitSolutions) -> Array:
     """Bound on the tip's error (mm) by each rung, shape (rung, design); infinite where none.
 
     The first rung needs elastic bars to drop, and a second well of every unit without them.
@@ -146,7 +146,7 @@ def cheapest(bounds: Array, target: float) -> Indices:
     return np.where(meets.any(axis=0), meets.argmax(axis=0), len(RUNGS) - 1)
 
 
-def dropped_bars(units: Units) -> Array:
+def dropped_bars(units: UnitSolutions) -> Array:
     """Bound on how far dropping the bars moves the tip (mm), shape (design,)."""
     if units.finger.is_rigid:
         return np.full(units.wells.exists.shape[1], np.inf)
@@ -154,7 +154,7 @@ def dropped_bars(units: Units) -> Array:
     return np.where(exists, bar_flexibility(units), np.inf)
 
 
-def bar_flexibility(units: Units) -> Array:
+def bar_flexibility(units: UnitSolutions) -> Array:
     """Bound on how far the bars' flexibility moves the tip (mm), in any state, (design,).
 
     Twice the sum, over units, of what each unit's bars do to first order.
@@ -165,7 +165,7 @@ def bar_flexibility(units: Units) -> Array:
     return np.asarray(SAFETY * np.broadcast_to(per_unit, shape).sum(axis=0))
 
 
-def _softness(units: Units) -> Array:
+def _softness(units: UnitSolutions) -> Array:
     """Σ F H/λ over the units: their turning by moments of the size of those in play."""
     finger = units.finger
     moment = finger.force_scale * finger.segment_height
@@ -174,7 +174,7 @@ def _softness(units: Units) -> Array:
     return np.asarray(np.broadcast_to(softness, (finger.n_units, softness.shape[1])).sum(axis=0))
 
 
-def _corner_stiffness(units: Units) -> Array:
+def _corner_stiffness(units: UnitSolutions) -> Array:
     """Smallest eigenvalue λ (N mm/rad) by a unit's two corners, in any well, (unit, design)."""
     finger, shape = single_units(units.finger)
     angle = np.where(units.wells.exists, units.wells.angle, 0.0)

@@ -43,8 +43,8 @@ def sensitivities(settled: Settled, directions: Sequence[Direction]) -> Sensitiv
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.states.settle import settle
-    >>> from dpgcli.states.units import Units
-    >>> units = Units.of(uniform_finger(1, **STUDY))
+    >>> from dpgcli.states.units import UnitSolutions
+    >>> units = UnitSolutions.of(uniform_finger(1, **STUDY))
     >>> settled = settle(units, chain_potential, np.array([[True]]), 1e-12)
     >>> found = sensitivities(settled, [{"segment_length": np.ones((1, 1))}])
     >>> print(abs(found.pose[2]).round(12))  # turning does not depend on L in the rigid limit

@@ -10,7 +10,7 @@ from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Settled, Status, certified
 from dpgcli.states.guess import geometric_guess, stroke_guess
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
 HELD_FROM = (1.0, 0.0)  # strokes: corners open first, or soft bars give way first
@@ -18,7 +18,7 @@ UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measure
 
 
 def settle(
-    units: Units,
+    units: UnitSolutions,
     formulate: Formulate,
     inverted: Flags,
     tolerance: float,
@@ -36,7 +36,7 @@ def settle(
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
-    >>> units = Units.of(uniform_finger(2, **STUDY))
+    >>> units = UnitSolutions.of(uniform_finger(2, **STUDY))
     >>> settled = settle(units, chain_potential, np.array([[True, True], [False, True]]), 1e-12)
     >>> [Status(code).text for code in settled.status]
     ['stable', 'stable']
@@ -56,7 +56,7 @@ def settle(
 
 
 def settle_from(
-    units: Units,
+    units: UnitSolutions,
     potential: FingerPotential,
     inverted: Flags,
     start: Array,
@@ -79,7 +79,7 @@ def settle_from(
     return certified(units, potential, inverted, there, tolerance, own)
 
 
-def _worth_a_search(settled: Settled, units: Units) -> Indices:
+def _worth_a_search(settled: Settled, units: UnitSolutions) -> Indices:
     """Lanes without a state, if bars give way and every inverted unit may have a second well.
 
     What is folded in its own wells between stiff bars has no other state.
@@ -94,7 +94,7 @@ def _worth_a_search(settled: Settled, units: Units) -> Indices:
 
 
 def _searched_again(
-    units: Units,
+    units: UnitSolutions,
     formulate: Formulate,
     settled: Settled,
     tolerance: float,

@@ -43,10 +43,10 @@ def tip(settled: Settled, *, with_compliance: bool) -> Tip:
     >>> from dpgcli.mechanics.finger import uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
     >>> from dpgcli.states.settle import settle
-    >>> from dpgcli.states.units import Units
+    >>> from dpgcli.states.units import UnitSolutions
     >>> unit = uniform_finger(1, segment_length=3.0, segment_height=1.0, stroke=0.5,
     ...     bistable_stiffness=2.0, force_linearity=0.05, hinge_stiffness=1.0)
-    >>> straight = settle(Units.of(unit), chain_potential, np.array([[False]]), 1e-12)
+    >>> straight = settle(UnitSolutions.of(unit), chain_potential, np.array([[False]]), 1e-12)
     >>> compliance = tip(straight, with_compliance=True).compliance
     >>> compliance[COMPLIANCE_PAIRS.index((1, 1))].round(9)
     array([3.])

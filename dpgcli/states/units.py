@@ -16,7 +16,7 @@ WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twic
 
 
 @dataclass(frozen=True)
-class Units:
+class UnitSolutions:
     """What is known of a finger's units before any pattern is solved."""
 
     finger: Finger
@@ -65,21 +65,21 @@ class Units:
         return has_none
 
     @classmethod
-    def of(cls, finger: Finger) -> "Units":
+    def of(cls, finger: Finger) -> "UnitSolutions":
         wells = inverted_wells(finger)
         return cls(finger, wells, first_order(finger, wells))
 
-    def section(self, first: int, stop: int) -> "Units":
+    def section(self, first: int, stop: int) -> "UnitSolutions":
         """Units first+1 … stop, counted from the base, with all that is known of them."""
-        return Units(
+        return UnitSolutions(
             self.finger.section(first, stop),
             self.wells.section(first, stop),
             self.first_order.section(first, stop),
         )
 
-    def take_lanes(self, index: Indices) -> "Units":
+    def take_lanes(self, index: Indices) -> "UnitSolutions":
         """One design for each lane, by index, so that designs and patterns share a batch."""
-        return Units(
+        return UnitSolutions(
             self.finger.take_lanes(index),
             self.wells.take_lanes(index),
             self.first_order.take_lanes(index),

@@ -18,10 +18,10 @@ from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.rungs import DEFAULT_TOLERANCE
-from dpgcli.studies.work import Work
+from dpgcli.studies.work import ChunkTask
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
-from dpgcli.sweeps.executors import Chunk, Runner, Workplace, chunked
+from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
 from dpgcli.sweeps.extent import Extent, size_text
 from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
@@ -199,7 +199,7 @@ class Study:
         drop_parts(self.folder)
 
     def compute(
-        self, workplace: Workplace, watch: Callable[[Progress], None], shard: Shard | None = None
+        self, workplace: Backend, watch: Callable[[Progress], None], shard: Shard | None = None
     ) -> Progress:
         """Evaluate what is missing, part by part; `watch` sees the progress after each."""
         store, evaluation, space = self.store, self.evaluation, self.sweep.space
@@ -212,7 +212,7 @@ class Study:
         n_designs = sum(stop - start for start, stop in ranges)
         n_resumed = n_designs - sum(stop - start for start, stop in missing)
         progress = Progress(n_designs, n_resumed, n_resumed, workplace.n_workers)
-        work = Work(evaluation, store if workplace.is_local else None)
+        work = ChunkTask(evaluation, store if workplace.is_local else None)
         runner = Runner(workplace, work, lambda c: (c, space.designs(c.start, c.stop), HERE))
         began = perf_counter()
         for result in runner.run(chunked(missing, self.chunk_size)):

@@ -12,7 +12,7 @@ from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker
 
 
-class Done(NamedTuple):
+class ChunkResult(NamedTuple):
     """What a worker sends back: counts, CPU seconds, and the part if it could not store it.
 
     Without the bytes it is shorter than what a pipe takes at once: a worker that is killed
@@ -26,18 +26,18 @@ class Done(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Work:
+class ChunkTask:
     """What a worker does with a chunk; `store` is None where it sees no common disk."""
 
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> Done:
+    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> ChunkResult:
         """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
         check_maker(maker)
         return self.stored(chunk, self.evaluation(chunk.start, values))
 
-    def stored(self, chunk: Chunk, blocks: Iterable[Tables]) -> Done:
+    def stored(self, chunk: Chunk, blocks: Iterable[Tables]) -> ChunkResult:
         """Store the part as its blocks come, or send it along."""
         began = process_time()
         clock = _Clock()
@@ -49,7 +49,7 @@ class Work:
             content = None
             with self.store.part(chunk.start, chunk.stop) as file:
                 n_states = self._write(file, clock.timed(blocks))
-        return Done(n_states, clock.seconds, process_time() - began - clock.seconds, content)
+        return ChunkResult(n_states, clock.seconds, process_time() - began - clock.seconds, content)
 
     def _write(self, sink: IO[bytes], blocks: Iterable[Tables]) -> int:
         evaluation = self.evaluation

@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from dpgcli.errors import Field, Message, NoWorkerError
-from dpgcli.sweeps.executors import GO_ON, PERIOD, Workplace
+from dpgcli.sweeps.executors import GO_ON, PERIOD, Backend
 
 PATIENCE = 10  # s, for an answer of the scheduler
 SILENCE = 10  # s after which a word is said
@@ -50,7 +50,7 @@ class Watch:
         return f"{self.name}: nothing from {who} for {silence:.0f} s; waiting"
 
 
-def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Workplace:
+def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Backend:
     """The workers of a Dask cluster.
 
     Raises OSError where no scheduler answers, NoWorkerError where no worker comes within `limit`
@@ -67,7 +67,7 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Wo
     while not _threads(client):
         watch(0.0)
         sleep(PERIOD)
-    return Workplace(
+    return Backend(
         name,
         lambda _: client.get_executor(pure=False),
         sum(_threads(client).values()),

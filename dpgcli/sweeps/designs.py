@@ -14,7 +14,7 @@ from dpgcli.states.rows import RowRequest, solved_rows
 from dpgcli.states.rungs import Exactness
 from dpgcli.states.settle import lanes_at_once
 from dpgcli.states.solved import Surroundings
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.metrics import Metrics
 
 ROWS_AT_ONCE = 2**15  # of one design
@@ -71,7 +71,7 @@ def design_states(
             yield Block(designs, rows, metrics.columns() if is_last else None)
 
 
-def _designs(units: Units, index: Indices) -> Units:
+def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
     """Units of the designs at `index`; what there is one design of stays one."""
     return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 

@@ -15,7 +15,7 @@ from dpgcli.design.scene import ORIGINS, Scene
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
 from dpgcli.states.rungs import exactnesses
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import DESIGN_COLUMNS
@@ -27,20 +27,11 @@ Numbers = NDArray[Any]
 class DesignStatus(StrEnum):
     """What became of a design."""
 
-    STABLE = "stable"
-    PARTLY_STABLE = "partly_stable"
-    INVALID = "invalid"
-    EXCLUDED = "excluded"
-    FAILED = "failed"
-
-
-DESIGN_STATUS_MEANINGS = {
-    DesignStatus.STABLE: "every pattern has its certified state",
-    DesignStatus.PARTLY_STABLE: "some patterns have none",
-    DesignStatus.INVALID: "no such finger can exist; `reason` says why",
-    DesignStatus.EXCLUDED: "a constraint is not met",
-    DesignStatus.FAILED: "evaluating it killed its worker, twice",
-}
+    STABLE = "stable"  # every pattern has its certified state
+    PARTLY_STABLE = "partly_stable"  # some patterns have none
+    INVALID = "invalid"  # no such finger can exist; `reason` says why
+    EXCLUDED = "excluded"  # a constraint is not met
+    FAILED = "failed"  # evaluating it killed its worker, twice
 
 
 class Tables(NamedTuple):
@@ -187,7 +178,7 @@ class Evaluation:
         return allowed
 
     def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
-        found = exactnesses(Units.of(scene.finger), self.tolerance, self.target_error)
+        found = exactnesses(UnitSolutions.of(scene.finger), self.tolerance, self.target_error)
         for some, exactness in found:
             alike = scene if len(some) == len(places) else scene.take_lanes(some)
             for block in design_states(alike, exactness, self.quantities):
@@ -244,17 +235,15 @@ class Evaluation:
         return {column.name: rows[column.name] for column in self.design_columns}
 
 
-DESIGN = Column("design", "", "number in the order of the space", Group.STATES, Kind.COUNT)
-CALIBRATION = Column(
-    "calibration", "", "gravest origin of a spring constant", Group.STATES, Kind.TEXT
-)
-STATUS = Column("status", "", "what became of the design", Group.STATES, Kind.TEXT)
+DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
+CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)
+STATUS = Column("status", "", "what became of the design", kind=Kind.TEXT)
 RUNG_COLUMNS = (
-    Column("rung", "", "way chosen for the target error", Group.STATES, Kind.TEXT),
-    Column("error_bound_mm", "mm", "bound on the tips' error before the work", Group.STATES),
+    Column("rung", "", "way chosen for the target error", kind=Kind.TEXT),
+    Column("error_bound_mm", "mm", "bound on the tips' error before the work"),
 )
 EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
-REASON = Column("reason", "", "why the design is invalid", Group.STATES, Kind.TEXT)
+REASON = Column("reason", "", "why the design is invalid", kind=Kind.TEXT)
 
 
 class _Solved(NamedTuple):
@@ -277,8 +266,7 @@ def value_columns(space: Space) -> dict[str, Column]:
             short if last.count(short) == 1 and ".overrides." not in key else key,
             unit_of(key),
             f"value of {key}",
-            Group.STATES,
-            Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
+            kind=Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
         )
         for key, short in zip(space.keys, last, strict=True)
     }

@@ -92,7 +92,7 @@ class Runner(Generic[T]):
     `deaths` gathers the chunks that were under way when a worker died.
     """
 
-    workplace: "Workplace"
+    workplace: "Backend"
     function: Callable[..., T]
     arguments: Arguments
     deaths: list[Chunk] = field(default_factory=list)
@@ -198,7 +198,7 @@ class Runner(Generic[T]):
 
 
 @dataclass(frozen=True)
-class Workplace:
+class Backend:
     """Where to run: how to make an executor of n workers, and how many.
 
     `is_local` says that workers see this machine's files. `broken` is what an executor raises
@@ -218,14 +218,14 @@ class Workplace:
     watch: Callable[[float], None] = lambda _: None
 
 
-def serial() -> Workplace:
+def serial() -> Backend:
     """This process."""
-    return Workplace("this process", lambda _: SerialExecutor(), 1)
+    return Backend("this process", lambda _: SerialExecutor(), 1)
 
 
-def processes(n_workers: int) -> Workplace:
+def processes(n_workers: int) -> Backend:
     """A pool of processes on this machine."""
-    return Workplace("the pool of processes", process_pool, n_workers)
+    return Backend("the pool of processes", process_pool, n_workers)
 
 
 class SerialExecutor(Executor):

@@ -31,7 +31,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RequirementVerdict:
     """One requirement held against the designs; `rows` are those that fail it."""
 
     designs: pd.DataFrame
@@ -116,7 +116,7 @@ def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
     return np.flatnonzero(~met & _in_question(designs))
 
 
-def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[Verdict, ...]:
+def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[RequirementVerdict, ...]:
     """Hold every design against requirements in words; see `check_requirements`."""
     columns = number_columns(designs)
     return check_requirements(designs, [requirement(text, columns) for text in texts])
@@ -124,7 +124,7 @@ def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[Verdict,
 
 def check_requirements(
     designs: pd.DataFrame, requirements: Sequence[Expression]
-) -> tuple[Verdict, ...]:
+) -> tuple[RequirementVerdict, ...]:
     """Hold every requirement against every design that is not excluded.
 
     Raises NothingSelectedError if none is left: an empty space meets every requirement.
@@ -134,7 +134,10 @@ def check_requirements(
         raise NothingSelectedError(
             f"no design to check: the table has {len(designs):,}, all of them excluded"
         )
-    return tuple(Verdict(designs, rule, n_checked, failing(designs, rule)) for rule in requirements)
+    return tuple(
+        RequirementVerdict(designs, rule, n_checked, failing(designs, rule))
+        for rule in requirements
+    )
 
 
 def _in_question(designs: pd.DataFrame) -> Flags:

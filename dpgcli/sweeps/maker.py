@@ -13,7 +13,7 @@ import numpy as np
 import dpgcli
 from dpgcli.code import PACKAGE, sha256_of_code
 from dpgcli.errors import WorkplaceError
-from dpgcli.sweeps.executors import Workplace
+from dpgcli.sweeps.executors import Backend
 
 NO_NUMBERS = (
     "api",
@@ -57,7 +57,7 @@ def check_maker(maker: Maker) -> None:
         raise WorkplaceError(_mixed(f"a worker ({where})", str(HERE), maker))
 
 
-def check_workers(workplace: Workplace) -> None:
+def check_workers(workplace: Backend) -> None:
     """Ask all workers that are there; raises WorkplaceError for the first that is another."""
     for worker, maker in workplace.ask(WHO).items():
         if maker != HERE:

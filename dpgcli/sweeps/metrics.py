@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
@@ -17,31 +17,27 @@ CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
 CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
 
 DESIGN_COLUMNS = (
-    Column("n_units", "", "number of units", Group.STATES, Kind.COUNT),
-    Column("n_states", "", "number of patterns", Group.STATES, Kind.COUNT),
-    Column("n_stable", "", "number of certified states", Group.STATES, Kind.COUNT),
+    Column("n_units", "", "number of units", kind=Kind.COUNT),
+    Column("n_states", "", "number of patterns", kind=Kind.COUNT),
+    Column("n_stable", "", "number of certified states", kind=Kind.COUNT),
     Column(
         "n_distinct_tips",
         "",
         f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
-        Group.STATES,
-        Kind.COUNT,
+        kind=Kind.COUNT,
     ),
-    Column("workspace_area_mm2", "mm²", "area of the tips' convex hull", Group.STATES),
-    Column("reach_min_mm", "mm", "smallest distance of a tip from the base", Group.STATES),
-    Column("reach_max_mm", "mm", "largest distance of a tip from the base", Group.STATES),
+    Column("workspace_area_mm2", "mm²", "area of the tips' convex hull"),
+    Column("reach_min_mm", "mm", "smallest distance of a tip from the base"),
+    Column("reach_max_mm", "mm", "largest distance of a tip from the base"),
     Column("aperture_min_mm", "mm", "smallest aperture of the gripper", Group.GRIPPER),
     Column("aperture_max_mm", "mm", "largest aperture of the gripper", Group.GRIPPER),
-    Column("stiffness_min_N_per_mm", "N/mm", "softest tip direction of any state", Group.STATES),
-    Column("stiffness_max_N_per_mm", "N/mm", "stiffest tip direction of any state", Group.STATES),
+    Column("stiffness_min_N_per_mm", "N/mm", "softest tip direction of any state"),
+    Column("stiffness_max_N_per_mm", "N/mm", "stiffest tip direction of any state"),
     Column(
-        "min_barrier_mJ",
-        "mJ",
-        "smallest barrier of a unit to snap or reset, bars taken as rigid",
-        Group.STATES,
+        "min_barrier_mJ", "mJ", "smallest barrier of a unit to snap or reset, bars taken as rigid"
     ),
-    Column("max_residual_N", "N", "largest unbalanced force of any state", Group.STATES),
-    Column("max_tip_error_mm", "mm", "largest numerical error of any tip", Group.STATES),
+    Column("max_residual_N", "N", "largest unbalanced force of any state"),
+    Column("max_tip_error_mm", "mm", "largest numerical error of any tip"),
 )
 
 LEAST = {  # metric: what of the states it is the least of
@@ -66,7 +62,7 @@ class Metrics:
     and of the distinct tips, however many states there are.
     """
 
-    units: Units
+    units: UnitSolutions
     n_designs: int
     n_stable: Indices = field(init=False)
     extremes: dict[str, Array] = field(init=False, default_factory=dict)

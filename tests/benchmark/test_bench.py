@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dpgcli.benchmark import bench as module
-from dpgcli.benchmark.ablation import ABLATIONS, check_kept, kept_ways
+from dpgcli.benchmark.ablation import ABLATIONS, ablations, check_ablation
 from dpgcli.benchmark.bench import Bench, chosen_patterns, errors, repeated, varied
-from dpgcli.benchmark.methods import Found
+from dpgcli.benchmark.methods import BenchmarkResult
 from dpgcli.calibration.known import KnownStates
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.errors import UsageError
@@ -75,18 +75,18 @@ def test_errors_count_states_that_exist_only() -> None:
     patterns = chosen_patterns(2)
     reference = extended_states(finger(2), patterns)
     pose, energy = reference.pose.astype(float), reference.energy.astype(float)
-    exact = errors(Found(pose, energy), reference)
+    exact = errors(BenchmarkResult(pose, energy), reference)
     assert exact["max_tip_error_mm"] < 1e-14
     assert exact["n_missing"] == 0
     pose[0, 1] += 3e-3
     pose[1, 1] += 4e-3
     pose[:, 2] = np.nan
-    worse = errors(Found(pose, energy), reference)
+    worse = errors(BenchmarkResult(pose, energy), reference)
     assert worse["max_tip_error_mm"] == pytest.approx(5e-3)
     assert worse["rms_tip_error_mm"] == pytest.approx(5e-3 / np.sqrt(3))
     assert worse["n_missing"] == 1
     none = extended_states(finger(2, force_linearity=0.5), patterns)
-    assert errors(Found(pose, energy), none)["n_missing"] == 0
+    assert errors(BenchmarkResult(pose, energy), none)["n_missing"] == 0
 
 
 @pytest.mark.parametrize("n_units", [1, 3, 5, 6, 20, 64])
@@ -118,7 +118,7 @@ KEPT: dict[str, Scene] = {
 
 @pytest.mark.parametrize("name", ABLATIONS)
 def test_the_plans_bound_covers_what_putting_back_changes(name: str) -> None:
-    planned, kept = kept_ways(KEPT[name], name, None)
+    planned, kept = ablations(KEPT[name], name, None)
     planned.run()
     kept.run()
     assert kept.n_states == planned.n_states == 2 ** KEPT[name].finger.n_units
@@ -140,14 +140,14 @@ def test_what_explain_leaves_out_is_what_can_be_put_back(
     possible = set()
     for name in ABLATIONS:
         with suppress(UsageError):
-            check_kept(scene, name, target)
+            check_ablation(scene, name, target)
             possible.add(name)
     assert possible == left_out
 
 
 @pytest.mark.parametrize("target", [1e-2, 1e-1])
 def test_bars_dropped_for_a_target_and_put_back(target: float) -> None:
-    _, kept = kept_ways(Scene(finger(5), ()), "bars", target)
+    _, kept = ablations(Scene(finger(5), ()), "bars", target)
     assert 1e-4 < kept.change <= kept.bound <= target
 
 

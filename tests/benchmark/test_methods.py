@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dpgcli.benchmark.methods import other_ways, ways
+from dpgcli.benchmark.methods import package_methods, third_party_methods
 from dpgcli.benchmark.timing import measured, numpy_kernel, peak_bytes
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.reference.equilibria import extended_states
@@ -30,7 +30,7 @@ def finger(linear_stiffness: float, force_linearity: float = 0.043) -> Finger:
 def test_errors_of_the_ladder() -> None:
     reference = extended_states(finger(1e4), PATTERNS)
     seen = {}
-    for way in ways(finger(1e4), PATTERNS):
+    for way in package_methods(finger(1e4), PATTERNS):
         found = way.run()
         error = np.hypot(*(found.pose[:2] - reference.pose[:2]))
         energy = np.abs(found.energy - reference.energy)
@@ -43,14 +43,14 @@ def test_errors_of_the_ladder() -> None:
 
 
 def test_rigid_bars_have_fewer_ways() -> None:
-    names = [way.name for way in ways(finger(np.inf), PATTERNS)]
+    names = [way.name for way in package_methods(finger(np.inf), PATTERNS)]
     assert names == ["rigid bars, unit by unit", *(n for n in WORST if n.startswith("chain, ")
                                                    and "rigid" not in n)]  # fmt: skip
 
 
 def test_a_pattern_without_a_state_is_missing_from_every_way() -> None:
     impossible = finger(1e4, force_linearity=0.5)
-    every = list(ways(impossible, PATTERNS))
+    every = list(package_methods(impossible, PATTERNS))
     assert [way.name for way in every] == list(WORST)
     for way in every:
         found = way.run()
@@ -62,7 +62,7 @@ def test_a_pattern_without_a_state_is_missing_from_every_way() -> None:
 def test_others_find_the_same_states() -> None:
     few = PATTERNS[:, [3, 5]]
     reference = extended_states(finger(1e4), few)
-    others = list(other_ways(finger(1e4), few))
+    others = list(third_party_methods(finger(1e4), few))
     assert len(others) >= 3
     for way in others:
         found = way.run()

@@ -21,7 +21,7 @@ from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
 from dpgcli.states.settle import lanes_at_once, settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 pytestmark = pytest.mark.benchmark
 REFERENCE = {**STUDY, "linear_stiffness": 1e4}
@@ -36,7 +36,7 @@ def varied_designs(n_units: int, n_designs: int) -> Finger:
     return Finger(n_units, **arrays)
 
 
-def certified(units: Units, inverted: Any, formulation: Any) -> None:
+def certified(units: UnitSolutions, inverted: Any, formulation: Any) -> None:
     batch = settle(units, formulation, inverted, 1e-12)
     status = certify(batch, units, 1e-12)
     tip(batch, with_compliance=True)
@@ -53,14 +53,16 @@ def test_all_states_of_many_five_unit_designs(benchmark: Any) -> None:
     finger = varied_designs(5, n_designs)
     inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), n_designs)
     designs = np.repeat(np.arange(n_designs), 32)
-    benchmark(lambda: certified(Units.of(finger).take_lanes(designs), inverted, chain_potential))
+    benchmark(
+        lambda: certified(UnitSolutions.of(finger).take_lanes(designs), inverted, chain_potential)
+    )
     note_rate(benchmark, inverted.shape[1])
 
 
 @pytest.mark.parametrize("formulation", [chain_potential, lattice_potential])
 def test_states_of_one_five_unit_finger(benchmark: Any, formulation: Any) -> None:
     keep_freed_memory()
-    units = Units.of(uniform_finger(5, **REFERENCE))
+    units = UnitSolutions.of(uniform_finger(5, **REFERENCE))
     inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), lanes_at_once(5) // 32)
     benchmark(lambda: certified(units, inverted, formulation))
     note_rate(benchmark, inverted.shape[1])

@@ -8,7 +8,7 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import (
     BistableFit,
-    Choice,
+    BistableOptions,
     Opening,
     fit_bistable,
     law,
@@ -36,7 +36,7 @@ def curve(quantity: Quantity, seed: int | None = None, travel: Array = TRAVEL) -
 
 def fitted(data: Record, quantity: Quantity = Quantity.ENERGY, **options: object) -> BistableFit:
     opening = options.pop("opening", EQUAL)
-    return fit_bistable(data, Choice(opening, quantity, **options))  # type: ignore[arg-type]
+    return fit_bistable(data, BistableOptions(opening, quantity, **options))  # type: ignore[arg-type]
 
 
 def warned(found: BistableFit, start: str) -> list[str]:

@@ -353,7 +353,7 @@ def test_a_real_hinge_is_as_stiff_as_the_reference(call: Any, folder: Path) -> N
 @needs_solver
 def test_energy_is_the_work_of_the_pressure(folder: Path, call: Any) -> None:
     """Statics below the snap: what the solver balances, and energy and volume of our own."""
-    from dpgcli.calibration.fe.dome import Dome, dome_mesh
+    from dpgcli.calibration.fe.dome import DomeShape, dome_mesh
     from dpgcli.calibration.fe.energy import strain_energy, swept_volume
     from dpgcli.calibration.fe.models import DOME_CELLS
     from dpgcli.calibration.fe.results import displacements
@@ -364,7 +364,7 @@ def test_energy_is_the_work_of_the_pressure(folder: Path, call: Any) -> None:
     static = "*STEP, NLGEOM\n*STATIC\n0.05, 1, 1e-6, 0.05\n*DLOAD\nLOADED, P2, 0.14\n"
     model = deck.read_text().partition("*STEP")[0]
     deck.write_text(model + static + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
-    dome = Dome(height=6.5, thickness=0.75, elastic_modulus=26.0)
+    dome = DomeShape(height=6.5, thickness=0.75, elastic_modulus=26.0)
     mesh = dome_mesh(dome, *DOME_CELLS["coarse"])
     share, moved = displacements(solve(deck, Limits(60.0)).displacements, len(mesh.nodes))
     volume = np.concatenate([[0.0], swept_volume(mesh, moved[..., :2])])

@@ -24,7 +24,7 @@ from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import read_sweep
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.studies.sweep import Study
-from dpgcli.studies.work import Work
+from dpgcli.studies.work import ChunkTask
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import HERE
 
@@ -356,10 +356,10 @@ def test_what_a_worker_sends_is_less_than_a_pipe_takes_at_once(sweep: Path) -> N
     study = Study(read_sweep(sweep), sweep.parent / "out")
     study.store.say({})
     values = study.sweep.space.designs(0, 6)
-    done = Work(study.evaluation, study.store)(Chunk(0, 6), values, HERE)
+    done = ChunkTask(study.evaluation, study.store)(Chunk(0, 6), values, HERE)
     assert done.n_states == 5 * 8
     assert len(pickle.dumps(done)) < select.PIPE_BUF / 4
-    assert Work(study.evaluation, None)(Chunk(0, 6), values, HERE).content is not None
+    assert ChunkTask(study.evaluation, None)(Chunk(0, 6), values, HERE).content is not None
 
 
 def test_shares_of_the_time_add_up(call: Any, sweep: Path) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.choices import Method
-from dpgcli.calibration.grid import Law, Points
+from dpgcli.calibration.choices import GridMethod
+from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.design.calibrations import PUBLISHED, Calibration, DomeCurve, Fitted, Grid
 from dpgcli.design.dimensions import Design, Section, are_possible
 from dpgcli.design.resolve import Resolution, resolve
@@ -33,14 +33,14 @@ def sizes(**given: float) -> dict[str, Array]:
     return {key: np.array([value]) for key, value in given.items()}
 
 
-def grid(method: Method, *, is_regular: bool) -> Calibration:
+def grid(method: GridMethod, *, is_regular: bool) -> Calibration:
     """Values that are no product of powers, at the nodes of a grid or anywhere."""
     geometry = np.array([(h, t) for h in (4.5, 5.5, 6.6, 7.5) for t in (0.5, 0.7, 1.0)])
     if not is_regular:
         geometry = geometry + np.random.default_rng(3).uniform(-0.04, 0.04, geometry.shape)
     stiffness = 12.0 * geometry[:, 1] ** 2 * (1.0 + 0.1 * np.sin(geometry[:, 0]))
-    law = Law(method, Points(OVER, geometry, {STIFFNESS: stiffness}))
-    known = Grid(OVER, frozenset({STIFFNESS}), method is Method.SCALING, law)
+    law = GridLaw(method, Points(OVER, geometry, {STIFFNESS: stiffness}))
+    known = Grid(OVER, frozenset({STIFFNESS}), method is GridMethod.SCALING, law)
     return Calibration("grid.yaml", {}, {"elastic_modulus_MPa": 26.0}, grid=known)
 
 
@@ -77,7 +77,7 @@ DESIGNS = {
             np.array([1e4]),
             (grid(method, is_regular=is_regular), PUBLISHED),
         )
-        for method in Method
+        for method in GridMethod
         for is_regular in (True, False)
     },
     **{

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dpgcli.calibration.choices import Method
+from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.fits import Parameter, fit_linear
-from dpgcli.calibration.grid import Law, Points
+from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.errors import OutputError, SpecError
 from dpgcli.files.calibration import (
     Calibration,
@@ -307,11 +307,11 @@ def test_a_fit_is_written_and_read_back(path: Path) -> None:
     assert again.values.force_linearity.interval is None
 
 
-@pytest.mark.parametrize("method", list(Method))
-def test_a_grid_is_written_and_read_back(path: Path, method: Method) -> None:
+@pytest.mark.parametrize("method", list(GridMethod))
+def test_a_grid_is_written_and_read_back(path: Path, method: GridMethod) -> None:
     geometry = np.array([[4.0, 0.5], [5.0, 0.5], [4.0, 1.0], [6.0, 1.0], [5.0, 0.8]])
     quantities = {"bistable_stiffness_N_per_mm": np.array([5.0, 4.8, 35.0, 31.0, 18.0])}
-    law = Law(method, Points(("dome_height_mm", "dome_thickness_mm"), geometry, quantities))
+    law = GridLaw(method, Points(("dome_height_mm", "dome_thickness_mm"), geometry, quantities))
     head = {"calibration_version": 1, "made_by": made_by(), "method": "test"}
     write_calibration(path, Calibration.model_validate({**head, "grid": grid_of(law)}))
     grid = read_calibration(path).grid

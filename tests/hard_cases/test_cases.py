@@ -21,7 +21,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.margins import limits
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 NAMES = [family.name for family in FAMILIES]
 
@@ -146,5 +146,5 @@ def test_unknown_families_are_named_with_what_there_is() -> None:
 def test_a_finger_graded_in_its_lengths_alone_can_be_solved() -> None:
     finger: Finger = changed(study_finger(), segment_length=np.array([13.5, 10.0, 20.0]))
     inverted = np.array([[True], [False], [True]])
-    batch = settle(Units.of(finger), chain_potential, inverted, 1e-12)
-    assert certify(batch, Units.of(finger), 1e-12).tolist() == [Status.STABLE]
+    batch = settle(UnitSolutions.of(finger), chain_potential, inverted, 1e-12)
+    assert certify(batch, UnitSolutions.of(finger), 1e-12).tolist() == [Status.STABLE]

@@ -19,7 +19,7 @@ from dpgcli.states.columns import Kind
 from dpgcli.states.margins import limits
 from dpgcli.states.plan import FORMULATIONS
 from dpgcli.states.settle import settle, settle_from
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 UNIT = rigid(study_finger().with_units([0]))
 
@@ -155,7 +155,7 @@ def test_the_six_minima_of_one_unit_are_found_and_two_are_physical(formulation: 
 def test_from_anywhere_one_unit_ends_in_one_of_six_minima_and_two_are_certified() -> None:
     angles = np.linspace(-3.0, 3.0, 25)
     guess = np.stack(np.meshgrid(angles, angles)).reshape(2, -1)
-    chain, units = chain_potential(UNIT), Units.of(UNIT)
+    chain, units = chain_potential(UNIT), UnitSolutions.of(UNIT)
     ground = np.zeros((1, guess.shape[1]), bool)
     batches = [settle_from(units, chain, pattern, guess, 1e-12) for pattern in (ground, ~ground)]
     stable = [certify(batch, units, 1e-12) == Status.STABLE for batch in batches]
@@ -192,7 +192,7 @@ def test_rounding_the_coordinates_leaves_no_more_than_the_floor(name: str) -> No
     finger = study_finger()
     answer = answered(case_of(finger, "111", name))
     potential = FORMULATIONS[name](finger)
-    batch = settle(Units.of(finger), FORMULATIONS[name], np.ones((3, 1), bool), 1e-12)
+    batch = settle(UnitSolutions.of(finger), FORMULATIONS[name], np.ones((3, 1), bool), 1e-12)
     here = batch.equilibrium.coordinates
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (len(here), 500))
     half_a_digit = here * (1.0 + 0.5 * np.finfo(float).eps * signs)

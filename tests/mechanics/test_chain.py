@@ -11,7 +11,7 @@ from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 
 FORMULATIONS: dict[str, tuple[Formulate, float]] = {
@@ -30,7 +30,7 @@ def energy_of(u: Array) -> Array:
 
 TRAVEL = np.linspace(0.0, 1.4, 8)  # few: the stiffness has a kink at each
 TABULATED = Tabulated(spline(tuple(TRAVEL), tuple(energy_of(TRAVEL))))
-LAWS: dict[str, Law] = {
+LAWS: dict[str, DomeLaw] = {
     "published": PUBLISHED,
     "tabulated": TABULATED,
     "pushes": PushOnly(PUBLISHED),

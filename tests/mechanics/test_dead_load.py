@@ -17,7 +17,7 @@ from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 FORCE = (0.15, -0.25)  # N
@@ -75,7 +75,10 @@ def test_it_solves_and_certifies(
     formulate: Formulate, linear_stiffness: float, reference_finger: Fingers
 ) -> None:
     """The tip goes where the whole energy is least, by a minimizer that shares no code."""
-    units, inverted = Units.of(reference_finger(3, linear_stiffness)), np.array([[1], [0], [1]]) > 0
+    units, inverted = (
+        UnitSolutions.of(reference_finger(3, linear_stiffness)),
+        np.array([[1], [0], [1]]) > 0,
+    )
     settled = settle(units, partial(loaded, formulate), inverted, 1e-12)
     assert settled.status.tolist() == [Status.STABLE]
     pose = tip(settled, with_compliance=False).pose

@@ -22,7 +22,7 @@ from dpgcli.reference.equilibria import ExtendedStates, extended_states
 from dpgcli.reference.units import Unit, extended_units, inverted_angle, spring_barrier
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import min_eigenvalues, tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 FOLD = 0.0964682337467354  # α at which the reference unit with rigid bars loses its second well
 LONG_DOUBLE = 4.0 * float(np.finfo(np.longdouble).eps)
@@ -44,7 +44,7 @@ def units_of(*patterns: str) -> Flags:
 
 
 def solver_nodes(finger: Finger, inverted: Flags) -> Array:
-    batch = settle(Units.of(finger), chain_potential, inverted, 1e-12)
+    batch = settle(UnitSolutions.of(finger), chain_potential, inverted, 1e-12)
     stations = batch.potential.coordinates.stations(batch.equilibrium.coordinates)
     return np.stack(stations, axis=1).reshape(4 * finger.n_units, -1)
 
@@ -137,7 +137,7 @@ def test_agrees_with_the_solver(linear_stiffness: float) -> None:
     finger = graded_finger(3, linear_stiffness)
     inverted = units_of("010", "110", "111")
     states = extended_states(finger, inverted)
-    batch = settle(Units.of(finger), chain_potential, inverted, 1e-12)
+    batch = settle(UnitSolutions.of(finger), chain_potential, inverted, 1e-12)
     at_tip = tip(batch, with_compliance=False)
     assert np.abs(states.pose[:2] - at_tip.pose[:2]).max() < 1e-12
     assert np.abs(states.pose[2] - at_tip.pose[2]).max() < 1e-13

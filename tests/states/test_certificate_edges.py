@@ -19,7 +19,7 @@ from dpgcli.states.pairs.compose import _Block, _fit, paired_states
 from dpgcli.states.pairs.halves import Half, Split
 from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
 Fingers = Callable[..., Finger]
@@ -27,14 +27,14 @@ Patterns = Callable[[int], Flags]
 
 
 @pytest.fixture
-def stable(reference_finger: Fingers) -> tuple[Settled, Units]:
-    units = Units.of(reference_finger(3, 1e4))
+def stable(reference_finger: Fingers) -> tuple[Settled, UnitSolutions]:
+    units = UnitSolutions.of(reference_finger(3, 1e4))
     batch = settle(units, chain_potential, np.array([[True], [False], [True]]), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     return batch, units
 
 
-def status_with(stable: tuple[Settled, Units], **changes: object) -> Status:
+def status_with(stable: tuple[Settled, UnitSolutions], **changes: object) -> Status:
     """The status if some numbers of the equilibrium were others."""
     batch, units = stable
     equilibrium = replace(batch.equilibrium, **changes)  # type: ignore[arg-type]
@@ -44,7 +44,7 @@ def status_with(stable: tuple[Settled, Units], **changes: object) -> Status:
 
 @pytest.mark.parametrize("residual", [np.nan, np.inf, 1.1e-12])
 def test_a_residual_above_the_tolerance_or_none_at_all(
-    stable: tuple[Settled, Units], residual: float
+    stable: tuple[Settled, UnitSolutions], residual: float
 ) -> None:
     relative = np.array([residual])
     assert status_with(stable, relative_residual=relative) is Status.NOT_CONVERGED
@@ -52,12 +52,12 @@ def test_a_residual_above_the_tolerance_or_none_at_all(
 
 @pytest.mark.parametrize("curvature", [np.nan, -1.0, 0.0, 1.4e-8])
 def test_a_curvature_that_is_not_safely_positive(
-    stable: tuple[Settled, Units], curvature: float
+    stable: tuple[Settled, UnitSolutions], curvature: float
 ) -> None:
     assert status_with(stable, curvature=np.array([curvature])) is Status.MARGINAL
 
 
-def test_the_gravest_reason_is_given(stable: tuple[Settled, Units]) -> None:
+def test_the_gravest_reason_is_given(stable: tuple[Settled, UnitSolutions]) -> None:
     batch, units = stable
     folded = replace(batch, is_folded=np.ones(1, bool))
     assert certify(folded, units, 1e-12).tolist() == [Status.FOLDED]
@@ -71,7 +71,7 @@ def test_the_gravest_reason_is_given(stable: tuple[Settled, Units]) -> None:
 
 @pytest.mark.parametrize(("share", "status"), [(0.09, "STABLE"), (0.11, "NOT_CONVERGED")])
 def test_an_unbalance_that_a_weak_well_would_not_bear(
-    stable: tuple[Settled, Units], share: float, status: str
+    stable: tuple[Settled, UnitSolutions], share: float, status: str
 ) -> None:
     """A moment of 1e-6 N times H is small against the forces in play, not against that well."""
     batch, units = stable
@@ -84,7 +84,7 @@ def test_an_unbalance_that_a_weak_well_would_not_bear(
 
 @pytest.mark.parametrize(("part", "status"), [(0.9, "STABLE"), (1.1, "NOT_CONVERGED")])
 def test_an_unbalance_that_a_fold_so_near_would_not_bear(
-    stable: tuple[Settled, Units], part: float, status: str
+    stable: tuple[Settled, UnitSolutions], part: float, status: str
 ) -> None:
     """Curvature 1e-3: a tenth of κ²/96 of (k_b + k_θ/H²) d, which is 45.67 N."""
     gradient = stable[0].equilibrium.gradient.copy()
@@ -93,7 +93,7 @@ def test_an_unbalance_that_a_fold_so_near_would_not_bear(
     assert status_with(stable, gradient=gradient, curvature=curvature) is Status[status]
 
 
-def test_a_faint_hinge_is_no_fold(stable: tuple[Settled, Units]) -> None:
+def test_a_faint_hinge_is_no_fold(stable: tuple[Settled, UnitSolutions]) -> None:
     """Rounding is allowed whatever the curvature."""
     gradient = stable[0].equilibrium.gradient.copy()
     gradient[2] = 0.9e-14 * 45.6729 * 10.75
@@ -133,7 +133,7 @@ STIFF = {
 @pytest.mark.parametrize("ratio", [1e13, 1e14, 1e15 / 6.0])
 def test_between_very_stiff_bars_no_state_is_certified_that_is_none(ratio: float) -> None:
     """What rounding leaves of the bars' forces exceeds all that the dome can do."""
-    units = Units.of(uniform_finger(1, **STIFF, linear_stiffness=6.0 * ratio))
+    units = UnitSolutions.of(uniform_finger(1, **STIFF, linear_stiffness=6.0 * ratio))
     inverted = np.ones((1, 1), bool)
     chain = settle(units, chain_potential, inverted, 1e-12)
     assert certify(chain, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
@@ -154,7 +154,11 @@ def test_a_strut_pulled_through_its_base_is_folded() -> None:
         hinge_stiffness=100.0,
         linear_stiffness=0.2,
     )
-    units, chain, inverted = Units.of(finger), chain_potential(finger), np.ones((2, 1), bool)
+    units, chain, inverted = (
+        UnitSolutions.of(finger),
+        chain_potential(finger),
+        np.ones((2, 1), bool),
+    )
     guess = chain.coordinates.of_shape(geometric_guess(finger, inverted, units.first_order))
     astray = settle_from(units, chain, inverted, guess, 1e-12)
     assert 10.0 + astray.equilibrium.coordinates[3, 0] == pytest.approx(-2.4958, abs=1e-4)
@@ -185,7 +189,7 @@ class OfHalves(Split):
 
 def test_a_pair_that_is_not_convex_is_marginal(reference_finger: Fingers) -> None:
     """Both halves are minima with their strut held; what is negative is their sum at the strut."""
-    own = Split(Units.of(reference_finger(4, 1e7)), 2, 1, 1e-12)
+    own = Split(UnitSolutions.of(reference_finger(4, 1e7)), 2, 1, 1e-12)
     (states,) = paired_states(own)
     fits = states.status == Status.STABLE
     assert fits.sum() == 12
@@ -198,7 +202,7 @@ def test_the_shared_strut_feels_both_halves_and_their_disagreement(
     reference_finger: Fingers, pull: float
 ) -> None:
     """Force at the strut: pulls of both, and of the held outer half per mm times the gap."""
-    split = Split(Units.of(reference_finger(4, 1e4)), 2, 1, 1e-12)
+    split = Split(UnitSolutions.of(reference_finger(4, 1e4)), 2, 1, 1e-12)
     inner, outer = split.inner(), split.outer()
     assert inner.joint is not None
     assert outer.joint is not None
@@ -224,7 +228,7 @@ def test_units_of_halves_are_those_of_the_whole(
         hinge_stiffness=24.2 * strong,
         force_linearity=np.array([0.043, 0.105, 0.043, 0.043, 0.043, 0.043])[:, None],
     )
-    split = Split(Units.of(finger), 3, 2, 1e-12)
+    split = Split(UnitSolutions.of(finger), 3, 2, 1e-12)
     (pairs,) = paired_states(split)
     direct = certify(
         settle(split.units, chain_potential, all_patterns(6), 1e-12), split.units, 1e-12
@@ -237,7 +241,7 @@ def test_units_of_halves_are_those_of_the_whole(
 def test_a_walk_near_a_fold_goes_on_to_where_rounding_ends_it(reference_finger: Fingers) -> None:
     """There, a tolerance of 1e-3 would let a unit stop that has nowhere to rest."""
     finger = reference_finger(1, force_linearity=0.0964682337467354 + 1e-5)
-    units, chain = Units.of(finger), chain_potential(finger)
+    units, chain = UnitSolutions.of(finger), chain_potential(finger)
     start = np.full((2, 1), np.arcsin(0.765 * 3.5 / 21.5))
     assert np.abs(chain.coordinates.corner_moments(start, start * 0.0)).max() == 0.0
     batch = settle_from(units, chain, np.ones((1, 1), bool), start, 1e-3)
@@ -246,17 +250,19 @@ def test_a_walk_near_a_fold_goes_on_to_where_rounding_ends_it(reference_finger: 
 
 def test_soft_bars_do_not_prove_that_there_is_no_well(reference_finger: Fingers) -> None:
     """A unit between rigid bars has none; between soft ones that is not said, and it may rest."""
-    soft = Units.of(reference_finger(1, 0.5, force_linearity=0.1))
+    soft = UnitSolutions.of(reference_finger(1, 0.5, force_linearity=0.1))
     assert not soft.wells.exists.any()
     assert soft.are_soft.all()
     assert not soft.have_no_well.any()
-    stiff = Units.of(reference_finger(1, 1e4, force_linearity=0.1))
+    stiff = UnitSolutions.of(reference_finger(1, 1e4, force_linearity=0.1))
     assert stiff.have_no_well.all()
-    never = Units.of(reference_finger(1, 0.5, force_linearity=0.112))
+    never = UnitSolutions.of(reference_finger(1, 0.5, force_linearity=0.112))
     assert never.have_no_well.all(), "the dome itself turns over nowhere"
 
 
-def test_a_unit_in_its_well_is_there_whatever_rigid_bars_say(stable: tuple[Settled, Units]) -> None:
+def test_a_unit_in_its_well_is_there_whatever_rigid_bars_say(
+    stable: tuple[Settled, UnitSolutions],
+) -> None:
     """Beyond a rigid fold, elastic bars may still leave a well: who rests in it is bistable."""
     batch, units = stable
     none = replace(units.wells, exists=np.zeros((1, 1), bool))
@@ -270,7 +276,7 @@ def test_at_a_rigid_fold_the_walk_goes_on_until_the_elastic_well_is_sure(
     """What rigid bars lack is 1e-13 of the forces in play; a residual of 1e-12 would not do."""
     linearity = 0.0964682337467354 * (1.0 + past)
     finger = reference_finger(1, 12.84e9, force_linearity=linearity)
-    units, inverted = Units.of(finger), np.ones((1, 1), bool)
+    units, inverted = UnitSolutions.of(finger), np.ones((1, 1), bool)
     batch = settle(units, chain_potential, inverted, 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     potential = chain_potential(finger)
@@ -293,7 +299,7 @@ def test_near_a_right_angle_moments_count_by_their_lever(
         hinge_stiffness=2.928e-5,
         linear_stiffness=4.33e14,
     )
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     batch = settle(units, formulation, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12)[0] != Status.STABLE
 
@@ -305,10 +311,11 @@ def test_a_dome_that_only_pushes_keeps_the_state_that_elastic_bars_leave_it(
     """Beyond the rigid fold; the search begins where the dome is in touch."""
     linearity = 0.0964682337467354 * (1.0 + past)
     both = reference_finger(3, 12.84 * ratio, force_linearity=linearity)
-    pushing = Units.of(replace(both, law=PushOnly(PUBLISHED)))
+    pushing = UnitSolutions.of(replace(both, law=PushOnly(PUBLISHED)))
     inverted = np.array([[True], [False], [True]])
     batches = [
-        settle(units, chain_potential, inverted, 1e-12) for units in (Units.of(both), pushing)
+        settle(units, chain_potential, inverted, 1e-12)
+        for units in (UnitSolutions.of(both), pushing)
     ]
     tips = [tip(batch, with_compliance=False).pose[:, 0] for batch in batches]
     assert certify(batches[1], pushing, 1e-12).tolist() == [Status.STABLE]
@@ -320,7 +327,7 @@ def test_a_dome_beyond_the_lever_leaves_the_ground_state(reference_finger: Finge
     travel = np.linspace(0.0, 1.5, 301)
     energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
     law = PushOnly(Tabulated(spline(tuple(travel), tuple(energy))))
-    units = Units.of(replace(reference_finger(3, 1e4, stroke=43.0), law=law))
+    units = UnitSolutions.of(replace(reference_finger(3, 1e4, stroke=43.0), law=law))
     assert not units.wells.exists.any()
     assert np.isfinite(units.wells.angle).all()
     inverted = np.array([[False, True], [False, False], [False, False]])
@@ -332,7 +339,7 @@ def test_a_dome_without_a_second_well_is_never_inverted(reference_finger: Finger
     travel = np.linspace(0.0, 0.8, 30)  # the curve ends before its well
     energy = 0.5 * travel**2 * (0.043 + 0.957 * (1.0 - travel) ** 2)
     law = Tabulated(spline(tuple(travel), tuple(energy)))
-    units = Units.of(replace(reference_finger(1, 1e4), law=law))
+    units = UnitSolutions.of(replace(reference_finger(1, 1e4), law=law))
     batch = settle(units, chain_potential, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.NOT_BISTABLE]
 
@@ -351,7 +358,7 @@ def test_soft_units_meet_wherever_a_curve_has_its_well(reference_finger: Fingers
         hinge_stiffness=4.0,
         linear_stiffness=7.0,
     )
-    units = Units.of(replace(finger, law=Tabulated(spline(tuple(travel), tuple(energy)))))
+    units = UnitSolutions.of(replace(finger, law=Tabulated(spline(tuple(travel), tuple(energy)))))
     batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.FOLDED]
 

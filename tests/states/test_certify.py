@@ -15,13 +15,13 @@ from dpgcli.states.certify import Status, certified, certify
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.settle import settle, settle_from
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 
 
 def statuses(finger: Finger, guess: Array, inverted: Flags) -> NDArray[np.uint8]:
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     return settle_from(units, chain_potential(finger), inverted, guess, 1e-12).status
 
 
@@ -60,8 +60,8 @@ def test_a_finger_without_hinges_is_a_mechanism(
     reference_finger: Fingers, linear_stiffness: float
 ) -> None:
     finger = reference_finger(3, linear_stiffness, hinge_stiffness=0.0)
-    batch = settle(Units.of(finger), chain_potential, np.zeros((3, 1), bool), 1e-12)
-    assert certify(batch, Units.of(finger), 1e-12).tolist() == [Status.MARGINAL]
+    batch = settle(UnitSolutions.of(finger), chain_potential, np.zeros((3, 1), bool), 1e-12)
+    assert certify(batch, UnitSolutions.of(finger), 1e-12).tolist() == [Status.MARGINAL]
 
 
 @pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
@@ -75,7 +75,7 @@ def test_a_mechanism_is_predicted_without_warnings(
 def test_one_hingeless_unit_leaves_the_search_finite(reference_finger: Fingers) -> None:
     hinges = np.array([[24.2], [0.0], [24.2]])
     finger = Finger(3, **(reference_finger(3, 1e4).arrays() | {"hinge_stiffness": hinges}))
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     batch = settle(units, chain_potential, np.zeros((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.MARGINAL]
 
@@ -96,7 +96,7 @@ def test_one_hingeless_unit_is_predicted_without_warnings(
 def test_a_saddle_is_not_called_stable(reference_finger: Fingers) -> None:
     finger = reference_finger(1)
     half = np.arcsin(2.004174241840 / 21.5)
-    chain, units = chain_potential(finger), Units.of(finger)
+    chain, units = chain_potential(finger), UnitSolutions.of(finger)
     at_barrier = minimize(chain, np.full((2, 1), half), 1e-3, max_iterations=1)
     reached = np.ones((1, 1), bool)
     batch = certified(units, chain, reached, at_barrier, 1e-3)
@@ -120,7 +120,7 @@ def test_crossed_struts_are_not_called_stable(reference_finger: Fingers) -> None
 
 
 def test_an_unreachable_tolerance_is_not_converged(graded_finger: Fingers) -> None:
-    units = Units.of(graded_finger(4, 42, 1e4))
+    units = UnitSolutions.of(graded_finger(4, 42, 1e4))
     inverted = np.ones((4, 1), bool)
     batch = settle(units, chain_potential, inverted, 1e-30)
     assert certify(batch, units, 1e-30).tolist() == [Status.NOT_CONVERGED]
@@ -136,14 +136,14 @@ def test_near_the_loss_of_bistability_elastic_fingers_keep_their_states(
 ) -> None:
     """Elastic bars make room for the dome: bistability is lost later than with rigid ones."""
     linearity = 0.0964682337467354 - margin
-    units = Units.of(reference_finger(3, linear_stiffness, force_linearity=linearity))
+    units = UnitSolutions.of(reference_finger(3, linear_stiffness, force_linearity=linearity))
     batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
 
 def test_at_the_rigid_fold_elastic_fingers_keep_their_states(reference_finger: Fingers) -> None:
     linearity = 0.0964682337467354 - 1e-12
-    units = Units.of(reference_finger(3, 50.0, force_linearity=linearity))
+    units = UnitSolutions.of(reference_finger(3, 50.0, force_linearity=linearity))
     batch = settle(units, chain_potential, np.ones((3, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
 
@@ -162,7 +162,7 @@ def test_with_soft_bars_patterns_are_distinct_minima(
     reference_finger: Fingers, all_patterns: Callable[[int], Flags], relative_stiffness: float
 ) -> None:
     """k_L down to k_b: the wells the pattern names are told apart by the rigid barrier."""
-    units = Units.of(reference_finger(5, 12.84 * relative_stiffness))
+    units = UnitSolutions.of(reference_finger(5, 12.84 * relative_stiffness))
     batch = settle(units, chain_potential, all_patterns(5), 1e-12)
     assert (certify(batch, units, 1e-12) == Status.STABLE).all()
     openings = batch.potential.coordinates.openings(batch.equilibrium.coordinates)

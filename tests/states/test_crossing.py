@@ -15,7 +15,7 @@ from dpgcli.states.certify import Status, certify
 from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.settle import settle, settle_from
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]
@@ -31,7 +31,7 @@ def simple(nodes: Stations, height: float) -> Flags:
     return np.array(rings)
 
 
-def stations(batch_of: Units, coordinates: Array) -> Stations:
+def stations(batch_of: UnitSolutions, coordinates: Array) -> Stations:
     return Chain(batch_of.finger).stations(coordinates)
 
 
@@ -41,7 +41,7 @@ def test_a_finger_of_the_study_meets_itself_from_21_units_on(
     reference_finger: Fingers, n_units: int, status: str, formulation: Formulate
 ) -> None:
     """17.36° a unit: 20 turn by 347°, 21 by 365°."""
-    units = Units.of(reference_finger(n_units, 1e4))
+    units = UnitSolutions.of(reference_finger(n_units, 1e4))
     batch = settle(units, formulation, np.ones((n_units, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status[status]]
 
@@ -61,7 +61,7 @@ def test_no_state_is_certified_that_crosses_itself_and_none_refused_that_does_no
             hinge_stiffness=np.array([[24.2]]),
             linear_stiffness=np.array([[1e5]]),
         )
-        units = Units.of(finger)
+        units = UnitSolutions.of(finger)
         inverted = random.random((n, 60)) < random.random(60) ** 0.3
         batch = settle(units, chain_potential, inverted, 1e-10)
         is_open = simple(stations(units, batch.equilibrium.coordinates), 10.75)
@@ -74,7 +74,7 @@ def test_no_state_is_certified_that_crosses_itself_and_none_refused_that_does_no
 def test_pairs_say_what_the_whole_finger_says(
     reference_finger: Fingers, all_patterns: Patterns
 ) -> None:
-    units = Units.of(reference_finger(12, 1e6, stroke=8.0))
+    units = UnitSolutions.of(reference_finger(12, 1e6, stroke=8.0))
     (pairs,) = paired_states(Split(units, 6, 2, 1e-12))
     direct = certify(settle(units, chain_potential, all_patterns(12), 1e-12), units, 1e-12)
     fits = pairs.status != Status.NOT_CONVERGED
@@ -86,16 +86,16 @@ def test_pairs_say_what_the_whole_finger_says(
 def test_a_loop_of_soft_units_is_looked_for_by_their_stroke(reference_finger: Fingers) -> None:
     """Where the rigid well does not tell how far a unit turns, the full stroke does."""
     finger = reference_finger(20, 12.84 * 0.05, force_linearity=0.09)
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     assert units.are_soft.all()
     assert units.shortest_loop is not None, "20 units of 18.7°"
-    stiff = Units.of(reference_finger(20, 1e4))
+    stiff = UnitSolutions.of(reference_finger(20, 1e4))
     assert stiff.shortest_loop is None, "20 units of 17.4°"
 
 
 def test_a_shape_given_as_a_start_is_looked_at_too(reference_finger: Fingers) -> None:
     finger = reference_finger(24, 1e4)
-    units, chain = Units.of(finger), chain_potential(finger)
+    units, chain = UnitSolutions.of(finger), chain_potential(finger)
     inverted = np.ones((24, 1), bool)
     start = settle(units, chain_potential, inverted, 1e-12).equilibrium.coordinates
     assert settle_from(units, chain, inverted, start, 1e-12).is_folded.tolist() == [True]

@@ -13,7 +13,7 @@ from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Extended = Callable[[Finger, Array], Any]
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well
@@ -25,7 +25,7 @@ def true_and_stated_errors(
     formulate: Formulate,
     extended_state: Extended,
 ) -> tuple[float, float]:
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     batch = settle(units, formulate, inverted, 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status.STABLE]
     at_tip = tip(batch, with_compliance=False)
@@ -135,7 +135,7 @@ def test_tip_error_covers_the_rounding_of_long_rigid_fingers(
     stroke: float,
 ) -> None:
     inverted = np.random.default_rng(13).random((n_units, 40)) < np.linspace(0.0, 1.0, 40)
-    units = Units.of(reference_finger(n_units, stroke=stroke))
+    units = UnitSolutions.of(reference_finger(n_units, stroke=stroke))
     at_tip = tip(settle(units, chain_potential, inverted, 1e-12), with_compliance=False)
     for state in range(40):
         with mpmath.workdps(40):

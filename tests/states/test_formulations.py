@@ -10,7 +10,7 @@ from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 TOLERANCE = 1e-12
 
@@ -20,7 +20,7 @@ TOLERANCE = 1e-12
 def test_chain_and_lattice_agree_on_every_node_of_every_state(
     reference_finger: Callable[..., Finger], n_units: int, linear_stiffness: float
 ) -> None:
-    units = Units.of(reference_finger(n_units, linear_stiffness))
+    units = UnitSolutions.of(reference_finger(n_units, linear_stiffness))
     inverted = inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units)
     nodes = []
     for formulate in (chain_potential, lattice_potential):
@@ -40,11 +40,13 @@ def test_designs_side_by_side_are_solved_as_each_alone(
     }
     patterns = inverted_units(np.arange(8, dtype=np.uint64), 3)
     together = settle(
-        Units.of(Finger(3, **arrays)).take_lanes(np.repeat(np.arange(3), 8)),
+        UnitSolutions.of(Finger(3, **arrays)).take_lanes(np.repeat(np.arange(3), 8)),
         chain_potential,
         np.tile(patterns, 3),
         TOLERANCE,
     )
-    alone = [settle(Units.of(finger), chain_potential, patterns, TOLERANCE) for finger in fingers]
+    alone = [
+        settle(UnitSolutions.of(finger), chain_potential, patterns, TOLERANCE) for finger in fingers
+    ]
     expected = np.concatenate([batch.equilibrium.coordinates for batch in alone], axis=1)
     np.testing.assert_allclose(together.equilibrium.coordinates, expected, rtol=1e-13, atol=1e-16)

@@ -15,7 +15,7 @@ from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 EXPONENTS = st.floats(-3.0, 3.0)
@@ -51,7 +51,7 @@ def test_states_do_not_depend_on_the_units_of_measure(
     scaled = in_other_units(finger, 10.0**length, 10.0**force)
     statuses, poses, reached = [], [], []
     for f, unit in ((finger, 1.0), (scaled, 10.0**length)):
-        units = Units.of(f)
+        units = UnitSolutions.of(f)
         batch = settle(units, chain_potential, all_patterns(3), 1e-12)
         statuses.append(certify(batch, units, 1e-12))
         poses.append(tip(batch, with_compliance=False).pose / np.array([[unit], [unit], [1.0]]))

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.wells import barriers, inverted_wells
@@ -25,7 +25,7 @@ def table(linearity: float = 0.043) -> Curve:
     return spline(tuple(TRAVEL), tuple(energy))
 
 
-LAWS: tuple[Law, ...] = (Tabulated(table()), PushOnly(PUBLISHED), PushOnly(Tabulated(table())))
+LAWS: tuple[DomeLaw, ...] = (Tabulated(table()), PushOnly(PUBLISHED), PushOnly(Tabulated(table())))
 
 
 def rows(finger: Finger, **request: object) -> dict[str, np.ndarray]:
@@ -33,7 +33,7 @@ def rows(finger: Finger, **request: object) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
-def test_both_formulations_agree(graded_finger: Fingers, law: Law) -> None:
+def test_both_formulations_agree(graded_finger: Fingers, law: DomeLaw) -> None:
     finger = replace(graded_finger(3, 5), law=law)
     chain, lattice = (rows(finger, formulation=name) for name in ("chain", "lattice"))
     assert (chain["status"] == "stable").all()
@@ -45,7 +45,9 @@ def test_both_formulations_agree(graded_finger: Fingers, law: Law) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.description)
-def test_free_shapes_do_not_feel_whether_domes_pull(reference_finger: Fingers, law: Law) -> None:
+def test_free_shapes_do_not_feel_whether_domes_pull(
+    reference_finger: Fingers, law: DomeLaw
+) -> None:
     """Inverted domes push in every state, ground ones are at rest."""
     finger = reference_finger(4, 1e4)
     both = rows(finger), rows(replace(finger, law=law))
@@ -129,13 +131,13 @@ LAWS = [PUBLISHED, Tabulated(table()), PushOnly(PUBLISHED), PushOnly(Tabulated(t
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
-def test_pairs_of_halves_are_for_every_law(reference_finger: Fingers, law: Law) -> None:
+def test_pairs_of_halves_are_for_every_law(reference_finger: Fingers, law: DomeLaw) -> None:
     scene = Scene(replace(reference_finger(14, 1e4), law=law), ())
     assert explain(scene, Request(columns=("tip_x_mm",))).method is Method.PAIRS
 
 
 @pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.description)
-def test_long_fingers_agree_with_a_direct_solve(reference_finger: Fingers, law: Law) -> None:
+def test_long_fingers_agree_with_a_direct_solve(reference_finger: Fingers, law: DomeLaw) -> None:
     finger = replace(reference_finger(13, 1e4), law=law)
     paired = rows(finger, columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
     some = rows(finger, patterns=("1*01*1",), columns=("tip_x_mm", "tip_y_mm", "energy_mJ"))
@@ -146,7 +148,7 @@ def test_long_fingers_agree_with_a_direct_solve(reference_finger: Fingers, law: 
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
-def test_dropping_the_bars_stays_within_its_bound(graded_finger: Fingers, law: Law) -> None:
+def test_dropping_the_bars_stays_within_its_bound(graded_finger: Fingers, law: DomeLaw) -> None:
     for seed in range(20):
         finger = replace(graded_finger(3, seed, linear_stiffness=3e3), law=law)
         exact = rows(finger)

@@ -14,7 +14,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.margins import NAMES, Margins, limits, margins
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well
@@ -116,7 +116,7 @@ def test_the_moment_turns_back_below_the_limit_and_not_above(name: str) -> None:
 @pytest.mark.parametrize(("factor", "status"), [(-1e-9, "STABLE"), (1e-9, "NOT_BISTABLE")])
 def test_the_solver_finds_the_state_up_to_the_limit(name: str, factor: float, status: str) -> None:
     limit = float(limit_of(limits_of(unit), name)[0])
-    units = Units.of(unit(**{name: limit * (1.0 + factor)}))
+    units = UnitSolutions.of(unit(**{name: limit * (1.0 + factor)}))
     batch = settle(units, chain_potential, np.ones((1, 1), bool), 1e-12)
     assert certify(batch, units, 1e-12).tolist() == [Status[status]]
 

@@ -18,7 +18,7 @@ from dpgcli.states.predict import Prediction, Summary, predict
 from dpgcli.states.settle import settle
 from dpgcli.states.solved import SolvedStates
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]
@@ -61,7 +61,7 @@ def test_pairs_are_the_states_of_the_whole(
     is_graded: bool,
 ) -> None:
     make = (lambda n, k: graded_finger(n, 51, k)) if is_graded else reference_finger
-    split = Split(Units.of(make(8, linear_stiffness)), 4, context, 1e-12)
+    split = Split(UnitSolutions.of(make(8, linear_stiffness)), 4, context, 1e-12)
     assert_like_direct(split, all_patterns(8), 1e-11)
 
 
@@ -69,7 +69,7 @@ def test_pairs_are_the_states_of_the_whole(
 def test_rigid_halves_fit_without_context(
     graded_finger: Fingers, all_patterns: Patterns, n_inner: int
 ) -> None:
-    split = Split(Units.of(graded_finger(6, 52, np.inf)), n_inner, 0, 1e-12)
+    split = Split(UnitSolutions.of(graded_finger(6, 52, np.inf)), n_inner, 0, 1e-12)
     assert assert_like_direct(split, all_patterns(6), 1e-13) == 1.0
 
 
@@ -79,7 +79,7 @@ def test_rigid_halves_fit_without_context(
 def test_pairs_of_longer_fingers_are_the_states_of_the_whole(
     graded_finger: Fingers, all_patterns: Patterns, n_units: int, linear_stiffness: float
 ) -> None:
-    units = Units.of(graded_finger(n_units, n_units, linear_stiffness))
+    units = UnitSolutions.of(graded_finger(n_units, n_units, linear_stiffness))
     for context in (1, 2, 3):
         split = Split(units, n_units // 2, context, 1e-12)
         assert_like_direct(split, all_patterns(n_units), 1e-11)
@@ -89,14 +89,14 @@ def test_pairs_of_longer_fingers_are_the_states_of_the_whole(
 def test_what_fits_within_a_looser_tolerance_still_has_an_honest_error(
     reference_finger: Fingers, all_patterns: Patterns, tolerance: float
 ) -> None:
-    split = Split(Units.of(reference_finger(8, 1e3)), 4, 1, tolerance)
+    split = Split(UnitSolutions.of(reference_finger(8, 1e3)), 4, 1, tolerance)
     assert_like_direct(split, all_patterns(8), 1e-6)
 
 
 def test_tip_error_of_pairs_covers_loosely_solved_halves(
     reference_finger: Fingers, all_patterns: Patterns
 ) -> None:
-    split = Split(Units.of(reference_finger(9, 7e3)), 5, 1, 1e-4)
+    split = Split(UnitSolutions.of(reference_finger(9, 7e3)), 5, 1, 1e-4)
     assert_like_direct(split, all_patterns(9), 1e-6)
 
 
@@ -106,7 +106,7 @@ def test_a_unit_without_a_well_is_found_in_pairs_too(
     linearity = np.full(8, 0.043)
     linearity[[1, 4]] = 0.12  # one in each half, the second next to the cut
     finger = graded_finger(8, 53, 1e5, force_linearity=linearity)
-    split = Split(Units.of(finger), 4, 2, 1e-12)
+    split = Split(UnitSolutions.of(finger), 4, 2, 1e-12)
     assert assert_like_direct(split, all_patterns(8), 1e-11) == 1.0
     status = all_pairs(split).status
     impossible = all_patterns(8)[[1, 4]].any(axis=0)
@@ -118,7 +118,7 @@ def half_coordinates(split: Split, inverted: Flags, tolerance: float) -> tuple[A
     cut, context, finger = split.n_inner, split.context, split.units.finger
     parts = []
     for first, stop in ((0, cut + context), (cut - context, split.n_units)):
-        units = Units.of(finger.section(first, stop))
+        units = UnitSolutions.of(finger.section(first, stop))
         solved = settle(units, chain_potential, inverted[first:stop], tolerance)
         parts.append(solved.equilibrium.coordinates)
     return parts[0], parts[1]
@@ -135,7 +135,7 @@ def test_the_residual_of_pairs_is_that_of_the_composite(
     second order in it may exceed the bound a little.
     """
     finger = graded_finger(8, 54, linear_stiffness)
-    split = Split(Units.of(finger), 4, context, 1e-13)
+    split = Split(UnitSolutions.of(finger), 4, context, 1e-13)
     pairs, chain = all_pairs(split), chain_potential(finger)
     for code in np.random.default_rng(55).integers(0, 2**8, 12):
         inner, outer = half_coordinates(split, pairs.inverted[:, [code]], 1e-13)
@@ -152,7 +152,7 @@ def test_the_tip_error_of_pairs_is_what_their_disagreement_does(
     graded_finger: Fingers, all_patterns: Patterns, linear_stiffness: float
 ) -> None:
     """Pairs that fit too poorly to be rows: there the error is far above rounding."""
-    split = Split(Units.of(graded_finger(8, 58, linear_stiffness)), 4, 1, 1e-13)
+    split = Split(UnitSolutions.of(graded_finger(8, 58, linear_stiffness)), 4, 1, 1e-13)
     pairs = all_pairs(split)
     direct = tip(
         settle(split.units, chain_potential, all_patterns(8), 1e-13), with_compliance=False
@@ -169,7 +169,7 @@ def test_curvature_of_pairs_agrees_with_eigenvalues(
     graded_finger: Fingers, dense: Callable[[Array], Array], linear_stiffness: float
 ) -> None:
     finger = graded_finger(8, 54, linear_stiffness)
-    split = Split(Units.of(finger), 4, 1, 1e-2)
+    split = Split(UnitSolutions.of(finger), 4, 1, 1e-2)
     pairs, chain = all_pairs(split), chain_potential(finger)
     for code in np.random.default_rng(59).integers(0, 2**8, 12):
         inner, outer = half_coordinates(split, pairs.inverted[:, [code]], 1e-2)

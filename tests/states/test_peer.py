@@ -11,7 +11,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.guess import geometric_guess
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 
 @pytest.mark.parametrize(("method", "tolerance"), [("trust-exact", 1e-7), ("BFGS", 1e-4)])
@@ -22,7 +22,7 @@ def test_scipy_reaches_the_same_states(
     method: str,
     tolerance: float,
 ) -> None:
-    units = Units.of(graded_finger(3, 31, 1e3))
+    units = UnitSolutions.of(graded_finger(3, 31, 1e3))
     lattice, inverted = lattice_potential(units.finger), all_patterns(3)
     guess = lattice.coordinates.of_shape(geometric_guess(units.finger, inverted, units.first_order))
     solved = settle(units, chain_potential, inverted, 1e-12)

@@ -17,7 +17,7 @@ from dpgcli.states import settle as settle_module
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
 from dpgcli.states.rungs import bar_flexibility
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 
@@ -154,7 +154,7 @@ def test_bar_flexibility_bounds_what_rigid_bars_cost(
     moved = np.hypot(rows["tip_x_mm"] - without["tip_x_mm"], rows["tip_y_mm"] - without["tip_y_mm"])
     both = (rows["status"] == "stable") & (without["status"] == "stable")
     assert both.sum() >= 8
-    (bound,) = bar_flexibility(Units.of(finger))
+    (bound,) = bar_flexibility(UnitSolutions.of(finger))
     assert 0.05 * bound <= moved[both].max() <= bound
 
 

@@ -15,7 +15,7 @@ from dpgcli.states.predict import predict
 from dpgcli.states.rungs import RUNGS, cheapest, error_bounds
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 FOLD = 0.0964682337467354  # α at which the reference unit loses its second well
 Fingers = Callable[..., Finger]
@@ -49,12 +49,12 @@ def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
     n_designs = 1000
     finger = random_fingers(n_units, n_designs, seed=n_units)
     inverted = np.random.default_rng(n_units).random((n_units, n_designs)) < 0.6
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     bounds = error_bounds(units)
     exact = settle(units, chain_potential, inverted, 1e-14)
     truth = tip(exact, with_compliance=False)
     is_state = certify(exact, units, 1e-12) == Status.STABLE
-    rigid = Units.of(finger.with_bars(np.inf))
+    rigid = UnitSolutions.of(finger.with_bars(np.inf))
     n_checked = []
     for rung, bound in zip(RUNGS, bounds, strict=True):
         own = rigid if rung.drops_bars else units
@@ -72,10 +72,10 @@ def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
 
 def test_bounds_are_not_absurd(reference_finger: Fingers) -> None:
     """Of the study's finger: dropping the bars is known within a factor of three."""
-    units = Units.of(reference_finger(5, 1e4))
+    units = UnitSolutions.of(reference_finger(5, 1e4))
     inverted = np.ones((5, 1), bool)
     exact = tip(settle(units, chain_potential, inverted, 1e-12), with_compliance=False)
-    rigid = Units.of(units.finger.with_bars(np.inf))
+    rigid = UnitSolutions.of(units.finger.with_bars(np.inf))
     without = tip(settle(rigid, chain_potential, inverted, 1e-12), with_compliance=False)
     moved = np.hypot(*(without.pose[:2] - exact.pose[:2]))[0]
     (bound,) = error_bounds(units)[0]
@@ -83,7 +83,7 @@ def test_bounds_are_not_absurd(reference_finger: Fingers) -> None:
 
 
 def test_no_bound_where_a_unit_is_about_to_lose_its_well(reference_finger: Fingers) -> None:
-    units = Units.of(reference_finger(2, 1e2, force_linearity=FOLD - 1e-12))
+    units = UnitSolutions.of(reference_finger(2, 1e2, force_linearity=FOLD - 1e-12))
     assert np.isinf(error_bounds(units)).all()
 
 
@@ -93,11 +93,11 @@ def test_no_bound_for_a_mechanism(
     reference_finger: Fingers, linear_stiffness: float, hinge_stiffness: float
 ) -> None:
     finger = reference_finger(2, linear_stiffness, hinge_stiffness=hinge_stiffness)
-    assert np.isinf(error_bounds(Units.of(finger))).all()
+    assert np.isinf(error_bounds(UnitSolutions.of(finger))).all()
 
 
 def test_rigid_bars_cannot_be_dropped(reference_finger: Fingers) -> None:
-    bounds = error_bounds(Units.of(reference_finger(2)))
+    bounds = error_bounds(UnitSolutions.of(reference_finger(2)))
     assert np.isinf(bounds[0]).all()
     assert np.isfinite(bounds[1:]).all()
 
@@ -202,5 +202,5 @@ def test_the_bound_of_a_tolerance_by_hand(reference_finger: Fingers) -> None:
     stiffness = min(softest(0.0), softest(well))
     forces = (12.84 + 24.2 / 10.75**2) * 3.5
     expected = 4.0 * forces * 10.75 / stiffness * 13.5
-    coarse, fine = error_bounds(Units.of(unit))[[1, 2], 0]
+    coarse, fine = error_bounds(UnitSolutions.of(unit))[[1, 2], 0]
     assert coarse - fine == pytest.approx((1e-3 - 1e-6) * expected, rel=1e-4)

@@ -10,13 +10,13 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import ARRAYS, STUDY, Finger
-from dpgcli.mechanics.laws import PUBLISHED, Law, PushOnly, Tabulated
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 from dpgcli.states.sensitivities import sensitivities
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 PATTERNS = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 0, 1, 1]], bool)
@@ -27,7 +27,7 @@ LAWS = (PUBLISHED, TABLE, PushOnly(PUBLISHED), PushOnly(TABLE))
 
 
 def solved(finger: Finger) -> Settled:
-    return settle(Units.of(finger), chain_potential, PATTERNS, 1e-14)
+    return settle(UnitSolutions.of(finger), chain_potential, PATTERNS, 1e-14)
 
 
 def outputs(finger: Finger) -> dict[str, Array]:
@@ -43,7 +43,7 @@ def outputs(finger: Finger) -> dict[str, Array]:
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
 @pytest.mark.parametrize("stiffness", [1e2, 1e4, np.inf])
 def test_they_are_the_slopes_of_states_that_are_solved_again(
-    graded_finger: Fingers, stiffness: float, law: Law
+    graded_finger: Fingers, stiffness: float, law: DomeLaw
 ) -> None:
     """By fourth-order central differences with a step of 1e-3 of the value, where it matters."""
     finger = replace(graded_finger(3, 3, linear_stiffness=stiffness), law=law)
@@ -75,7 +75,7 @@ def test_they_are_the_slopes_of_states_that_are_solved_again(
 
 def test_one_unit_in_closed_form(reference_finger: Fingers) -> None:
     """de/dphi = F H cos(phi/2) + k_theta phi = 0, differentiated by k_theta."""
-    units = Units.of(reference_finger(1))
+    units = UnitSolutions.of(reference_finger(1))
     batch = settle(units, chain_potential, np.array([[True]]), 1e-14)
     turn = -float(tip(batch, with_compliance=False).pose[2, 0])
     height, hinge = STUDY["segment_height"], STUDY["hinge_stiffness"]
@@ -114,6 +114,6 @@ def test_states_in_units_of_their_own_lanes(reference_finger: Fingers) -> None:
     step = [{"segment_height": np.ones((1, 1))}]
     together = sensitivities(solved(finger), step).pose
     for state in range(PATTERNS.shape[1]):
-        alone = settle(Units.of(finger), chain_potential, PATTERNS[:, [state]], 1e-14)
+        alone = settle(UnitSolutions.of(finger), chain_potential, PATTERNS[:, [state]], 1e-14)
         found = sensitivities(alone, step).pose[..., 0]
         assert found == pytest.approx(together[..., state], rel=1e-12, abs=1e-15)

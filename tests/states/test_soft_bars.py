@@ -15,7 +15,7 @@ from dpgcli.mechanics.terms import Formulate, chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 
@@ -109,7 +109,7 @@ def independent(finger: Finger, inverted: Flags) -> Array | None:
 def solved(
     finger: Finger, inverted: Flags, formulation: Formulate = chain_potential
 ) -> tuple[Status, Array]:
-    units = Units.of(finger)
+    units = UnitSolutions.of(finger)
     batch = settle(units, formulation, inverted, 1e-12)
     nodes = np.stack(batch.potential.coordinates.stations(batch.equilibrium.coordinates), axis=1)
     return Status(certify(batch, units, 1e-12)[0]), nodes.ravel()
@@ -150,7 +150,7 @@ def test_a_state_between_soft_bars_that_rigid_ones_would_not_have(
     values = {**STUDY, **SOFT, **changes}
     finger = uniform_finger(len(pattern), **values, linear_stiffness=bars)
     inverted = np.array([[digit == "1"] for digit in pattern])
-    assert not Units.of(finger).wells.exists.any()
+    assert not UnitSolutions.of(finger).wells.exists.any()
     status, nodes = solved(finger, inverted)
     assert status is Status.STABLE
     assert is_state(finger, inverted, nodes)

@@ -18,7 +18,7 @@ from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import min_eigenvalues
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[..., Flags]
@@ -26,7 +26,7 @@ COMPLIANCES = ("xx_mm_per_N", "xy_mm_per_N", "yy_mm_per_N", "x_angle_rad_per_N")
 COMPLIANCES += ("y_angle_rad_per_N", "angle_rad_per_N_mm")
 
 
-def at_nodes(units: Units, inverted: Flags) -> tuple[Potential[Lattice], Array]:
+def at_nodes(units: UnitSolutions, inverted: Flags) -> tuple[Potential[Lattice], Array]:
     """The lattice and its coordinates at the chain's solution of one pattern."""
     solved = settle(units, chain_potential, inverted, 1e-13)
     stations = solved.potential.coordinates.stations(solved.equilibrium.coordinates)
@@ -47,7 +47,7 @@ def test_the_smallest_eigenvalue_is_the_dense_one(
     pattern: str,
     linear_stiffness: float,
 ) -> None:
-    units = Units.of(graded_finger(len(pattern), 61, linear_stiffness))
+    units = UnitSolutions.of(graded_finger(len(pattern), 61, linear_stiffness))
     lattice, nodes = at_nodes(units, units_of(pattern))
     expected = np.linalg.eigvalsh(dense(lattice.evaluate(nodes).hessian))[0]
     found = min_eigenvalues(settle(units, chain_potential, units_of(pattern), 1e-13))
@@ -69,7 +69,7 @@ def test_tip_compliance_is_that_of_the_dense_lattice(
     graded_finger: Fingers, units_of: Patterns, dense: Callable[[Array], Array], pattern: str
 ) -> None:
     finger = graded_finger(len(pattern), 62, 1e3)
-    lattice, nodes = at_nodes(Units.of(finger), units_of(pattern))
+    lattice, nodes = at_nodes(UnitSolutions.of(finger), units_of(pattern))
     jacobian = lattice.coordinates.tip(nodes)[1][:, :, 0]
     c = jacobian.T @ np.linalg.solve(dense(lattice.evaluate(nodes).hessian), jacobian)
     rows = compliances(finger, pattern)
@@ -102,7 +102,7 @@ def test_tip_compliance_is_the_answer_to_a_small_load(
 ) -> None:
     """Central differences of loaded equilibria; third derivatives leave a few in a million."""
     finger = graded_finger(len(pattern), 63, 1e3)
-    lattice, nodes = at_nodes(Units.of(finger), units_of(pattern))
+    lattice, nodes = at_nodes(UnitSolutions.of(finger), units_of(pattern))
     rows = compliances(finger, pattern)
     load = 1e-3
     for axis, names in enumerate((("xx", "xy"), ("xy", "yy"))):

@@ -11,7 +11,7 @@ from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 Patterns = Callable[[int], Flags]
@@ -22,7 +22,7 @@ Patterns = Callable[[int], Flags]
 def test_the_chain_finds_every_pattern_of_its_own(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float, linear_stiffness: float
 ) -> None:
-    units = Units.of(reference_finger(5, linear_stiffness))
+    units = UnitSolutions.of(reference_finger(5, linear_stiffness))
     batch = settle(
         units,
         chain_potential,
@@ -38,7 +38,7 @@ def test_the_chain_finds_every_pattern_of_its_own(
 def test_the_lattice_finds_every_pattern_from_nearby(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float
 ) -> None:
-    units = Units.of(reference_finger(5, 1e4))
+    units = UnitSolutions.of(reference_finger(5, 1e4))
     batch = settle(
         units,
         lattice_potential,
@@ -53,7 +53,7 @@ def test_the_lattice_finds_every_pattern_from_nearby(
 def test_from_afar_the_lattice_says_which_pattern_it_fell_into(
     reference_finger: Fingers, all_patterns: Patterns, strokes: float
 ) -> None:
-    units = Units.of(reference_finger(5, 1e4))
+    units = UnitSolutions.of(reference_finger(5, 1e4))
     own = settle(units, lattice_potential, all_patterns(5), 1e-12).equilibrium.coordinates
     batch = settle(
         units,
@@ -72,7 +72,7 @@ def test_from_afar_the_lattice_says_which_pattern_it_fell_into(
 def test_below_the_barrier_every_pattern_relaxes_to_the_ground_state(
     reference_finger: Fingers, all_patterns: Patterns
 ) -> None:
-    units = Units.of(reference_finger(5, 1e4))
+    units = UnitSolutions.of(reference_finger(5, 1e4))
     batch = settle(
         units,
         chain_potential,

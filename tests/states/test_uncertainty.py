@@ -14,7 +14,7 @@ from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 NAMES = ("segment_height", "hinge_stiffness", "stroke")
@@ -35,7 +35,7 @@ def drawn_poses(finger: Finger, pattern: str) -> Array:
     off = ERRORS[:, None] * (np.linalg.cholesky(CORRELATION) @ random.normal(size=(3, N_DRAWN)))
     values = {name: getattr(finger, name) + off[[k]] for k, name in enumerate(NAMES)}
     inverted = np.array([[digit == "1"] for digit in pattern]).repeat(N_DRAWN, axis=1)
-    batch = settle(Units.of(finger.changed(**values)), chain_potential, inverted, 1e-10)
+    batch = settle(UnitSolutions.of(finger.changed(**values)), chain_potential, inverted, 1e-10)
     return tip(batch, with_compliance=False).pose
 
 

@@ -13,7 +13,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.guess import FirstOrder, first_order, geometric_guess
 from dpgcli.states.settle import settle
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
 Reference = Callable[..., Finger]
@@ -134,7 +134,7 @@ def test_the_first_order_guess_errs_at_second_order(reference_finger: Reference)
     """Guess against the converged state: a tenfold k_L leaves a hundredth of the error."""
     errors = []
     for linear_stiffness in (1e4, 1e5):
-        units = Units.of(reference_finger(3, linear_stiffness))
+        units = UnitSolutions.of(reference_finger(3, linear_stiffness))
         inverted = np.array([[True], [False], [True]])
         solved = settle(units, chain_potential, inverted, 1e-13).equilibrium.coordinates
         guess = Chain(units.finger).of_shape(

@@ -12,7 +12,7 @@ import pytest
 import dpgcli
 from dpgcli.errors import UsageError, WorkplaceError
 from dpgcli.studies import sweep as studies
-from dpgcli.sweeps.executors import Workplace, processes, serial
+from dpgcli.sweeps.executors import Backend, processes, serial
 from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, Maker, check_workers, code_of
 
 PACKAGE = Path(dpgcli.__file__).parent
@@ -90,7 +90,7 @@ def test_tables_of_other_code_are_not_up_to_date(
 
 @pytest.mark.parametrize("workplace", [serial(), processes(2)])
 def test_a_worker_of_other_code_evaluates_nothing(
-    study: Any, monkeypatch: pytest.MonkeyPatch, workplace: Workplace
+    study: Any, monkeypatch: pytest.MonkeyPatch, workplace: Backend
 ) -> None:
     """As one that joins a cluster later: both are named."""
     monkeypatch.setattr(studies, "HERE", OTHER)
@@ -112,7 +112,7 @@ def test_a_worker_of_other_code_evaluates_nothing(
 )
 def test_a_mixed_cluster_is_refused_before_the_work(answer: Any, named: str) -> None:
     answers = {"tcp://a": HERE, "tcp://b": answer}
-    mixed = Workplace("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: answers)
+    mixed = Backend("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: answers)
     with pytest.raises(WorkplaceError, match="worker tcp://b of the cluster") as refused:
         check_workers(mixed)
     assert named in str(refused.value)
@@ -120,7 +120,7 @@ def test_a_mixed_cluster_is_refused_before_the_work(answer: Any, named: str) -> 
 
 
 def test_all_workers_are_asked_before_a_sweep_is_begun(study: Any) -> None:
-    mixed = Workplace("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: {"a": OTHER})
+    mixed = Backend("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: {"a": OTHER})
     with pytest.raises(WorkplaceError, match="worker a of the cluster has"):
         study(HEIGHTS).compute(mixed, lambda _: None)
     assert not study(HEIGHTS).store.folder.exists()
@@ -133,5 +133,5 @@ def test_a_cluster_of_one_kind_passes() -> None:
         asked.append(function)
         return {"tcp://a": function(), "tcp://b": function()}
 
-    check_workers(Workplace("the cluster", lambda _: pytest.fail("used"), 2, ask=ask))
+    check_workers(Backend("the cluster", lambda _: pytest.fail("used"), 2, ask=ask))
     assert asked == [WHO]

@@ -12,7 +12,7 @@ import pytest
 from dpgcli.errors import UsageError
 from dpgcli.studies import sweep as studies
 from dpgcli.studies.sweep import Progress, Shard, Study, assemble, stores
-from dpgcli.sweeps.executors import Workplace, processes, serial
+from dpgcli.sweeps.executors import Backend, processes, serial
 from dpgcli.sweeps.extent import BYTES_PER_STATE
 
 AXES = (
@@ -54,7 +54,7 @@ def expected(study: Any) -> dict[str, bytes]:
     return bytes_of(made.folder)
 
 
-def finish(made: Study, workplace: Workplace | None = None) -> dict[str, bytes]:
+def finish(made: Study, workplace: Backend | None = None) -> dict[str, bytes]:
     made.compute(workplace or serial(), quiet)
     made.assemble()
     assert sorted(p.name for p in made.folder.iterdir()) == [studies.DESIGNS, studies.STATES]

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from dpgcli.errors import WorkplaceError
 from dpgcli.sweeps.executors import (
+    Backend,
     Chunk,
     Runner,
-    Workplace,
     chunked,
     process_pool,
     processes,
@@ -61,7 +61,7 @@ def test_chunks_cover_what_is_missing_and_are_cut_at_fixed_places(
 
 
 @pytest.mark.parametrize("workplace", [serial(), processes(1), processes(3)])
-def test_nothing_dies(deadly: Any, tmp_path: Path, workplace: Workplace) -> None:
+def test_nothing_dies(deadly: Any, tmp_path: Path, workplace: Backend) -> None:
     runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
     assert results(runner, chunked([(0, 20)], 3)) == {case: case**2 for case in range(20)}
     assert runner.deaths == []
@@ -109,7 +109,7 @@ def test_a_worker_that_dies_as_it_is_tried_is_tried_again(deadly: Any, tmp_path:
         doomed = deadly.dies if len(opened) in (2, 3) else None
         return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=doomed)
 
-    workplace = Workplace("the pool", fragile, 2)
+    workplace = Backend("the pool", fragile, 2)
     runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path, once=[4]))
     assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}
     assert opened[:4] == [2, 1, 1, 1]
@@ -119,7 +119,7 @@ def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
     def broken(n_workers: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=deadly.dies)
 
-    workplace = Workplace("the pool", broken, 2)
+    workplace = Backend("the pool", broken, 2)
     runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
     with pytest.raises(WorkplaceError, match="the pool: workers do not start"):
         list(runner.run(chunked([(0, 20)], 3)))
@@ -127,7 +127,7 @@ def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("workplace", [serial(), processes(2)])
-def test_an_error_of_the_function_is_raised(deadly: Any, workplace: Workplace) -> None:
+def test_an_error_of_the_function_is_raised(deadly: Any, workplace: Backend) -> None:
     runner: Runner[int] = Runner(workplace, deadly.refused, lambda c: (c,))
     with pytest.raises(ZeroDivisionError, match="of its own"):
         list(runner.run(chunked([(0, 9)], 1)))
@@ -185,7 +185,7 @@ def test_a_fork_server_that_is_killed_is_started_again(
             monkeypatch.setattr(server, "ensure_running", lambda: None)
         return pool
 
-    workplace = Workplace("the pool", unlucky, 2)
+    workplace = Backend("the pool", unlucky, 2)
     runner = Runner(workplace, deadly.squares, deadly.arguments(tmp_path))
     if ends_well:
         assert results(runner, chunked([(0, 12)], 3)) == {case: case**2 for case in range(12)}

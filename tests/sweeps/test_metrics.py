@@ -12,7 +12,7 @@ from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
 from dpgcli.states.rungs import Exactness
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import Block, design_states
 from dpgcli.sweeps.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics
 
@@ -21,7 +21,7 @@ QUANTITIES = tuple(q for q in declared(1, (), False) if q.group in {Group.STATES
 
 
 def all_states(finger: Finger) -> Iterator[Block]:
-    return design_states(Scene(finger, ()), Exactness(Units.of(finger), 1e-12), QUANTITIES)
+    return design_states(Scene(finger, ()), Exactness(UnitSolutions.of(finger), 1e-12), QUANTITIES)
 
 
 LENGTH = 27.0  # mm, of the reference finger of two units
@@ -32,7 +32,7 @@ def metrics(reference_finger: Fingers) -> Callable[..., Columns]:
     """Metrics of one design by the tips in each block, in mm."""
 
     def of(*blocks: Sequence[tuple[float, float]], status: Sequence[int] = ()) -> Columns:
-        found = Metrics(Units.of(reference_finger(2)), 1)
+        found = Metrics(UnitSolutions.of(reference_finger(2)), 1)
         for tips in blocks:
             x, y = np.array(tips, float).reshape(-1, 2).T
             same = {"tip_stiffness_min_N_per_mm": x, "tip_stiffness_max_N_per_mm": x}

@@ -17,7 +17,7 @@ from dpgcli.api.fits.result import (
 )
 from dpgcli.api.inputs import check_positive, chosen
 from dpgcli.calibration import bistable
-from dpgcli.calibration.bistable import UNITS, BistableFit, Choice
+from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity
 from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import Record
@@ -69,7 +69,7 @@ def fit_bistable(
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, sizes(where))
     fitted_to = _quantity(measured.curve, quantity)
-    choice = Choice(
+    choice = BistableOptions(
         opening,
         fitted_to,
         is_quasi_static=chosen(Branches, "branches", branches) is Branches.QUASI_STATIC,
@@ -86,7 +86,11 @@ def fit_bistable(
 
 
 def _result(
-    found: BistableFit, choice: Choice, where: Geometry | None, measured: Measured, name: str
+    found: BistableFit,
+    choice: BistableOptions,
+    where: Geometry | None,
+    measured: Measured,
+    name: str,
 ) -> FitResult[BistableFit]:
     source = DataFile(file=name, sha256=measured.sha256, rows=found.fit.n_points)
     return fit_result(

@@ -7,8 +7,8 @@ from typing import Any
 
 from dpgcli.api.fits.result import FitResult, GeometryInput, fit_result, geometry_from, sizes
 from dpgcli.api.inputs import chosen, setting_texts
-from dpgcli.calibration.choices import Method
-from dpgcli.calibration.grid import Law, Points
+from dpgcli.calibration.choices import GridMethod
+from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import grid_doubts, grid_of
@@ -24,7 +24,7 @@ def fit_grid(
     method: str = "scaling",
     geometry: GeometryInput = None,
     spec: str | Path | Mapping[str, Any] | None = None,
-) -> FitResult[Law]:
+) -> FitResult[GridLaw]:
     """Fit quantities over geometries, by products of powers or an "interpolation".
 
     `table` has columns that are keys of the geometry, and positive quantities. Its result's
@@ -40,8 +40,8 @@ def fit_grid(
     read = read_table(table)
     _check_apart(geometry, (*read.over, *read.constant))
     shared = sizes(geometry_from(geometry, spec))
-    way = chosen(Method, "method", method)
-    law = Law(way, Points(read.over, read.geometry, read.quantities))
+    way = chosen(GridMethod, "method", method)
+    law = GridLaw(way, Points(read.over, read.geometry, read.quantities))
     for key in read.quantities:
         law.at(key, law.points.reference[None])  # a spec will ask for no less
     elsewhere = {key: value for key, value in shared.items() if key not in read.over}

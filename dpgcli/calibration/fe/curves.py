@@ -8,7 +8,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.decks import Pulse
-from dpgcli.calibration.fe.dome import Dome, DomeMesh
+from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import strain_energy, swept_volume
 from dpgcli.calibration.fe.hinge import Chambers, chamber_turn, couple, moment
 from dpgcli.errors import SolverError
@@ -35,7 +35,7 @@ Curve = DomeCurve | HingeCurve
 
 
 def dome_curve(
-    dome: Dome, mesh: DomeMesh, loading: Pulse, time: Array, displacements: Array
+    dome: DomeShape, mesh: DomeMesh, loading: Pulse, time: Array, displacements: Array
 ) -> DomeCurve:
     """The curve of a dynamic run: times (k,) in s, displacements (k, n, 3) in mm."""
     time = np.concatenate([[0.0], time])
@@ -62,7 +62,7 @@ def hinge_curve(
     )
 
 
-def dome_finding(dome: Dome, curve: DomeCurve) -> str:
+def dome_finding(dome: DomeShape, curve: DomeCurve) -> str:
     """A sentence on the dome's snap, if any, and its rest at the end."""
     inverted = curve.pole_travel_mm > dome.height  # the pole beyond the plane of the base
     if not inverted.any():

@@ -7,7 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.fe.bricks import Bricks
-from dpgcli.calibration.fe.dome import Dome, DomeMesh
+from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS
@@ -45,14 +45,14 @@ class Pulse:
         return np.interp(time, (0.0, *self.corners), (0.0, self.peak, self.peak, 0.0))
 
 
-def pulse(dome: Dome, peak: float) -> Pulse:
+def pulse(dome: DomeShape, peak: float) -> Pulse:
     """A pulse slow beside the dome's vibrations, whose periods go as a^2/t sqrt(rho/E)."""
     radius = dome.base_diameter / 2
     speed = np.sqrt(dome.elastic_modulus / DENSITY)
     return Pulse(peak, float(radius**2 / (dome.thickness * speed)))
 
 
-def dome_deck(dome: Dome, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) -> str:
+def dome_deck(dome: DomeShape, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) -> str:
     """The deck of a dome that pressure on its convex side inverts: implicit dynamics.
 
     `words` become its comments.
@@ -82,7 +82,7 @@ def dome_deck(dome: Dome, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) 
     return "\n".join(lines) + "\n"
 
 
-def dome_words(dome: Dome) -> tuple[str, ...]:
+def dome_words(dome: DomeShape) -> tuple[str, ...]:
     """A description of a dome's model in words."""
     return (
         f"Axisymmetric dome: a spherical cap of mid-surface height {dome.height:g} mm over a base "

@@ -9,7 +9,7 @@ from dpgcli.arrays import Array, Indices
 
 
 @dataclass(frozen=True)
-class Dome:
+class DomeShape:
     """A spherical cap on an annulus whose outer edge is fixed; mm, MPa.
 
     Height and base diameter are those of the mid-surface; the material is neo-Hookean.
@@ -39,16 +39,16 @@ class DomeMesh:
     pole: int
 
 
-def sphere_radius(dome: Dome) -> float:
+def sphere_radius(dome: DomeShape) -> float:
     """Radius R = (a^2 + h^2)/(2 h) in mm of the mid-surface over a base of radius a.
 
-    >>> sphere_radius(Dome(height=8.0, thickness=0.75, elastic_modulus=26.0))
+    >>> sphere_radius(DomeShape(height=8.0, thickness=0.75, elastic_modulus=26.0))
     8.0
     """
     return ((dome.base_diameter / 2) ** 2 + dome.height**2) / (2 * dome.height)
 
 
-def edge_angles(dome: Dome) -> tuple[float, float]:
+def edge_angles(dome: DomeShape) -> tuple[float, float]:
     """Polar angles of the joint between the faces of cap and annulus, inner and outer.
 
     The faces are spheres of radius R -+ t/2, cut by the planes z = -+ t/2: the joint is a miter,
@@ -63,7 +63,7 @@ def edge_angles(dome: Dome) -> tuple[float, float]:
     return math.acos(cosines[0]), math.acos(cosines[1])
 
 
-def impossible(dome: Dome) -> str:
+def impossible(dome: DomeShape) -> str:
     """Why there can be no such dome, empty if there can."""
     try:
         joint = joint_radius(dome)
@@ -74,14 +74,14 @@ def impossible(dome: Dome) -> str:
     return ""
 
 
-def joint_radius(dome: Dome) -> float:
+def joint_radius(dome: DomeShape) -> float:
     """Largest radius in mm of the joint between cap and annulus; the rim must lie beyond it."""
     _, outer = edge_angles(dome)
     widest = math.sin(min(outer, math.pi / 2))  # more than half a sphere overhangs its base
     return (sphere_radius(dome) + dome.thickness / 2) * widest
 
 
-def dome_mesh(dome: Dome, n_cap: int, n_annulus: int, n_thickness: int) -> DomeMesh:
+def dome_mesh(dome: DomeShape, n_cap: int, n_annulus: int, n_thickness: int) -> DomeMesh:
     """A structured mesh: cells along the cap, along the annulus, and through the wall."""
     n_along = n_cap + n_annulus
     inner, outer = edge_angles(dome)

@@ -6,7 +6,7 @@ CalculiX sums its own energies over increments, and they drift when it cuts one 
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.fe.dome import Dome, DomeMesh
+from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.elements import QUAD, gauss, quad_shapes, quad_slopes
 
 
@@ -19,7 +19,7 @@ def moduli(elastic_modulus: float, poisson: float) -> tuple[float, float]:
     return elastic_modulus / (2 * (1 + poisson)), elastic_modulus / (3 * (1 - 2 * poisson))
 
 
-def strain_energy(dome: Dome, mesh: DomeMesh, displacements: Array) -> Array:
+def strain_energy(dome: DomeShape, mesh: DomeMesh, displacements: Array) -> Array:
     """Strain energy in mJ of the whole dome at displacements (..., n, 2) in mm.
 
     W = G/2 (J^(-2/3) tr C - 3) + K/2 (J - 1)^2 per volume at rest, CalculiX's neo-Hookean form,

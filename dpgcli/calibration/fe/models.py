@@ -22,7 +22,7 @@ from dpgcli.calibration.fe.decks import (
     pulse,
     pulse_words,
 )
-from dpgcli.calibration.fe.dome import Dome, dome_mesh
+from dpgcli.calibration.fe.dome import DomeShape, dome_mesh
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
 from dpgcli.design.geometry import snap_pressure
 
@@ -36,7 +36,7 @@ PEAK_OVER_SNAP = 1.25
 """How far the pressure goes beyond the one that is expected to invert the dome."""
 
 
-class Outcome(NamedTuple):
+class RunOutcome(NamedTuple):
     """The curve of a run, and its finding in one line."""
 
     curve: Curve
@@ -55,7 +55,7 @@ class Model:
     words: tuple[str, ...]
     n_nodes: int
     end: float
-    outcome: Callable[[Array, Array], Outcome]
+    outcome: Callable[[Array, Array], RunOutcome]
 
     def comments(self, version: str, finding: str) -> tuple[str, ...]:
         """The comments above a curve: solver, model, hash of the deck, finding."""
@@ -68,22 +68,22 @@ class Model:
         )
 
 
-def expected_peak(dome: Dome) -> float:
+def expected_peak(dome: DomeShape) -> float:
     """A pressure in MPa beyond the snap of most domes: 1.25 times the scaled snap pressure."""
     expected = snap_pressure(dome.height, dome.thickness, dome.elastic_modulus)
     return PEAK_OVER_SNAP * expected
 
 
-def dome_model(dome: Dome, fineness: str, peak: float) -> Model:
+def dome_model(dome: DomeShape, fineness: str, peak: float) -> Model:
     """A dome under a pulse of pressure (MPa) on a mesh of DOME_CELLS."""
     mesh = dome_mesh(dome, *DOME_CELLS[fineness])
     loading = pulse(dome, peak)
     size = _size(fineness, len(mesh.elements), "CAX8R", len(mesh.nodes))
     words = (*dome_words(dome), *pulse_words(loading), size, UNITS)
 
-    def outcome(time: Array, moved: Array) -> Outcome:
+    def outcome(time: Array, moved: Array) -> RunOutcome:
         curve = dome_curve(dome, mesh, loading, time, moved)
-        return Outcome(curve, dome_finding(dome, curve))
+        return RunOutcome(curve, dome_finding(dome, curve))
 
     deck = dome_deck(dome, mesh, loading, ("dpg fe dome", *words))
     return Model("dome", deck, words, len(mesh.nodes), loading.corners[-1], outcome)
@@ -95,9 +95,9 @@ def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Mod
     size = _size(fineness, len(mesh.elements), "C3D20R", len(mesh.nodes))
     words = (*hinge_words(chambers, largest_moment), size, UNITS)
 
-    def outcome(time: Array, moved: Array) -> Outcome:
+    def outcome(time: Array, moved: Array) -> RunOutcome:
         curve = hinge_curve(chambers, mesh, largest_moment, time, moved)
-        return Outcome(curve, hinge_finding(curve))
+        return RunOutcome(curve, hinge_finding(curve))
 
     deck = hinge_deck(chambers, mesh, largest_moment, ("dpg fe hinge", *words))
     return Model("hinge", deck, words, len(mesh.nodes), 1.0, outcome)

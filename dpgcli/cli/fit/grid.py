@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.calibration.choices import Method
+from dpgcli.calibration.choices import GridMethod
 from dpgcli.cli.fit.options import GeometrySpec, GeometryValues, Output, Printed
 from dpgcli.cli.fit.output import check_files, put_out
 from dpgcli.cli.options import Quiet
@@ -18,8 +18,8 @@ def grid(
     ],
     output: Output = None,
     method: Annotated[
-        Method, typer.Option("--method", help="Products of powers, or an interpolation")
-    ] = Method.SCALING,
+        GridMethod, typer.Option("--method", help="Products of powers, or an interpolation")
+    ] = GridMethod.SCALING,
     geometry: GeometryValues = None,
     spec: GeometrySpec = None,
     printed_as: Printed = Format.TABLE,

@@ -30,7 +30,7 @@ from dpgcli.files.calibration.models import (
 )
 from dpgcli.files.last_line import is_whole_text, sealed
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.files.places import Location, in_order, located, shown
 from dpgcli.files.sections import (
     Geometry,
     Section,
@@ -117,10 +117,10 @@ def read_calibration(path: str | Path) -> Calibration:
     file, text = read_text(path)
     is_whole = is_whole_text(text)
     if is_whole is False:
-        raise SpecError((located(Place(file), "file", *OTHER_TEXT),))
+        raise SpecError((located(Location(file), "file", *OTHER_TEXT),))
     found = calibration_in(parse_document(file, text))
     if found.made_by.endswith(SEALED) and not is_whole:
-        raise SpecError((located(Place(file), "file", *NO_SEAL),))
+        raise SpecError((located(Location(file), "file", *NO_SEAL),))
     return found
 
 
@@ -144,7 +144,7 @@ def geometry_of(settings: Sequence[str], base: Geometry | None = None) -> Geomet
     Raises SpecError with every problem.
     """
     data: dict[str, Any] = {} if base is None else base.model_dump(exclude_none=True)
-    place = Place(Field("geometry"))
+    place = Location(Field("geometry"))
     problems: list[Problem] = []
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))

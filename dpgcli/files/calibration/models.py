@@ -20,7 +20,7 @@ from dpgcli.files.sections import (
 )
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.grid import Law
+    from dpgcli.calibration.grid import GridLaw
 
 T = TypeVar("T")
 Numbers = Annotated[list[float], Field(min_length=1)]
@@ -129,16 +129,16 @@ class Grid(Section):
     )
 
     @cached_property
-    def law(self) -> "Law":
+    def law(self) -> "GridLaw":
         """The way between the points; made once for all designs that share the grid."""
         import numpy as np
 
-        from dpgcli.calibration.choices import Method
-        from dpgcli.calibration.grid import Law, Points
+        from dpgcli.calibration.choices import GridMethod
+        from dpgcli.calibration.grid import GridLaw, Points
 
         geometry = np.array([self.points[key] for key in self.over]).T
         quantities = {k: np.array(v) for k, v in self.points.items() if k not in self.over}
-        return Law(Method(self.method), Points(tuple(self.over), geometry, quantities))
+        return GridLaw(GridMethod(self.method), Points(tuple(self.over), geometry, quantities))
 
     @property
     def known(self) -> calibrations.Grid:

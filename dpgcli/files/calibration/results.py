@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.calibration.bistable import BistableFit, Choice
-from dpgcli.calibration.choices import Method, Quantity
+from dpgcli.calibration.bistable import BistableFit, BistableOptions
+from dpgcli.calibration.choices import GridMethod, Quantity
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.grid import Law
+from dpgcli.calibration.grid import GridLaw
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import FitError
 from dpgcli.files.calibration.models import (
@@ -43,7 +43,7 @@ def method_of(what: str, fit: Fit, resamples: int, seed: int) -> str:
     return text + (f", bootstrap of {resamples} (seed {seed})" if resamples else "")
 
 
-def bistable_method(found: BistableFit, choice: Choice) -> str:
+def bistable_method(found: BistableFit, choice: BistableOptions) -> str:
     """The method of a fit of the bistable law, with what of the curve it was made to."""
     text = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
     if choice.quantity is Quantity.PRESSURE:
@@ -120,12 +120,12 @@ def curve_of(found: BistableFit) -> Curve | None:
     )
 
 
-def grid_of(law: Law) -> Grid:
+def grid_of(law: GridLaw) -> Grid:
     """The points of a grid, its scaling laws if it has them, and its leave-one-out errors."""
     points = law.points
     columns = dict(zip(points.over, points.geometry.T.tolist(), strict=True))
     left_out = {key: law.leave_one_out(key)[0] for key in points.quantities}
-    is_scaling = law.method is Method.SCALING
+    is_scaling = law.method is GridMethod.SCALING
     reference = dict(zip(points.over, points.reference.tolist(), strict=True))
     return Grid(
         method=law.method.value,
@@ -137,7 +137,7 @@ def grid_of(law: Law) -> Grid:
     )
 
 
-def grid_doubts(law: Law, table: GridTable) -> Iterator[str]:
+def grid_doubts(law: GridLaw, table: GridTable) -> Iterator[str]:
     """What a user should know about a table of points, in words."""
     yield from table.doubts
     if table.ignored:
@@ -155,7 +155,7 @@ def grid_doubts(law: Law, table: GridTable) -> Iterator[str]:
         yield "too few points to leave one out: nothing is known about the error between them"
 
 
-def _scaling_of(law: Law, key: str) -> ScalingLaw:
+def _scaling_of(law: GridLaw, key: str) -> ScalingLaw:
     fit, over = law.scaling(key), law.points.over
     errors = fit.standard_errors.tolist()
     is_known = bool(np.isfinite(fit.standard_errors).all())

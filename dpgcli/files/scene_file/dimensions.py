@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from dpgcli.design.dimensions import sizes_of
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.places import Place, located
+from dpgcli.files.places import Location, located
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.sections import expected_of
 
@@ -34,4 +34,4 @@ def overridden(spec: Spec, keys: Sequence[str]) -> tuple[str, ...]:
 
 def _problem(file: str, key: str, purpose: str) -> Problem:
     hint = f"or unit_cell_mm; {purpose}" if key == "chamber_width_mm" else purpose
-    return located(Place(file), f"finger.geometry.{key}", expected_of(key), "nothing", hint)
+    return located(Location(file), f"finger.geometry.{key}", expected_of(key), "nothing", hint)

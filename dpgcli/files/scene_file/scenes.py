@@ -9,7 +9,7 @@ from dpgcli.design.problems import Issue
 from dpgcli.design.resolve import NO_BARS
 from dpgcli.design.scene import Scene
 from dpgcli.errors import SpecError
-from dpgcli.files.places import Place, located
+from dpgcli.files.places import Location, located
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.text import dotted
 
@@ -18,7 +18,7 @@ def scene_of(spec: Spec) -> Scene:
     """The scene that a spec describes. Raises SpecError, without lines, if keys disagree."""
     resolution = spec.resolution
     if found := resolution.problems.of(0):
-        place = Place("spec")
+        place = Location("spec")
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
     return resolution.scene()
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dpgcli.errors import Field, Problem, SpecError
-from dpgcli.files.places import Place, in_order, located, shown
+from dpgcli.files.places import Location, in_order, located, shown
 from dpgcli.files.yaml_file import MAX_DEPTH, Document, parse_value
 from dpgcli.text import KeyPath, dotted, shortened
 
-SETTING = Place(Field("settings"))
+SETTING = Location(Field("settings"))
 
 
 def with_settings(document: Document, settings: Sequence[str]) -> Document:

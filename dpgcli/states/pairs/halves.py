@@ -31,7 +31,7 @@ from dpgcli.states.crossing import Outline, outline
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.settle import lanes_at_once, settle
 from dpgcli.states.tip import tip
-from dpgcli.states.units import Units
+from dpgcli.states.units import UnitSolutions
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Half:
 class Split:
     """A finger cut after `n_inner` units; each half is solved with `context` units of the other."""
 
-    units: Units
+    units: UnitSolutions
     n_inner: int
     context: int
     tolerance: float

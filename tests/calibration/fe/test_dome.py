@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.fe.dome import Dome, DomeMesh, dome_mesh, impossible, sphere_radius
+from dpgcli.calibration.fe.dome import DomeMesh, DomeShape, dome_mesh, impossible, sphere_radius
 from dpgcli.calibration.fe.elements import gauss, quad_shapes, quad_slopes
 from dpgcli.calibration.fe.energy import moduli, strain_energy, swept_volume
 
-REFERENCE = Dome(height=6.5, thickness=0.75, elastic_modulus=26.0)
+REFERENCE = DomeShape(height=6.5, thickness=0.75, elastic_modulus=26.0)
 SHAPES = [
     REFERENCE,
     replace(REFERENCE, height=2.0, thickness=1.5),
@@ -48,7 +48,7 @@ def stretched(mesh: DomeMesh, radial: float, axial: float) -> Array:
 @pytest.mark.parametrize("dome", SHAPES)
 @pytest.mark.parametrize("cells", [(20, 3, 1), (28, 4, 2), (56, 8, 4)])
 def test_elements_are_not_turned_over_and_fill_the_dome(
-    dome: Dome, cells: tuple[int, int, int]
+    dome: DomeShape, cells: tuple[int, int, int]
 ) -> None:
     mesh = dome_mesh(dome, *cells)
     exact = math.pi * dome.thickness * (dome.height**2 + dome.rim_radius**2)
@@ -92,7 +92,7 @@ def test_nodes_of_importance(mesh: DomeMesh) -> None:
         (replace(REFERENCE, thickness=17.0), "it is too thick"),
     ],
 )
-def test_domes_that_cannot_be(dome: Dome, reason: str) -> None:
+def test_domes_that_cannot_be(dome: DomeShape, reason: str) -> None:
     said = impossible(dome)
     assert said.startswith(reason)
     assert bool(said) == bool(reason)

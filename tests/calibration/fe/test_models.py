@@ -8,7 +8,7 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.decks import pulse
-from dpgcli.calibration.fe.dome import Dome, dome_mesh
+from dpgcli.calibration.fe.dome import DomeShape, dome_mesh
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
 from dpgcli.calibration.fe.models import (
     CHAMBER_CELLS,
@@ -20,7 +20,7 @@ from dpgcli.calibration.fe.models import (
 )
 from dpgcli.errors import SolverError
 
-DOME = Dome(height=6.5, thickness=0.75, elastic_modulus=26.0)
+DOME = DomeShape(height=6.5, thickness=0.75, elastic_modulus=26.0)
 CHAMBERS = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 
 
@@ -86,7 +86,7 @@ def test_the_pulse_goes_up_stays_and_goes_down() -> None:
 
 def test_times_follow_the_vibrations_of_the_dome() -> None:
     """A dome twice as large is twice as slow, one of four times the modulus half as slow."""
-    double = Dome(13.0, 1.5, 26.0, base_diameter=32.0, rim_radius=20.0)
+    double = DomeShape(13.0, 1.5, 26.0, base_diameter=32.0, rim_radius=20.0)
     assert pulse(double, 0.2).period == pytest.approx(2 * pulse(DOME, 0.2).period)
     stiff = replace(DOME, elastic_modulus=104.0)
     assert pulse(stiff, 0.2).period == pytest.approx(pulse(DOME, 0.2).period / 2)
@@ -100,7 +100,7 @@ def test_the_peak_is_beyond_the_snap_of_every_dome_of_the_grid() -> None:
         *((6.5, 0.75, 0.149509), (7.5, 0.75, 0.17635), (7.5, 1.0, 0.357641)),
     ]
     for height, thickness, limit in grid:
-        peak = expected_peak(Dome(height, thickness, 26.0))
+        peak = expected_peak(DomeShape(height, thickness, 26.0))
         assert 1.15 < peak / limit < 1.35
 
 

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dpgcli.errors import Field, SpecError
-from dpgcli.files.places import Place, shown
+from dpgcli.files.places import Location, shown
 from dpgcli.files.yaml_file import MAX_BYTES, parse_document, parse_value, read_document
 from dpgcli.text import shortened
 
@@ -49,15 +49,15 @@ def test_values_follow_yaml_1_2():
 
 def test_places_are_those_of_the_keys_counted_from_one():
     document = parse_document("a.yaml", "# top\na:\n  b: {c: 1,  d: 2}\n  4-5: x\n")
-    assert document.place(("a",)) == Place("a.yaml", 2, 1)
-    assert document.place(("a", "b", "d")) == Place("a.yaml", 3, 14)
-    assert document.place(("a", "4-5")) == Place("a.yaml", 4, 3)
+    assert document.place(("a",)) == Location("a.yaml", 2, 1)
+    assert document.place(("a", "b", "d")) == Location("a.yaml", 3, 14)
+    assert document.place(("a", "4-5")) == Location("a.yaml", 4, 3)
 
 
 def test_the_place_of_a_missing_key_is_its_section():
     document = parse_document("a.yaml", "a: 1\nb:\n  c: 2\n")
-    assert document.place(("b", "missing", "deeper")) == Place("a.yaml", 2, 1)
-    assert document.place(("missing",)) == Place("a.yaml", 1, 1)
+    assert document.place(("b", "missing", "deeper")) == Location("a.yaml", 2, 1)
+    assert document.place(("missing",)) == Location("a.yaml", 1, 1)
 
 
 def test_numbers_as_keys_become_text():
@@ -74,8 +74,8 @@ def test_anchors_and_merge_keys():
     assert document.data["b"] == {"x": 1, "y": 3}
     assert document.data["c"] == {"x": 7, "z": 9}
     assert document.data["d"] == {"x": 1, "y": 2}
-    assert document.place(("b", "x")) == Place("a.yaml", 1, 8)
-    assert document.place(("b", "y")) == Place("a.yaml", 4, 3)
+    assert document.place(("b", "x")) == Location("a.yaml", 1, 8)
+    assert document.place(("b", "y")) == Location("a.yaml", 4, 3)
 
 
 def test_every_repeated_key_is_reported_with_both_lines():
@@ -173,7 +173,7 @@ def test_standard_input_and_byte_order_marks(monkeypatch):
 
 
 def test_single_values():
-    place = Place(Field("settings"))
+    place = Location(Field("settings"))
     assert parse_value("1e4", place) == 1e4
     assert parse_value("{a: [1]}", place) == {"a": [1]}
     assert parse_value("", place) is None
