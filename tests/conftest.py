@@ -45,3 +45,19 @@ def graded_finger() -> Callable[..., Finger]:
         return Finger(n_units, **values, linear_stiffness=np.array([[linear_stiffness]]))
 
     return build
+
+
+@pytest.fixture(scope="session")
+def dense() -> Callable[[Array], Array]:
+    """The full matrix of the first lane of a band of `equilibrium.banded`."""
+
+    def unfold(band: Array) -> Array:
+        size = band.shape[1]
+        full = np.zeros((size, size))
+        for depth in range(min(len(band), size)):
+            columns = np.arange(size - depth)
+            full[columns + depth, columns] = band[depth, : size - depth, 0]
+            full[columns, columns + depth] = band[depth, : size - depth, 0]
+        return full
+
+    return unfold

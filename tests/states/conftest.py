@@ -27,22 +27,6 @@ def all_patterns() -> Callable[[int], Flags]:
     return lambda n: (np.arange(2**n) >> np.arange(n - 1, -1, -1)[:, None]) % 2 == 1
 
 
-@pytest.fixture(scope="session")
-def dense() -> Callable[[Array], Array]:
-    """The full matrix of the first lane of a band of `equilibrium.banded`."""
-
-    def unfold(band: Array) -> Array:
-        size = band.shape[1]
-        full = np.zeros((size, size))
-        for depth in range(min(len(band), size)):
-            columns = np.arange(size - depth)
-            full[columns + depth, columns] = band[depth, : size - depth, 0]
-            full[columns, columns + depth] = band[depth, : size - depth, 0]
-        return full
-
-    return unfold
-
-
 class ExtendedState(NamedTuple):
     """An equilibrium of 50 digits: nodes, tip (x, y), energy, and whether it is a minimum."""
 
