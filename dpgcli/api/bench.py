@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dpgcli.api.inputs import Settings, SpecInput, check_installed, scene_input
+from dpgcli.api.inputs import Settings, SpecInput, check_installed, figure_path, point, scene_input
 from dpgcli.api.tables import Table
 from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
 from dpgcli.calibration.known import Frame
@@ -52,7 +52,7 @@ class BenchResult:
 
     def draw(self, path: str | Path) -> None:
         """Draw error over time to a .svg or .png file."""
-        draw_precision(self.rows, self.name, Path(path))
+        draw_precision(self.rows, self.name, figure_path(path))
 
 
 def bench(
@@ -85,7 +85,7 @@ def bench(
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
     then = None if compare is None else _recorded(Path(compare), given.json)
-    frame = Frame(first_station, tip_offset)
+    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
     write = partial(write_states, spec_json="{}")
     study = Bench(given.scene, repeats, tuple(keep), target_error, known, frame, write)
     study.check()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dpgcli.api.inputs import Settings, SpecInput, scene_input
+from dpgcli.api.inputs import Settings, SpecInput, figure_path, point, scene_input
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.benchmark.timing import measured
@@ -60,7 +60,7 @@ class CompareResult:
 
     def draw(self, path: str | Path) -> None:
         """Draw shapes and known tips to a .svg or .png file."""
-        draw_comparison(self.known, self.found, self.calibrated, self.name, Path(path))
+        draw_comparison(self.known, self.found, self.calibrated, self.name, figure_path(path))
 
     def _times(self) -> Iterator[str]:
         """What a state took in the data and takes here, where the data say."""
@@ -97,7 +97,8 @@ def compare(
     [1.0]
     """
     given = scene_input(spec, settings)
-    finger, frame = given.scene.finger, Frame(first_station, tip_offset)
+    finger = given.scene.finger
+    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
     known = states_of(finger, data, shapes)
     better = None if calibration is None else given.recalibrated(calibration).finger
     return CompareResult(

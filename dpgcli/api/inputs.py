@@ -27,7 +27,7 @@ from dpgcli.files.scene_file.settings import with_settings
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.mechanics.finger import Finger
 
-Settings: TypeAlias = Mapping[str, object] | Sequence[str]
+Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 """Values by dotted key of a spec, or "key=value" texts."""
 
 E = TypeVar("E", bound=StrEnum)
@@ -113,7 +113,7 @@ def setting_texts(settings: Settings) -> tuple[str, ...]:
     ('finger.units=3', 'finger.linear_stiffness_N_per_mm=".inf"')
     """
     if not isinstance(settings, Mapping):
-        return tuple(settings)
+        return as_texts(settings)
     values = {key: json.dumps(canonical(plain(value))) for key, value in settings.items()}
     return tuple(f"{key}={text}" for key, text in values.items())
 
@@ -129,12 +129,53 @@ def plain(value: Any) -> Any:
         return value.model_dump(exclude_none=True)
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | range):
         return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
-    item = getattr(value, "item", None)  # of NumPy's scalars
-    return value if item is None else item()
+    listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
+    return value if listed is None else listed()
+
+
+def as_texts(texts: str | Sequence[str]) -> tuple[str, ...]:
+    """Texts; one alone is not a sequence of letters.
+
+    >>> as_texts("abc"), as_texts(["a", "b"])
+    (('abc',), ('a', 'b'))
+    """
+    return (texts,) if isinstance(texts, str) else tuple(texts)
+
+
+def point(field: str, place: Sequence[float]) -> tuple[float, float]:
+    """A place in some data, mm. Raises UsageError for what is not two numbers.
+
+    >>> point("first_station", [5.375, -0.75])
+    (5.375, -0.75)
+    """
+    try:
+        x, y = map(float, place)
+    except (TypeError, ValueError):
+        x, y = float("nan"), 0.0
+    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
+        raise UsageError(
+            Field(field), f" {place}: expected two numbers in mm, such as 5.375, -0.75"
+        )
+    return x, y
+
+
+def figure_path(path: str | Path) -> Path:
+    """The path of a figure. Raises UsageError for a suffix that cannot be drawn."""
+    if Path(path).suffix.lower() not in (".svg", ".png"):
+        raise UsageError(Field("path"), f" {path}: expected a name that ends in .svg or .png")
+    check_installed("a figure", "matplotlib")
+    return Path(path)
+
+
+def check_resampling(bootstrap: int, seed: int) -> None:
+    """Raise UsageError for numbers of samples, or seeds, below zero."""
+    for field, value in (("bootstrap", bootstrap), ("seed", seed)):
+        if value < 0:
+            raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
 
 
 def check_installed(what: str, package: str) -> None:

@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, figure_path, scene_input
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
@@ -72,7 +72,7 @@ class PredictResult:
     def draw(self, path: str | Path) -> None:
         """Draw the states, 64 at most, to a .svg or .png file."""
         check_drawable(self.plan.n_states)
-        draw(self.given.scene, self.plan.request.patterns, Path(path))
+        draw(self.given.scene, self.plan.request.patterns, figure_path(path))
 
 
 def predict(

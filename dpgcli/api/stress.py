@@ -4,7 +4,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput, check_installed, scene_input
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    as_texts,
+    check_installed,
+    scene_input,
+)
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.study_tables import write_stress
@@ -61,7 +68,7 @@ class HardCases:
 def stress(
     spec: SpecInput | None = None,
     *,
-    only: Sequence[str] = (),
+    only: str | Sequence[str] = (),
     settings: Settings = (),
     watch: Callable[[Outcome], None] = lambda outcome: None,
 ) -> StressResult:
@@ -74,7 +81,7 @@ def stress(
     >>> len(result.failures), set(result.table["verdict"].tolist())
     (0, {'right'})
     """
-    cases = hard_cases(spec, only, settings)
+    cases = hard_cases(spec, as_texts(only), settings)
     found = []
     for outcome in cases.outcomes():
         watch(outcome)

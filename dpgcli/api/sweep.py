@@ -193,6 +193,8 @@ class Place:
         dask, scheduler = Field("executor"), Field("scheduler")
         if self.executor not in EXECUTORS:
             raise UsageError(dask, f" {self.executor!r}: expected {', '.join(EXECUTORS)}")
+        if self.jobs is not None and self.jobs < 1:
+            raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
         if self.scheduler is not None and re.fullmatch(ADDRESS, self.scheduler) is None:
@@ -226,7 +228,7 @@ class Place:
             raise UsageError(Field("scheduler"), why) from error
 
 
-def merge(shards: Sequence[str | Path], output: str | Path) -> SweepResult:
+def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> SweepResult:
     """Join the folders of shards into the tables of the whole sweep.
 
     Raises UsageError for folders without a shard, damage, gaps and overlaps, and parts of
@@ -237,7 +239,10 @@ def merge(shards: Sequence[str | Path], output: str | Path) -> SweepResult:
         ...
     dpgcli.errors.UsageError: nowhere: expected the output of one dpg sweep shard, found no shard
     """
-    return merged([Path(folder) for folder in shards], Path(output), silent)
+    folders = [shards] if isinstance(shards, str | Path) else shards
+    if not folders:
+        raise UsageError(Field("shards"), ": expected one folder or more")
+    return merged([Path(folder) for folder in folders], Path(output), silent)
 
 
 def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:

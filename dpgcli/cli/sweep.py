@@ -45,7 +45,7 @@ class ExecutorName(StrEnum):
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[  # as it is typed, for Make
-    str, typer.Option("-o", "--output", metavar="PATH", help="Folder of the tables")
+    str, typer.Option("-o", "--output", metavar="<path>", help="Folder of the tables")
 ]
 Jobs = Annotated[
     int | None,

@@ -309,12 +309,18 @@ class _Pool(ProcessPoolExecutor):
         """
         with _held_signals():
             try:
-                return super().submit(fn, *args, **kwargs)
+                future = super().submit(fn, *args, **kwargs)
             except (ConnectionError, FileNotFoundError, EOFError) as error:
                 raise BrokenExecutor("the fork server is gone") from error
             except OSError as error:
                 why = f"cannot start a process: {error.strerror}. Take fewer "
                 raise WorkplaceError(why, Field("jobs"), f". {GO_ON}") from error
+        if self._broken:
+            # of a broken pool all processes are ended and waited for: one that was just being
+            # started escapes the first, and would be waited for without end (seen in CPython 3.11)
+            for process in list((self._processes or {}).values()):
+                process.terminate()
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of the base."""

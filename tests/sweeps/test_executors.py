@@ -5,8 +5,10 @@ import os
 import resource
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import process as process_module
 from multiprocessing import forkserver, get_context
 from pathlib import Path
 from typing import Any
@@ -206,3 +208,39 @@ def test_a_system_that_allows_no_more_processes(deadly: Any, tmp_path: Path) -> 
             list(runner.run(chunked([(0, 12)], 3)))
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
+    deadly: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It escapes the end of the others, and was once waited for without end: it is ended, too."""
+    pool, late = process_pool(2), list[Any]()
+    spawn, started = ProcessPoolExecutor._spawn_process, threading.Event()
+    manager = process_module._ExecutorManagerThread
+    join = manager.join_executor_internals
+
+    def spawn_late(self: Any) -> None:
+        known, self._processes = self._processes, {}
+        spawn(self)
+        late.extend(self._processes.values())
+        began = time.monotonic()
+        while not self._broken and time.monotonic() - began < 5.0:
+            time.sleep(0.01)
+        time.sleep(0.2)  # those that are known have been ended
+        known.update(self._processes)
+        self._processes = known
+        started.set()
+
+    def join_later(self: Any) -> None:
+        started.wait(10.0)
+        join(self)
+
+    pool.submit(deadly.dies)
+    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", spawn_late)
+    monkeypatch.setattr(manager, "join_executor_internals", join_later)
+    pool.submit(os.getpid)
+    ending = threading.Thread(target=pool.shutdown, daemon=True)
+    ending.start()
+    ending.join(20.0)
+    assert not ending.is_alive()
+    assert [process.exitcode for process in late] == [-signal.SIGTERM]

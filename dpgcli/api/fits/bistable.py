@@ -15,7 +15,7 @@ from dpgcli.api.fits.result import (
     sizes,
     warned,
 )
-from dpgcli.api.inputs import check_positive, chosen
+from dpgcli.api.inputs import as_texts, check_positive, check_resampling, chosen
 from dpgcli.calibration import bistable
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity
@@ -40,7 +40,7 @@ def fit_bistable(
     area: float | None = None,
     branches: str = "all",
     fix: Mapping[str, float] | None = None,
-    free: Sequence[str] | None = None,
+    free: str | Sequence[str] | None = None,
     geometry: GeometryInput = None,
     spec: str | Path | Mapping[str, Any] | None = None,
     loss: str = "linear",
@@ -65,7 +65,8 @@ def fit_bistable(
     """
     mapping = travel_to_opening
     opening = Opening.of(mapping) if isinstance(mapping, str) else mapping
-    held = _held(fix or {}, free)
+    held = _held(fix or {}, None if free is None else as_texts(free))
+    check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, sizes(where))
     fitted_to = _quantity(measured.curve, quantity)
@@ -123,8 +124,9 @@ def _held(fix: Mapping[str, float], free: Sequence[str] | None) -> dict[str, flo
                 raise UsageError(Field(field), f" {key}: no value of the law ({hint})")
     for key, value in fix.items():
         low, high = limits_of(key)
-        if not low <= value <= high:
-            what = f" {key}={value:g}: expected a number from {low:g} to {high:g}"
+        if not (isinstance(value, int | float) and low <= value <= high):
+            shown = f"{value:g}" if isinstance(value, int | float) else repr(value)
+            what = f" {key}={shown}: expected a number from {low:g} to {high:g}"
             raise UsageError(Field("fix"), what)
     for key in LAW_KEYS if free is not None else ():
         is_free = key in (free or ())

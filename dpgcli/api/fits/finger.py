@@ -11,11 +11,20 @@ from dpgcli.api.fits.result import (
     fit_result,
     with_geometry,
 )
-from dpgcli.api.inputs import Settings, SpecInput, chosen, scene_input
+from dpgcli.api.inputs import (
+    Settings,
+    SpecInput,
+    as_texts,
+    check_resampling,
+    chosen,
+    point,
+    scene_input,
+)
 from dpgcli.calibration.choices import LEVER, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import Frame
+from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import finger_method, fitted
 from dpgcli.files.csv_file import Tabular, name_of
@@ -28,7 +37,7 @@ def fit_finger(
     spec: SpecInput,
     states: Tabular,
     *,
-    free: Sequence[str] = (LEVER,),
+    free: str | Sequence[str] = (LEVER,),
     target: str = "tips",
     settings: Settings = (),
     first_station: tuple[float, float] = (0.0, 0.0),
@@ -59,8 +68,13 @@ def fit_finger(
     known = states_of(base, states)
     weighted = chosen(Loss, "loss", loss)
     check_loss(weighted, loss_scale)
-    met, frame = chosen(Target, "target", target), Frame(first_station, tip_offset)
-    study = FingerFit(base, known, frame, tuple(free), met, weighted, loss_scale)
+    met = chosen(Target, "target", target)
+    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
+    keys = as_texts(free)
+    if not keys:
+        raise UsageError(Field("free"), ": expected one key or more")
+    check_resampling(bootstrap, seed)
+    study = FingerFit(base, known, frame, keys, met, weighted, loss_scale)
     found = study.fit(bootstrap, seed)
     name = name_of(states)
     source = DataFile(file=name, sha256=known.sha256, rows=known.patterns.shape[1])

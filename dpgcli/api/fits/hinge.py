@@ -13,7 +13,7 @@ from dpgcli.api.fits.result import (
     geometry_from,
     warned,
 )
-from dpgcli.api.inputs import chosen
+from dpgcli.api.inputs import check_resampling, chosen
 from dpgcli.calibration import hinge
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.hinge import HingeFit
@@ -46,6 +46,7 @@ def fit_hinge(
     >>> round(fit.values["hinge_stiffness_N_mm_per_rad"], 9)
     24.2
     """
+    check_resampling(bootstrap, seed)
     at = geometry_from(geometry, spec)
     data = read_moments(curve, where)
     weighted = chosen(Loss, "loss", loss)

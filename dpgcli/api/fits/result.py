@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
-from dpgcli.api.inputs import check_positive, keys_of, setting_texts
+from dpgcli.api.inputs import check_positive, figure_path, keys_of, setting_texts
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.calibration.choices import Loss
@@ -68,7 +68,7 @@ class FitResult(Generic[T]):
         """Draw data, fit and residuals to a .svg or .png file; raises UsageError for a grid."""
         if self.drawing is None:
             raise UsageError("a grid has no figure")
-        self.drawing(Path(path))
+        self.drawing(figure_path(path))
 
     def with_warnings(self, warnings: Iterable[str]) -> Self:
         """The result with its warnings in other words, in its calibration, too."""
