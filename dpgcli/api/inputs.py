@@ -166,7 +166,7 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
 def figure_path(path: str | Path) -> Path:
     """The path of a figure. Raises UsageError for a suffix that cannot be drawn."""
     if Path(path).suffix.lower() not in (".svg", ".png"):
-        raise UsageError(Field("path"), f" {path}: expected a name that ends in .svg or .png")
+        raise UsageError(f"path {path}: expected a name that ends in .svg or .png")
     check_installed("a figure", "matplotlib")
     return Path(path)
 

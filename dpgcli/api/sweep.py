@@ -241,7 +241,7 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
     """
     folders = [shards] if isinstance(shards, str | Path) else shards
     if not folders:
-        raise UsageError(Field("shards"), ": expected one folder or more")
+        raise UsageError("shards: expected one folder or more")
     return merged([Path(folder) for folder in folders], Path(output), silent)
 
 

@@ -6,13 +6,15 @@ import inspect
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import dpgcli as dpg
 from dpgcli.cli.spelling import option_of, with_options
-from dpgcli.errors import DpgError, Field, Message, respelled
+from dpgcli.errors import DpgError, Field, Message, UsageError, respelled
 
 PACKAGE = Path(dpg.__file__).parent
 README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
@@ -109,3 +111,64 @@ def test_an_error_keeps_its_fields(name: str) -> None:
     assert isinstance(error, DpgError)
     assert str(error) == "tolerance 1: too large"
     assert with_options(error.message) == "--tolerance 1: too large"
+
+
+SPEC = {
+    "finger": {
+        "units": 2,
+        "linear_stiffness_N_per_mm": 1.0e4,
+        "lattice": {
+            "segment_length_mm": 13.5,
+            "segment_height_mm": 10.75,
+            "stroke_mm": 3.5,
+            "bistable_stiffness_N_per_mm": 12.84,
+            "force_linearity": 0.043,
+            "hinge_stiffness_N_mm_per_rad": 24.2,
+        },
+    }
+}
+KNOWN = {"pattern": ["11"], "tip_x_mm": [26.0], "tip_y_mm": [-4.0]}
+SPACE = [{"key": "finger.lattice.stroke_mm", "values": [3.0, 3.5]}]
+CURVE = {"travel_mm": [0.0, 0.5, 1.0, 1.5, 2.0, 2.5], "energy_mJ": [0, 0.14, 0.25, 0.14, 0, 0.39]}
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: dpg.compare(SPEC, KNOWN, first_station=(float("nan"), 0.0)), "first_station"),
+        (lambda: dpg.compare(SPEC, KNOWN, tip_offset=(1.0,)), "tip_offset"),
+        (lambda: dpg.compare(SPEC, KNOWN, first_station="1,2"), "first_station"),
+        (lambda: dpg.predict(SPEC).draw("states.pdf"), "path"),
+        (lambda: dpg.merge([], "whole"), "shards"),
+        (lambda: dpg.sweep({"base": SPEC, "space": SPACE}, jobs=-1), "jobs"),
+        (lambda: dpg.sweep({"base": SPEC, "space": SPACE}, jobs=0, executor="serial"), "jobs"),
+        (lambda: dpg.fit_bistable(CURVE, travel_to_opening="equal", bootstrap=-1), "bootstrap"),
+        (lambda: dpg.fit_bistable(CURVE, travel_to_opening="equal", seed=-1), "seed"),
+        (
+            lambda: dpg.fit_bistable(CURVE, travel_to_opening="equal", fix={"stroke_mm": "x"}),
+            "fix",
+        ),
+        (lambda: dpg.fit_finger(SPEC, KNOWN, free=()), "free"),
+        (lambda: dpg.stress(only="foo"), "only foo"),
+    ],
+)
+def test_functions_refuse_what_commands_refuse(call: Callable[[], object], field: str) -> None:
+    with pytest.raises(UsageError, match=rf"^{field}\b"):
+        call()
+
+
+def test_a_text_alone_is_no_sequence_of_letters() -> None:
+    table = dpg.predict(SPEC, settings="finger.units=3", patterns="1*1").table
+    assert list(table["pattern"]) == ["101", "111"]
+    with pytest.raises(UsageError, match="nowhere: expected the output"):
+        dpg.merge("nowhere", "whole")
+
+
+def test_arrays_and_ranges_are_lists_of_values() -> None:
+    numbers = np.array([3.0, 3.5])
+    space = [{"key": "finger.lattice.stroke_mm", "values": numbers}]
+    found = dpg.sweep({"base": SPEC, "space": space}, executor="serial").designs
+    assert list(found["stroke_mm"]) == [3.0, 3.5]
+    space = [{"key": "finger.units", "values": range(1, 3)}]
+    found = dpg.sweep({"base": SPEC, "space": space}, executor="serial").designs
+    assert list(found["n_units"]) == [1, 2]
