@@ -12,8 +12,10 @@ from dpgcli.design.scene import Scene
 from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
+from dpgcli.states.pairs.halves import Split
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
+from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers, inverted_wells
 
 Fingers = Callable[..., Finger]
@@ -331,3 +333,16 @@ def test_a_dome_that_only_pushes_does_not_pull_in_a_ripple_either() -> None:
     assert apart.energy == pytest.approx(np.full((1, 7), at_rest), rel=1e-12)
     around = np.linspace(*curve.rests, 201)[1:-1] * 4.6
     assert (law.response(around, dome).force <= 0.0).all()
+
+
+def test_a_dome_that_does_not_act_brings_no_force_into_play(reference_finger: Fingers) -> None:
+    """Ground units under a push-only law have their hinge alone, and so has a strut between two."""
+    finger = replace(reference_finger(2, 1e4), law=PushOnly(PUBLISHED))
+    hinge, both = 24.2 / 10.75**2 * 3.5, (12.84 + 24.2 / 10.75**2) * 3.5
+    acting = finger.with_domes(np.array([[True], [False]]))
+    assert acting.force_scale.ravel() == pytest.approx([both, hinge], rel=1e-14)
+    assert Split(UnitSolutions.of(finger), 1, 0, 1e-12).strut_force == pytest.approx(
+        hinge, rel=1e-14
+    )
+    always = Split(UnitSolutions.of(replace(finger, law=PUBLISHED)), 1, 0, 1e-12)
+    assert always.strut_force == pytest.approx(both, rel=1e-14)

@@ -12,7 +12,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain
 from dpgcli.states.predict import predict
-from dpgcli.states.rungs import RUNGS, cheapest, error_bounds
+from dpgcli.states.rungs import RUNGS, bar_flexibility, cheapest, error_bounds
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -204,3 +204,15 @@ def test_the_bound_of_a_tolerance_by_hand(reference_finger: Fingers) -> None:
     expected = 4.0 * forces * 10.75 / stiffness * 13.5
     coarse, fine = error_bounds(UnitSolutions.of(unit))[[1, 2], 0]
     assert coarse - fine == pytest.approx((1e-3 - 1e-6) * expected, rel=1e-4)
+
+
+def test_what_dropping_the_bars_costs_is_in_the_error_of_each_tip(
+    reference_finger: Callable[..., Finger],
+) -> None:
+    finger = reference_finger(3, 1e3)
+    prediction = predict(Scene(finger, ()), Request(target_error=1.0))
+    assert prediction.plan.rung is not None and prediction.plan.rung.drops_bars
+    cost = float(bar_flexibility(UnitSolutions.of(finger))[0])
+    assert prediction.plan.dropped_error == prediction.plan.bar_flexibility == cost
+    errors = prediction.arrays()["tip_error_mm"]
+    assert (errors >= cost).all() and errors == pytest.approx(cost, abs=1e-10)

@@ -214,3 +214,16 @@ def test_a_search_that_stalls_between_stiff_bars_is_made_again(
     truth = extended_state(finger, nodes)
     assert truth.is_minimum
     assert np.array(truth.nodes, float) == pytest.approx(nodes, abs=1e-6)
+
+
+@pytest.mark.parametrize(("share", "is_soft"), [(0.04, False), (0.06, True)])
+def test_bars_give_way_before_a_stiff_hinge(
+    reference_finger: Callable[..., Finger], share: float, is_soft: bool
+) -> None:
+    """Of a dome too weak to hold it open: rigid bars prove nothing then."""
+    bars = 1e3
+    finger = reference_finger(1, bars, hinge_stiffness=share * bars * 10.75**2)
+    units = UnitSolutions.of(finger)
+    assert not units.wells.exists.any()
+    assert units.are_soft.tolist() == [[is_soft]]
+    assert units.have_no_well.tolist() == [[not is_soft]]
