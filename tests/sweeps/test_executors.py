@@ -75,6 +75,42 @@ def test_a_worker_that_dies_once_costs_nothing(deadly: Any, tmp_path: Path) -> N
     assert Chunk(4, 8) in runner.deaths
 
 
+def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
+    deadly: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It escapes the end of the others, and was once waited for without end: it is ended, too."""
+    pool, late = process_pool(2), list[Any]()
+    spawn, started = ProcessPoolExecutor._spawn_process, threading.Event()
+    manager = process_module._ExecutorManagerThread
+    join = manager.join_executor_internals
+
+    def spawn_late(self: Any) -> None:
+        known, self._processes = self._processes, {}
+        spawn(self)
+        late.extend(self._processes.values())
+        began = time.monotonic()
+        while not self._broken and time.monotonic() - began < 5.0:
+            time.sleep(0.01)
+        time.sleep(0.2)  # those that are known have been ended
+        known.update(self._processes)
+        self._processes = known
+        started.set()
+
+    def join_later(self: Any) -> None:
+        started.wait(10.0)
+        join(self)
+
+    pool.submit(deadly.dies)
+    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", spawn_late)
+    monkeypatch.setattr(manager, "join_executor_internals", join_later)
+    pool.submit(os.getpid)
+    ending = threading.Thread(target=pool.shutdown, daemon=True)
+    ending.start()
+    ending.join(20.0)
+    assert not ending.is_alive()
+    assert [process.exitcode for process in late] == [-signal.SIGTERM]
+
+
 def test_a_case_that_always_kills_is_alone_in_failing(deadly: Any, tmp_path: Path) -> None:
     runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=[5]))
     found = results(runner, chunked([(0, 12)], 4))
@@ -208,39 +244,3 @@ def test_a_system_that_allows_no_more_processes(deadly: Any, tmp_path: Path) -> 
             list(runner.run(chunked([(0, 12)], 3)))
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-
-
-def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
-    deadly: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It escapes the end of the others, and was once waited for without end: it is ended, too."""
-    pool, late = process_pool(2), list[Any]()
-    spawn, started = ProcessPoolExecutor._spawn_process, threading.Event()
-    manager = process_module._ExecutorManagerThread
-    join = manager.join_executor_internals
-
-    def spawn_late(self: Any) -> None:
-        known, self._processes = self._processes, {}
-        spawn(self)
-        late.extend(self._processes.values())
-        began = time.monotonic()
-        while not self._broken and time.monotonic() - began < 5.0:
-            time.sleep(0.01)
-        time.sleep(0.2)  # those that are known have been ended
-        known.update(self._processes)
-        self._processes = known
-        started.set()
-
-    def join_later(self: Any) -> None:
-        started.wait(10.0)
-        join(self)
-
-    pool.submit(deadly.dies)
-    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", spawn_late)
-    monkeypatch.setattr(manager, "join_executor_internals", join_later)
-    pool.submit(os.getpid)
-    ending = threading.Thread(target=pool.shutdown, daemon=True)
-    ending.start()
-    ending.join(20.0)
-    assert not ending.is_alive()
-    assert [process.exitcode for process in late] == [-signal.SIGTERM]
