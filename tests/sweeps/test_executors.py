@@ -108,7 +108,8 @@ def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
     ending.start()
     ending.join(20.0)
     assert not ending.is_alive()
-    assert [process.exitcode for process in late] == [-signal.SIGTERM]
+    (exit_code,) = (process.exitcode for process in late)
+    assert exit_code in (-signal.SIGTERM, -signal.SIGKILL)  # the latter if it was the one that died
 
 
 def test_a_case_that_always_kills_is_alone_in_failing(deadly: Any, tmp_path: Path) -> None:
