@@ -313,6 +313,8 @@ class _Pool(ProcessPoolExecutor):
             except (ConnectionError, FileNotFoundError, EOFError) as error:
                 raise BrokenExecutor("the fork server is gone") from error
             except OSError as error:
+                if self._broken:  # its pipes are closed meanwhile
+                    raise BrokenExecutor("a worker died while another was started") from error
                 why = f"cannot start a process: {error.strerror}. Take fewer "
                 raise WorkplaceError(why, Field("jobs"), f". {GO_ON}") from error
         if self._broken:
