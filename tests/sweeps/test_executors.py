@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from concurrent.futures import process as process_module
 from multiprocessing import forkserver, get_context
 from pathlib import Path
@@ -110,6 +110,22 @@ def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
     assert not ending.is_alive()
     (exit_code,) = (process.exitcode for process in late)
     assert exit_code in (-signal.SIGTERM, -signal.SIGKILL)  # the latter if it was the one that died
+
+
+def test_a_pool_that_breaks_while_it_starts_a_worker_is_broken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its pipes are closed under the start: that is no lack of processes."""
+    pool = process_pool(1)
+
+    def spawn(self: Any) -> None:
+        self._broken = "a worker died"
+        raise OSError("handle is closed")
+
+    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", spawn)
+    with pytest.raises(BrokenExecutor, match="while another was started"):
+        pool.submit(os.getpid)
+    pool.shutdown()
 
 
 def test_a_case_that_always_kills_is_alone_in_failing(deadly: Any, tmp_path: Path) -> None:
