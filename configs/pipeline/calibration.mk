@@ -15,10 +15,10 @@ export SPEC MESH STROKE DPG_VERSION
 all: $(OUT)/states.parquet
 
 $(OUT)/dome/dome.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value $(OUT)/DPG_VERSION.value
-	$(DPG) fe dome $(SPEC) --out $(@D) --mesh $(MESH) --run
+	$(DPG) fe dome $(SPEC) --output $(@D) --mesh $(MESH) --run
 
 $(OUT)/hinge/hinge.csv: $(SPEC) $(OUT)/SPEC.value $(OUT)/MESH.value $(OUT)/DPG_VERSION.value
-	$(DPG) fe hinge $(SPEC) --out $(@D) --mesh $(MESH) --run
+	$(DPG) fe hinge $(SPEC) --output $(@D) --mesh $(MESH) --run
 
 $(OUT)/dome.yaml: $(OUT)/dome/dome.csv $(OUT)/STROKE.value
 	$(DPG) fit bistable $< --spec $(SPEC) --travel-to-opening stroke:$(STROKE) \

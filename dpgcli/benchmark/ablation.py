@@ -65,7 +65,7 @@ def ablations(scene: Scene, name: str, target_error: float | None) -> tuple[Abla
     rows, other = (predict(v.scene, v.request).arrays() for v in (planned, kept))
     both = (rows["status"] == "stable") & (other["status"] == "stable")
     moved = np.hypot(*(rows[key] - other[key] for key in ("tip_x_mm", "tip_y_mm")))
-    bound = (rows["tip_error_mm"] + other["tip_error_mm"])[both].max(initial=0.0)
+    bound = (rows["numerical_error_mm"] + other["numerical_error_mm"])[both].max(initial=0.0)
     if name == "bars" and scene.finger.is_rigid:
         bound += plan.bar_flexibility
     return (

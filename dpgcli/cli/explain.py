@@ -173,7 +173,7 @@ def _bar_error(plan: "Plan") -> str:
 
 def _bound(plan: "Plan") -> str:
     if plan.error_bound == float("inf"):
-        return "the tip's numerical error is bounded only after the work, in tip_error_mm"
+        return "the tip's numerical error is bounded only after the work, in numerical_error_mm"
     way = f"{plan.rung.name}, chosen for the target error: " if plan.rung else ""
     return f"{way}the tip's error will be below {plan.error_bound:.1e} mm (the model's left aside)"
 

@@ -41,7 +41,9 @@ class Mesh(StrEnum):
     FINE = "fine"
 
 
-Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder of deck and results")]
+Out = Annotated[
+    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of deck and results")
+]
 Poisson = Annotated[float, typer.Option("--poisson", help="Poisson's ratio, below 0.5")]
 MeshOption = Annotated[Mesh, typer.Option("--mesh", help="How fine the mesh is")]
 RunOption = Annotated[bool, typer.Option("--run", help="Run ccx, write the curve")]
@@ -184,5 +186,10 @@ def _carry_out(
         say(f"{finding} ({time.monotonic() - start:.3g} s)")
 
 
+def _as_before(name: str) -> str:
+    """`--output` for `--out`, its former name, for one version more."""
+    return "output" if name == "out" else name
+
+
 for _function in (dome, hinge):
-    app.command()(command(_function))
+    app.command(context_settings={"token_normalize_func": _as_before})(command(_function))

@@ -21,25 +21,24 @@ PRINCIPAL = (
     "status",
     "tip_x_mm",
     "tip_y_mm",
-    "tip_angle_rad",
+    "tip_angle_deg",
     "energy_mJ",
     "tip_x_uncertainty_mm",
     "tip_y_uncertainty_mm",
     "tip_angle_uncertainty_rad",
     "aperture_mm",
     "fingers_overlap",
-    "min_eigenvalue_N_per_mm",
-    "residual_N",
-    "tip_error_mm",
+    "numerical_error_mm",
 )
-DROPPED_FIRST = ("min_eigenvalue_N_per_mm", "residual_N", "tip_error_mm")
+DROPPED_FIRST = ("numerical_error_mm",)
 TOO_SMALL = 1e-3  # for fixed decimals: such as the tips of a finger of micrometers
 ROUNDED = {
     "residual_N": ".1e",
-    "tip_error_mm": ".1e",
+    "numerical_error_mm": ".1e",
     "min_eigenvalue_N_per_mm": ".5f",
     "mm": ".5f",
     "rad": ".5f",
+    "deg": ".3f",
     "N": ".4f",
     "mJ": ".5f",
     "%": ".1f",

@@ -27,7 +27,7 @@ def write_prediction(
             "states": {status.text: n for status, n in summary.statuses.items()},
             "finger_solves": summary.n_finger_solves,
             "worst_residual_N": summary.residual,
-            "worst_tip_error_mm": summary.tip_error,
+            "worst_numerical_error_mm": summary.tip_error,
             "seconds": summary.seconds,
             "cpu_seconds": summary.cpu_seconds,
             "machine": platform.machine(),

@@ -27,7 +27,7 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "aperture_max_mm": True,
     "aperture_min_mm": False,
 }
-ERRORS = ("max_residual_N", "max_tip_error_mm")
+ERRORS = ("max_residual_N", "max_numerical_error_mm")
 STATUSES = ("stable", "partly_stable", "invalid", "excluded", "failed")
 BOUNDARY_STATUSES = ("stable", "partly_stable", "invalid")
 WITHOUT_REASON = {

@@ -42,7 +42,7 @@ class Summary:
         stable = block["status"] == Status.STABLE
         if stable.any():
             self.residual = max(self.residual, float(block["residual_N"][stable].max()))
-            self.tip_error = max(self.tip_error, float(block["tip_error_mm"][stable].max()))
+            self.tip_error = max(self.tip_error, float(block["numerical_error_mm"][stable].max()))
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,7 @@ _POSES = (
         "rotation of the last strut; negative = curled",
         of=lambda s: s.pose[2],
     ),
+    Quantity("tip_angle_deg", "deg", "the same in degrees", of=lambda s: np.degrees(s.pose[2])),
     Quantity("energy_mJ", "mJ", "potential energy of the state", of=lambda s: s.energy),
 )
 _EIGENVALUE = Quantity(
@@ -135,7 +136,7 @@ _NUMERICS = (
         is_always=True,
     ),
     Quantity(
-        "tip_error_mm",
+        "numerical_error_mm",
         "mm",
         "estimated numerical error of the tip position",
         of=lambda s: s.tip_error,

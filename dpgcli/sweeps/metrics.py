@@ -37,7 +37,7 @@ DESIGN_COLUMNS = (
         "min_barrier_mJ", "mJ", "smallest barrier of a unit to snap or reset, bars taken as rigid"
     ),
     Column("max_residual_N", "N", "largest unbalanced force of any state"),
-    Column("max_tip_error_mm", "mm", "largest numerical error of any tip"),
+    Column("max_numerical_error_mm", "mm", "largest numerical error of any tip"),
 )
 
 LEAST = {  # metric: what of the states it is the least of
@@ -49,7 +49,7 @@ MOST = {
     "reach_max_mm": "reach",
     "stiffness_max_N_per_mm": "tip_stiffness_max_N_per_mm",
     "max_residual_N": "residual_N",
-    "max_tip_error_mm": "tip_error_mm",
+    "max_numerical_error_mm": "numerical_error_mm",
     "aperture_max_mm": "aperture_mm",
 }
 

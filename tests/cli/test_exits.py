@@ -89,7 +89,7 @@ def test_the_version_goes_to_standard_output(call: Call) -> None:
         ("sweep", "three_unit.yaml", "-o", "out", "-j", "0"),
         ("sweep", "three_unit.yaml", "-o", "out", "-j", "9" * 20),
         ("sweep", "three_unit.yaml", "-o", "out", "--shard", "1/" + "9" * 20),
-        ("fe", "dome", "three_unit.yaml", "--out", "out", "--threads", "9" * 20),
+        ("fe", "dome", "three_unit.yaml", "--output", "out", "--threads", "9" * 20),
     ],
 )
 def test_misuse_is_2_without_output_of_data(call: Call, arguments: tuple[str, ...]) -> None:

@@ -16,8 +16,8 @@ from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
 from dpgcli.cli.exits import ExitCode
 
 needs_solver = pytest.mark.skipif(shutil.which("ccx") is None, reason="needs calculix-ccx")
-HINGE = ("fe", "hinge", "three_unit.yaml", "--out", "deck", "--mesh", "coarse")
-DOME = ("fe", "dome", "three_unit.yaml", "--out", "deck", "--mesh", "coarse")
+HINGE = ("fe", "hinge", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
+DOME = ("fe", "dome", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
 
 Fake = Callable[[str], dict[str, str]]
 
@@ -71,6 +71,12 @@ def test_a_deck_alone(call: Any, folder: Path) -> None:
     before = (folder / "deck" / "dome.inp").read_bytes()
     assert call(*DOME).exit_code == ExitCode.DONE
     assert (folder / "deck" / "dome.inp").read_bytes() == before
+
+
+def test_the_former_name_of_output(call: Any, folder: Path) -> None:
+    former = ("--out" if word == "--output" else word for word in HINGE)
+    assert call(*former).stdout == call(*HINGE).stdout == "deck/hinge.inp\n"
+    assert "--out " not in call("fe", "hinge", "--help").stdout
 
 
 def test_options_reach_the_deck(call: Any, folder: Path) -> None:
@@ -300,8 +306,8 @@ def test_another_deck_removes_what_the_old_one_gave(call: Any, folder: Path, fak
         ((*DOME, "--base-diameter", "0.2"), "no mesh of this dome: "),
         ((*DOME, "--time-limit", "0"), "--time-limit 0: expected a number > 0"),
         ((*HINGE, "--moment", "nan"), "--moment nan: expected a number > 0"),
-        (("fe", "dome", "none.yaml", "--out", "deck"), "none.yaml: file: expected a readable file"),
-        ((*DOME[:3], "--out", "three_unit.yaml"), "cannot write three_unit.yaml: it is no folder"),
+        (("fe", "dome", "none.yaml", "--output", "deck"), "none.yaml: file: expected a readable file"),
+        ((*DOME[:3], "--output", "three_unit.yaml"), "cannot write three_unit.yaml: it is no folder"),
     ],
 )
 def test_what_makes_no_sense(

@@ -347,7 +347,7 @@ def test_the_geometry_of_a_spec_whose_calibration_is_yet_to_be_made(
     named = text.replace("calibration: published", "calibration: [dome.yaml, published]")
     (folder / "new.yaml").write_text(named)
     assert call("predict", "new.yaml").exit_code == ExitCode.USAGE
-    assert call("fe", "hinge", "new.yaml", "--out", "deck", "-q").exit_code == ExitCode.DONE
+    assert call("fe", "hinge", "new.yaml", "--output", "deck", "-q").exit_code == ExitCode.DONE
     options = ("--travel-to-opening", "stroke:3.5", "--spec", "new.yaml", "-o", "dome.yaml", "-q")
     assert fit("bistable", PATH, *options).exit_code == ExitCode.DONE
     assert call("predict", "new.yaml", "-q").exit_code == ExitCode.DONE

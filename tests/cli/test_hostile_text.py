@@ -92,7 +92,7 @@ def test_a_report_of_a_hostile_table(call: Any, folder: Path, tables: str) -> No
         ("fit", "hinge", "hinge.csv"),
         ("compare", "a\u202eb.yaml", "tips.csv"),
         ("explain", "calibrated.yaml", "--set", "finger.lattice.stroke_mm=3.5"),
-        ("fe", "hinge", "a\u202eb.yaml", "--out", "deck\u202e"),
+        ("fe", "hinge", "a\u202eb.yaml", "--output", "deck\u202e"),
     ],
 )
 def test_names_of_files_and_columns(

@@ -76,7 +76,7 @@ def test_a_solver_and_its_folder(
     )
     solver.chmod(0o755)
     monkeypatch.setenv("PATH", f"{solver.parent}{os.pathsep}{os.environ['PATH']}")
-    fe = ("fe", "hinge", "three_unit.yaml", "--out", "deck", "--mesh", "coarse")
+    fe = ("fe", "hinge", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
     process = start(*fe, "--run")
     until((folder / "deck" / "pids").exists)
     numbers = [int(word) for word in (folder / "deck" / "pids").read_text().split()]

@@ -414,7 +414,7 @@ def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
     assert call("sweep", "sweep.yaml", *SERIAL, "--target-error", "1mm").exit_code == 0
     rough = pd.read_parquet(out / "designs.parquet").dropna(subset="error_bound_mm")
     assert set(rough["rung"]) == {"rigid bars"}
-    assert (rough["max_tip_error_mm"] <= rough["error_bound_mm"]).all()
+    assert (rough["max_numerical_error_mm"] <= rough["error_bound_mm"]).all()
     assert (rough["error_bound_mm"] <= 1.0).all()
     assert rough["stiffness_max_N_per_mm"].isna().all(), "the bars carry it"
     assert fine["stiffness_max_N_per_mm"].notna().all()

@@ -60,7 +60,7 @@ def test_no_escape_codes_in_pipes(
 def test_rows_in_a_pipe_are_never_cropped(run: Any, env: dict[str, str]) -> None:
     lines = run("predict", "-q", "three_unit.yaml", env=env).stdout.splitlines()
     assert len(lines) == 9
-    assert lines[0].endswith("tip_error_mm")
+    assert lines[0].endswith("numerical_error_mm")
     assert len({len(line) for line in lines}) == 1
 
 

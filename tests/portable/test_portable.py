@@ -88,4 +88,4 @@ def test_the_small_commands(folder: Path) -> None:
     dpg(folder, "validate", "three_unit.yaml")
     dpg(folder, "init", "new.yaml")
     assert "calibrated" in dpg(folder, "explain", "new.yaml")
-    assert dpg(folder, "fe", "hinge", "three_unit.yaml", "--out", "deck") == "deck/hinge.inp\n"
+    assert dpg(folder, "fe", "hinge", "three_unit.yaml", "--output", "deck") == "deck/hinge.inp\n"

@@ -74,7 +74,7 @@ def test_a_uniform_finger_may_be_stored_unit_by_unit(reference_finger: Fingers) 
     for name, values in once.items():
         if values.dtype.kind == "U":
             np.testing.assert_array_equal(each[name], values)
-        elif name not in ("residual_N", "tip_error_mm"):
+        elif name not in ("residual_N", "numerical_error_mm"):
             np.testing.assert_allclose(each[name], values, rtol=1e-9, atol=1e-12)
 
 

@@ -139,7 +139,7 @@ def test_64_units_with_one_pattern(
     assert lanes == [1]
     assert rows["status"].tolist() == ["stable"]
     assert rows["reached_pattern"].tolist() == [pattern]
-    assert rows["tip_error_mm"] < 1e-9
+    assert rows["numerical_error_mm"] < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -117,8 +117,8 @@ def test_predict_meets_its_target_and_says_so_in_every_row(
     assert plan.error_bound <= target
     rows, exact = (predict(scene, r).arrays() for r in (request, Request(columns=("states",))))
     error = np.hypot(*(rows[name] - exact[name] for name in ("tip_x_mm", "tip_y_mm")))
-    assert (error <= rows["tip_error_mm"] + exact["tip_error_mm"]).all()
-    assert rows["tip_error_mm"].max() <= target
+    assert (error <= rows["numerical_error_mm"] + exact["numerical_error_mm"]).all()
+    assert rows["numerical_error_mm"].max() <= target
 
 
 def test_a_rung_without_bars_has_fewer_unknowns(reference_finger: Fingers) -> None:
@@ -134,7 +134,7 @@ def test_long_fingers_in_pairs_meet_it_too(reference_finger: Fingers) -> None:
     rows = predict(scene, Request(columns=("states",), target_error=0.1)).arrays()
     exact = predict(scene, Request(columns=("states",))).arrays()
     error = np.hypot(*(rows[name] - exact[name] for name in ("tip_x_mm", "tip_y_mm")))
-    assert 1e-6 < error.max() <= rows["tip_error_mm"].max() < 0.1
+    assert 1e-6 < error.max() <= rows["numerical_error_mm"].max() < 0.1
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_a_marginal_state_has_no_error_estimate(reference_finger: Fingers) -> No
     scene = Scene(reference_finger(2, 12.84e15), ())
     rows = predict(scene, Request(formulation="lattice", columns=("states",))).arrays()
     assert set(rows["status"]) == {"marginal"}
-    assert np.isinf(rows["tip_error_mm"]).all()
+    assert np.isinf(rows["numerical_error_mm"]).all()
 
 
 def test_the_bound_of_a_tolerance_by_hand(reference_finger: Fingers) -> None:
@@ -214,5 +214,5 @@ def test_what_dropping_the_bars_costs_is_in_the_error_of_each_tip(
     assert prediction.plan.rung is not None and prediction.plan.rung.drops_bars
     cost = float(bar_flexibility(UnitSolutions.of(finger))[0])
     assert prediction.plan.dropped_error == prediction.plan.bar_flexibility == cost
-    errors = prediction.arrays()["tip_error_mm"]
+    errors = prediction.arrays()["numerical_error_mm"]
     assert (errors >= cost).all() and errors == pytest.approx(cost, abs=1e-10)

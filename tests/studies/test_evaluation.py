@@ -65,7 +65,7 @@ def test_metrics_follow_from_the_states(study: Any, tables: Any, base: str) -> N
             "stiffness_min_N_per_mm": min(rows["tip_stiffness_min_N_per_mm"]),
             "stiffness_max_N_per_mm": max(rows["tip_stiffness_max_N_per_mm"]),
             "max_residual_N": max(rows["residual_N"]),
-            "max_tip_error_mm": max(rows["tip_error_mm"]),
+            "max_numerical_error_mm": max(rows["numerical_error_mm"]),
         }
         if base == "gripper":
             expected["aperture_min_mm"] = min(rows["aperture_mm"])

@@ -36,7 +36,7 @@ def metrics(reference_finger: Fingers) -> Callable[..., Columns]:
         for tips in blocks:
             x, y = np.array(tips, float).reshape(-1, 2).T
             same = {"tip_stiffness_min_N_per_mm": x, "tip_stiffness_max_N_per_mm": x}
-            same |= {"residual_N": x, "tip_error_mm": x, "tip_x_mm": x, "tip_y_mm": y}
+            same |= {"residual_N": x, "numerical_error_mm": x, "tip_x_mm": x, "tip_y_mm": y}
             stable = np.array(status or [Status.STABLE] * len(x), np.uint8)
             found.add({**same, "status": stable})
         return found.columns()
@@ -120,7 +120,7 @@ def test_states_that_are_not_stable_do_not_count(metrics: Callable[..., Columns]
     none = metrics(SQUARE, status=[Status.FOLDED] * 6)
     assert (none["n_stable"].tolist(), none["n_distinct_tips"].tolist()) == ([0], [0])
     assert none["workspace_area_mm2"].tolist() == [0.0]
-    assert np.isnan([none[name][0] for name in ("reach_min_mm", "max_tip_error_mm")]).all()
+    assert np.isnan([none[name][0] for name in ("reach_min_mm", "max_numerical_error_mm")]).all()
 
 
 def test_extremes_are_those_of_all_blocks(metrics: Callable[..., Columns]) -> None:
