@@ -156,7 +156,9 @@ def _chosen(rung: "Rung", bound: float, target: float) -> str:
     """What a target error chose, in words."""
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
-        promise = "no way is bounded by that before the work: numerical_error_mm says what was reached"
+        promise = (
+            "no way is bounded by that before the work: numerical_error_mm says what was reached"
+        )
     return f"chosen for the target error: {rung.name}; {promise}"
 
 

@@ -306,8 +306,14 @@ def test_another_deck_removes_what_the_old_one_gave(call: Any, folder: Path, fak
         ((*DOME, "--base-diameter", "0.2"), "no mesh of this dome: "),
         ((*DOME, "--time-limit", "0"), "--time-limit 0: expected a number > 0"),
         ((*HINGE, "--moment", "nan"), "--moment nan: expected a number > 0"),
-        (("fe", "dome", "none.yaml", "--output", "deck"), "none.yaml: file: expected a readable file"),
-        ((*DOME[:3], "--output", "three_unit.yaml"), "cannot write three_unit.yaml: it is no folder"),
+        (
+            ("fe", "dome", "none.yaml", "--output", "deck"),
+            "none.yaml: file: expected a readable file",
+        ),
+        (
+            (*DOME[:3], "--output", "three_unit.yaml"),
+            "cannot write three_unit.yaml: it is no folder",
+        ),
     ],
 )
 def test_what_makes_no_sense(
