@@ -157,7 +157,7 @@ def _chosen(rung: "Rung", bound: float, target: float) -> str:
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
-            "no way is bounded by that before the work: numerical_error_mm says what was reached"
+            "no method promises that before the work: numerical_error_mm says what was reached"
         )
     return f"chosen for the target error: {rung.name}; {promise}"
 
