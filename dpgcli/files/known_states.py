@@ -30,7 +30,8 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
     points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Raises SpecError
     with every problem of a file.
     """
-    sheet = read_sheet(source)
+    names = _names(n_units)
+    sheet = read_sheet(source, names)
     sheet.check_names(("pattern",))
     if len(sheet.rows) * n_units > MOST_UNITS:
         expected = f"at most {MOST_UNITS // n_units:,} states of {n_units} units"
@@ -100,11 +101,16 @@ def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
         raise SpecError(tuple(problems))
 
 
+def _names(n_units: int) -> set[str]:
+    """The columns that a table of states may have."""
+    by_unit = (*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units))
+    return {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units), *by_unit}
+
+
 def _unused(sheet: Sheet, n_units: int) -> tuple[str, ...]:
-    used = {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units)}
-    used |= {*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units)}
+    used = _names(n_units)
     used -= set() if {*TIP} <= {*sheet.names} else {*TIP}  # one coordinate places no tip
-    return tuple(name for name in sheet.names if name not in used)
+    return tuple(name for name in sheet.names if name and name not in used)
 
 
 def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
@@ -160,7 +166,7 @@ def _angles(sheet: Sheet, n_units: int) -> Array:
 
 def _read_shapes(source: Tabular, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
     """Points by state, in the order of the file; none for a state that is not in it."""
-    sheet = read_sheet(source)
+    sheet = read_sheet(source, ("pattern", *POINT))
     sheet.check_names(("pattern", *POINT))
     problems = _pattern_problems(sheet, n_units)
     points = sheet.numbers(POINT)
