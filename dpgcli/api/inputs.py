@@ -12,6 +12,7 @@ from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
@@ -29,6 +30,11 @@ from dpgcli.mechanics.finger import Finger
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 """Values by dotted key of a spec, or "key=value" texts."""
+
+Texts: TypeAlias = Mapping[str, str] | Sequence[str] | str
+"""Texts by name, or "name=text"."""
+
+FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -144,6 +150,26 @@ def as_texts(texts: str | Sequence[str]) -> tuple[str, ...]:
     (('abc',), ('a', 'b'))
     """
     return (texts,) if isinstance(texts, str) else tuple(texts)
+
+
+def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
+    """What of a table is read: our names and quantities with its titles and units.
+
+    >>> table_choice(["force_N=Load"], 4, {"force": "kN"})
+    Choice(columns={'force_N': 'Load'}, skip=4, units={'force': 'kN'})
+    """
+    return Choice(_by_name("column", column), skip, _by_name("units", units))
+
+
+def _by_name(field: str, texts: Texts) -> dict[str, str]:
+    """Texts by name. Raises UsageError for what is no "name=text"."""
+    if isinstance(texts, Mapping):
+        return {str(name): str(text) for name, text in texts.items()}
+    parts = [(text, *map(str.strip, text.partition("="))) for text in as_texts(texts)]
+    for text, name, _, said in parts:
+        if not name or not said:
+            raise UsageError(Field(field), f" {text}: expected {FORMS[field]}")
+    return {name: said for _, name, _, said in parts}
 
 
 def point(field: str, place: Sequence[float]) -> tuple[float, float]:
