@@ -45,7 +45,7 @@ def fit_bistable(
     travel_to_opening: str | Opening,
     quantity: str | None = None,
     area: float | None = None,
-    branches: str = "all",
+    branches: str | None = None,
     fix: Mapping[str, float] | None = None,
     free: str | Sequence[str] | None = None,
     geometry: GeometryInput = None,
@@ -62,10 +62,12 @@ def fit_bistable(
 
     `curve` has `travel_mm` and any of `energy_mJ`, `force_N`, `pressure_MPa`; for pressure `area`
     is its effective area (mm²). `travel_to_opening` is "equal", "proportional:FACTOR" or
-    "stroke:MM". `fix` holds values by key; `free` names those that are fitted, by default all
-    others. Dimensions (`geometry`, or those of a `spec`) say where the values hold. Of a machine's
-    export `column` has titles by our names ("-Extension" reverses signs), `skip` is the number of
-    lines above its table, `units` has units by quantity, such as {"force": "kN"}.
+    "stroke:MM". `branches` is "loading", "unloading", "both" or "quasi-static"; without it both are
+    fitted, unless they are two curves. `fix` holds values by key; `free` names those that are
+    fitted, by default all others. Dimensions (`geometry`, or those of a `spec`) say where the
+    values hold. Of a machine's export `column` has titles by our names ("-Extension" reverses
+    signs), `skip` is the number of lines above its table, `units` has units by quantity, such as
+    {"force": "kN"}.
     Raises SpecError for wrong data, UsageError for wrong choices, FitError for a fit that fails.
 
     >>> opening = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]  # of a law with k_b = 2 N/mm, α = 0, d = 2 mm
@@ -85,7 +87,7 @@ def fit_bistable(
     choice = BistableOptions(
         opening,
         fitted_to,
-        is_quasi_static=chosen(Branches, "branches", branches) is Branches.QUASI_STATIC,
+        branches=None if branches is None else chosen(Branches, "branches", branches),
         area=_area(fitted_to, area),
         fixed=held,
         loss=chosen(Loss, "loss", loss),

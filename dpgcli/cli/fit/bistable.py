@@ -57,7 +57,10 @@ Area = Annotated[
     float | None, typer.Option("--area", metavar="MM2", help="Effective area, for pressure")
 ]
 BranchNames = Annotated[
-    Branches, typer.Option("--branches", help="All points, or slow stable pieces only")
+    Branches | None,
+    typer.Option(
+        "--branches", help="Ways of the travel, or slow pieces  [default: both, if they are alike]"
+    ),
 ]
 Fix = Annotated[
     list[str] | None, typer.Option("--fix", metavar="KEY=VALUE", help="Hold a value; repeatable")
@@ -74,7 +77,7 @@ def bistable(
     travel_to_opening: OpeningRule = None,
     quantity: QuantityName = None,
     area: Area = None,
-    branches: BranchNames = Branches.ALL,
+    branches: BranchNames = None,
     fix: Fix = None,
     free: Free = None,
     column: ColumnTitles = None,
