@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.calibration.beginning import beginning_warnings, check_sign
 from dpgcli.calibration.branches import branch_of, ways, with_hysteresis
 from dpgcli.calibration.choices import (
     LINEARITY,
@@ -143,9 +144,12 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     if choice.branches in (Branches.LOADING, Branches.UNLOADING):
         record = branch_of(record, choice.branches)
     ordered, said = in_order(_by_travel(record))
+    if choice.quantity is not Quantity.ENERGY:
+        check_sign(ordered)
     observed = _observed(ordered, choice)
     kept = np.ones(len(observed), bool)
     warnings = [*said, *record_warnings(ordered, is_cut=choice.is_quasi_static)]
+    warnings += beginning_warnings(ordered)
     if choice.is_quasi_static:
         kept, cut = quasi_static(ordered)
         warnings.append(cut)

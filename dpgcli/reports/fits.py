@@ -105,8 +105,8 @@ def bistable_summary(found: BistableFit, choice: BistableOptions) -> Iterator[st
         linearity, stroke = found.fit.values[1:]
         yield (
             f"stroke_mm {stroke:.4g} is the law's d, no place of rest: with a force linearity of "
-            f"{linearity:.3g} its inverted dome rests at {well / stroke:.3f} d = {well:.4g} mm; the "
-            f"{choice.opening.amount:g} mm asked for are where that of the data does"
+            f"{linearity:.3g} its inverted dome rests at {well / stroke:.3f} d = {well:.4g} mm; "
+            f"the {choice.opening.amount:g} mm asked for are where that of the data does"
         )
 
 
