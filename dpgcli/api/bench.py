@@ -5,7 +5,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dpgcli.api.inputs import Settings, SpecInput, check_installed, figure_path, point, scene_input
+from dpgcli.api.inputs import (
+    Place,
+    Settings,
+    SpecInput,
+    check_installed,
+    figure_path,
+    frame_of,
+    scene_input,
+)
 from dpgcli.api.tables import Table
 from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
 from dpgcli.calibration.known import Frame
@@ -63,8 +71,8 @@ def bench(
     target_error: float | None = None,
     keep: Sequence[str] = (),
     against: Tabular | None = None,
-    first_station: tuple[float, float] = (0.0, 0.0),
-    tip_offset: tuple[float, float] = (0.0, 0.0),
+    first_station: Place = None,
+    tip_offset: Place = None,
     compare: str | Path | None = None,
     watch: Callable[[Row], None] = lambda row: None,
 ) -> BenchResult:
@@ -85,7 +93,7 @@ def bench(
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
     then = None if compare is None else _recorded(Path(compare), given.json)
-    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
+    frame = Frame() if known is None else frame_of(given, known, first_station, tip_offset)[0]
     write = partial(write_states, spec_json="{}")
     study = Bench(given.scene, repeats, tuple(keep), target_error, known, frame, write)
     study.check()

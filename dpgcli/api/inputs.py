@@ -8,6 +8,7 @@ from importlib import util
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
+from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
@@ -22,6 +23,7 @@ from dpgcli.files.scene_file import (
     recalibrated,
     scene_of,
 )
+from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
@@ -34,6 +36,10 @@ Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 Texts: TypeAlias = Mapping[str, str] | Sequence[str] | str
 """Texts by name, or "name=text"."""
 
+Place: TypeAlias = Sequence[float] | None
+"""Two numbers in mm; None where somebody else says them."""
+
+ORIGINS = ("as given", "from the data's header", "from the spec")
 FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
@@ -187,6 +193,25 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
             Field(field), f" {place}: expected two numbers in mm, such as 5.375, -0.75"
         )
     return x, y
+
+
+def frame_of(
+    given: SceneInput, known: KnownStates, first_station: Place, tip_offset: Place
+) -> tuple[Frame, str]:
+    """The frame of known states, and where it is from: options, else the data, else the spec."""
+    spec = (given.spec and given.spec.data) or DataSpec()
+    said: dict[str, tuple[Place, ...]] = {
+        "first_station": (first_station, known.first_station, spec.first_station_mm),
+        "tip_offset": (tip_offset, known.tip_offset, spec.tip_offset_mm),
+    }
+    points, words = [], []
+    for field, places in said.items():
+        found = [(place, origin) for place, origin in zip(places, ORIGINS, strict=True) if place]
+        place, origin = found[0] if found else ((0.0, 0.0), "assumed")
+        x, y = point(field, place)
+        points.append((x, y))
+        words.append(f"{field.replace('_', ' ')} {x:g},{y:g} mm ({origin})")
+    return Frame(*points), ", ".join(words)
 
 
 def figure_path(path: str | Path) -> Path:

@@ -70,7 +70,7 @@ class Sheet:
 
     `names` are ours for columns that were chosen. By name, `units` are those that the file says
     itself, `titles` what it calls a column that was chosen; `reversed` are those whose sign is.
-    `comments` are the lines with a # above the header.
+    `comments` are lines with a # above the header, and their numbers.
     """
 
     file: str
@@ -82,7 +82,7 @@ class Sheet:
     units: Mapping[str, str] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     reversed: frozenset[str] = frozenset()
-    comments: tuple[str, ...] = ()
+    comments: tuple[tuple[int, str], ...] = ()
 
     def cells(self, name: str) -> list[str]:
         """The texts of one column."""
@@ -232,12 +232,18 @@ def read_sheet(
         head.units,
         head.titles,
         head.reversed,
-        tuple(text.strip() for text in lines[:line] if text.lstrip().startswith("#")),
+        tuple(_comments(lines[:line])),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
     if problems:
         raise SpecError(in_order(problems))
     return sheet
+
+
+def _comments(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(map(str.strip, lines), start=1):
+        if line.startswith("#"):
+            yield number, line.lstrip("#").strip()
 
 
 def _unfound(sheet: Sheet, choice: Choice) -> Iterator[Problem]:

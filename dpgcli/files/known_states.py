@@ -10,12 +10,14 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
+from dpgcli.files.layout import NUMBER
 from dpgcli.files.places import Location, in_order, located
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
 SECONDS = "seconds"
+STATION, OFFSET = "first_station_mm", "tip_offset_mm"
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
@@ -27,8 +29,9 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
 
     Columns: `pattern`; `tip_x_mm` and `tip_y_mm`; `tip_angle_rad`; `chamber2_angle_rad` …, of the
     phalanges after the first; `opening1_mm` …; `push1_N` …; `seconds`. A second file has the
-    points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Raises SpecError
-    with every problem of a file.
+    points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Comments above the
+    header may say the frame: `# first_station_mm: 5.375, 0.75`, `# tip_offset_mm: 5.375, -0.75`.
+    Raises SpecError with every problem of a file.
     """
     names = _names(n_units)
     sheet = read_sheet(source, names)
@@ -38,7 +41,8 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         wrong = sheet.problem(None, "file", expected, f"{len(sheet.rows):,}", "a part at a time")
         raise SpecError((wrong,))
     patterns = sheet.cells("pattern")
-    problems = [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
+    frame, problems = _frame(sheet)
+    problems += [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
     if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
         problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
     try:
@@ -57,6 +61,8 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
+        first_station=frame.get(STATION),
+        tip_offset=frame.get(OFFSET),
     )
     problems = [
         sheet.problem(row, SECONDS, "a time > 0", f"{known.seconds[row]:g}")
@@ -68,6 +74,23 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
     if problems:
         raise SpecError(in_order(problems))
     return known
+
+
+def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]:
+    """Points of the frame by key, from comments, and what is wrong with them."""
+    frame: dict[str, tuple[float, float]] = {}
+    problems = []
+    for line, text in sheet.comments:
+        key, mark, said = (part.strip() for part in text.partition(":"))
+        if not mark or key not in (STATION, OFFSET):
+            continue
+        numbers = said.removeprefix("[").removesuffix("]").split(",")
+        if len(numbers) == len(TIP) and all(NUMBER.fullmatch(n.strip()) for n in numbers):
+            frame[key] = (float(numbers[0]), float(numbers[1]))
+        else:
+            place = Location(sheet.file, line)
+            problems.append(located(place, key, "two numbers in mm, such as 5.375, -0.75", said))
+    return frame, problems
 
 
 def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
