@@ -36,7 +36,8 @@ def measured(
 def _rows(columns: Sequence[Array], separator: str, decimal: str, quote: str = "") -> str:
     lines = zip(*(column.tolist() for column in columns), strict=True)
     return "".join(
-        separator.join(f"{quote}{value:.5f}{quote}".replace(".", decimal) for value in line) + "\r\n"
+        separator.join(f"{quote}{value:.5f}{quote}".replace(".", decimal) for value in line)
+        + "\r\n"
         for line in lines
     )
 
