@@ -13,7 +13,7 @@ import numpy as np
 
 from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.content import content_of
+from dpgcli.files.content import beside, content_of
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.sweep_file.models import (
@@ -145,7 +145,7 @@ class SpaceReader:
         from dpgcli.files.sweep_file.tables import UNREADABLE, NoTableError, Wrong, numbers_in
 
         try:
-            frame = self.read(path, self.folder / name)
+            frame = self.read(path, beside(self.folder, name))
         except SpecError as error:
             self.wrong(path, TABLE, error.problems[0].found)
             return None
