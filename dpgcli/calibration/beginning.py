@@ -34,7 +34,7 @@ def check_sign(record: Record) -> None:
                 f"the {name} is negative where the dome leaves its rest: is its sign the other way "
                 "round? ",
                 Field("column"),
-                f" {key}=-{key} reverses it",
+                f" {key}=-TITLE reverses it",
             )
 
 

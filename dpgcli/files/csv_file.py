@@ -36,6 +36,7 @@ Tabular: TypeAlias = Union[str, Path, "pd.DataFrame", Mapping[str, Any]]
 
 FRAME = "data frame"
 MAX_BYTES = 64 * 1024 * 1024
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # its marks
 FOREIGN = {
     b"PK\x03\x04": "an Excel workbook or an archive",
     b"\xd0\xcf\x11\xe0": "an Excel workbook",
@@ -44,7 +45,9 @@ FOREIGN = {
 WESTERN = frozenset("äöüÄÖÜßéèêàâçñáíóúåøæÅØÆôîïëìòùõãÉÈÇÑ°µ²³·±–—’“”…€×«»§® ")
 TO_COMMENT = "behind the # of a comment stands a space"
 TO_BEGIN = Message(
-    "once; a number is a column's place; ", Field("skip"), " N if the table begins below N lines"
+    "a title that stands there once, or a column's place; ",
+    Field("skip"),
+    " N if the table begins below N lines",
 )
 
 
@@ -153,7 +156,8 @@ class Sheet:
         """The problem that there is no column of any of these names."""
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else hint
-        expected, found = f"a column {' or '.join(wanted)}", ", ".join(filter(None, self.names))
+        expected = f"a column {' or '.join(wanted)}"
+        found = ", ".join(self.titles.get(name, name) for name in self.names if name)
         return located(Location(self.file), "header", expected, found, hint)
 
 
@@ -183,10 +187,12 @@ def text_of(content: bytes, place: Location) -> str:
 
     Raises SpecError for what is no text.
     """
+    if b"\0" in content[:1000] and not content.startswith(UTF_16):
+        raise SpecError((located(place, "file", "text", "zero bytes", "save it as UTF-8"),))
     if kind := next((kind for mark, kind in FOREIGN.items() if content.startswith(mark)), None):
         raise SpecError((located(place, "file", "text", kind, "save it as CSV"),))
     try:
-        if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        if content.startswith(UTF_16):
             return content.decode("utf-16")
         return decoded(content, place)
     except UnicodeDecodeError as error:

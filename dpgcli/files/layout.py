@@ -15,7 +15,7 @@ from dpgcli.files.places import Location, located
 from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
-SEPARATORS = (",", ";", "\t", "  ", " ")  # a pair of blanks stands for two or more
+SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more
 SAMPLE = 200  # of the last lines, which are of the table
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 GROUPED = re.compile(r"[-+]?[1-9][0-9]{0,2}([.,'\u00a0\u202f])[0-9]{3}(?:\1[0-9]{3})*", re.ASCII)

@@ -9,14 +9,14 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
 from dpgcli.design.dimensions import SMALLEST, unit_of
-from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.calibration.models import Values
 from dpgcli.files.csv_file import AS_IT_IS, Choice, Sheet, Tabular, read_sheet
-from dpgcli.files.own_units import InOwnUnits, chosen_units, in_own_units
+from dpgcli.files.own_units import chosen_units, in_own_units
 from dpgcli.files.places import in_order
+from dpgcli.files.plausible import other_scales, other_springs, wrong_signs
 from dpgcli.files.sections import Geometry, expected_of
-from dpgcli.files.units import asked_for, factor_of
+from dpgcli.files.units import factor_of
 from dpgcli.files.yaml_file import MAX_NODES
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
@@ -26,35 +26,12 @@ CURVE = {**dict.fromkeys(TRAVELS, "travel"), **QUANTITIES, **OTHERS}  # quantiti
 MOMENT, ROTATIONS = "moment_N_mm", ("rotation_rad", "rotation_mid_chamber_rad")
 HINGE = {MOMENT: "moment", **dict.fromkeys(ROTATIONS, "rotation")}
 
-PLAUSIBLE = {  # of the largest value, for what soft fingers are made of; without geometry
-    "travel": (0.1, 1e3),
-    "energy": (0.1, 1e5),
-    "force": (1e-3, 1e4),
-    "pressure": (1e-4, 10.0),
-    "moment": (0.02, 1e6),
-    "rotation": (1e-6, 3.2),
-}
-GUESSES = {  # the unit behind values that are too small, and too large
-    "travel": ("meters?", "micrometers?"),
-    "energy": ("joules?", "microjoules?"),
-    "force": ("kilonewtons?", "millinewtons?"),
-    "pressure": ("gigapascals?", "kPa or Pa?"),
-    "moment": ("N m?", "N um?"),
-    "rotation": ("", "degrees?"),
-}
 USUAL = {  # largest values of a geometry, by the unit of its key, and what others may be in
     "mm": (0.05, 200.0, "meters?", "micrometers?"),
     "MPa": (1e-3, 1e4, "gigapascals?", "kPa or Pa?"),
 }
-SPRINGS = {  # of the largest value over a power of the largest travel, and that power: N/mm
-    "force": (0.03, 500.0, 1),  # from silicone of 0.5 MPa to stiff TPU, domes of millimeters
-    "energy": (0.005, 150.0, 2),
-}
 MOST_NUMBERS = MAX_NODES * 9 // 10
 POSITIVE = f"a number > 0, at least {SMALLEST:g}, since logarithms are fitted"
-DOME = ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa")
-BEHIND = {"travel": DOME[:1], "energy": DOME, "force": DOME, "pressure": DOME}  # a range of its own
-MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit is 1000 off
 
 
 @dataclass(frozen=True)
@@ -134,10 +111,10 @@ def read_curve(
     arrays = {kind: own.values[name] for name, kind in columns.items()}
     travel = next(name for name in TRAVELS if name in columns)
     problems = [
-        *_signs(sheet, travel, arrays["travel"]),
-        *_scales(sheet, own.values, columns, geometry),
+        *wrong_signs(sheet, travel, arrays["travel"]),
+        *other_scales(sheet, own.values, columns, geometry),
     ]
-    problems = problems or list(_springs(sheet, own, columns, geometry))
+    problems = problems or list(other_springs(sheet, own, columns, geometry))
     if problems:
         raise SpecError(in_order(problems))
     return Measured(Record(**arrays), _unused(sheet, columns), sheet.sha256, own.notes)
@@ -161,7 +138,7 @@ def read_moments(source: Tabular, where: str | None = None, choice: Choice = AS_
     known = {MOMENT: "moment", rotation: "rotation"}
     own = in_own_units(sheet, known, given)
     columns = own.values
-    problems = list(_scales(sheet, columns, known, None))
+    problems = list(other_scales(sheet, columns, known, None))
     if problems:
         raise SpecError(in_order(problems))
     texts = {name: tuple(sheet.cells(name)) for name in sheet.names if not _is_numeric(sheet, name)}
@@ -279,78 +256,3 @@ def _repeated(sheet: Sheet, geometry: Array) -> Iterator[Problem]:
             found = f"that of line {sheet.lines[first[values]]} again"
             yield sheet.problem(row, "geometry", "each geometry once", found)
         first.setdefault(values, row)
-
-
-def _signs(sheet: Sheet, name: str, travel: Array) -> Iterator[Problem]:
-    if travel.max() <= 0.0 or travel.min() < -0.5 * travel.max():
-        found = f"{travel.min():g} to {travel.max():g}"
-        title = sheet.titles.get(name, name)
-        reverse = Message(Field("column"), f" {name}=-{title} reverses it")
-        hint = reverse if travel.min() < 0.0 and name not in sheet.reversed else ""
-        yield sheet.problem(None, name, "travels that are positive towards inversion", found, hint)
-
-
-def _scales(
-    sheet: Sheet,
-    columns: Mapping[str, Array],
-    known: Mapping[str, str],
-    geometry: Mapping[str, float] | None,
-) -> Iterator[Problem]:
-    """Columns whose largest value no dome has: most likely in another unit."""
-    ranges = {**PLAUSIBLE, **_of_dome(geometry or {})}
-    for name, values in columns.items():
-        kind = known[name]
-        largest = float(np.abs(values).max())
-        if kind not in ranges or largest == 0.0:
-            continue
-        low, high = ranges[kind]
-        if not low <= largest <= high:
-            hint = GUESSES[kind][largest > high]
-            needed = BEHIND.get(kind, ())
-            if missing := [key for key in needed if key not in (geometry or {})]:
-                hint = Message(hint, " if it is right, say how large the dome is:")
-                for key in missing:
-                    hint = Message(hint, " ", Field("geometry"), f" {key}=...")
-            expected = f"a largest value of {low:.3g} to {high:.3g}"
-            yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
-
-
-def _springs(
-    sheet: Sheet,
-    own: InOwnUnits,
-    columns: Mapping[str, str],
-    geometry: Mapping[str, float] | None,
-) -> Iterator[Problem]:
-    """Columns whose unit nobody said, and that make a spring as no dome of millimeters has it."""
-    travel = next(own.values[name] for name, kind in columns.items() if kind == "travel").max()
-    for name, kind in columns.items():
-        if kind not in SPRINGS or name in own.said or set(BEHIND[kind]) <= set(geometry or ()):
-            continue
-        low, high, power = SPRINGS[kind]
-        spring = float(np.abs(own.values[name]).max()) / travel**power if travel > 0.0 else 0.0
-        if spring > 0.0 and not low <= spring <= high:
-            guess = GUESSES[kind][spring > high]
-            hint = Message(guess, " if it is right, say so: ", asked_for(kind))
-            expected = f"the spring of a dome of millimeters, {low:g} to {high:g} N/mm"
-            over = " ".join(filter(None, ("travel", "squared" * (power == 2))))
-            found = f"{spring:.3g} N/mm by the largest value over {over}"
-            yield sheet.problem(None, name, expected, found, hint)
-
-
-def _of_dome(geometry: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Largest values that a dome of this geometry may have.
-
-    Energy E t^2.8 h^1.75, from 68 mJ at h = 6.5 mm, t = 0.75 mm, E = 26 MPa: the finite-element
-    grid of configs/calibration.
-    """
-    height = geometry.get("dome_height_mm")
-    if height is None:
-        return {}
-    ranges = {"travel": (0.05 * height, 20.0 * height)}
-    if set(DOME) <= set(geometry):
-        _, thickness, modulus = dome = [geometry[key] for key in DOME]
-        energy = 68.0 * modulus / 26.0 * (thickness / 0.75) ** 2.8 * (height / 6.5) ** 1.75
-        pressure = snap_pressure(*dome)
-        usual = {"energy": energy, "force": energy / height, "pressure": pressure}
-        ranges |= {kind: (size / MARGIN, size * MARGIN) for kind, size in usual.items()}
-    return ranges

@@ -24,10 +24,15 @@ def chosen_units(choice: Choice, quantities: Mapping[str, str]) -> dict[str, flo
 
     Raises UsageError for a column or a quantity that there is none of, or no unit of it.
     """
+    taken: dict[str, str] = {}
     for name, title in choice.columns.items():
+        said = f" {name}={title}: "
         if name not in quantities:
             expected = f"expected one of {', '.join(quantities)} before the ="
-            raise UsageError(Field("column"), f" {name}={title}: {expected}")
+            raise UsageError(Field("column"), said, expected)
+        if other := taken.get(title.removeprefix("-")):
+            raise UsageError(Field("column"), said, f"that is {other} already")
+        taken[title.removeprefix("-")] = name
     if choice.skip is not None and choice.skip < 0:
         raise UsageError(Field("skip"), f" {choice.skip}: expected a number of lines")
     return units_in(choice.units, quantities)
