@@ -18,7 +18,7 @@ from dpgcli.states.rungs import exactnesses
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
-from dpgcli.sweeps.metrics import DESIGN_COLUMNS
+from dpgcli.sweeps.metrics import METRICS
 from dpgcli.sweeps.space import Space
 
 Numbers = NDArray[Any]
@@ -78,7 +78,7 @@ class Evaluation:
     @property
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
-        metrics = (c for c in DESIGN_COLUMNS if c.group in self.groups)
+        metrics = (c for c in METRICS if c.group in self.groups)
         rung = () if self.target_error is None else RUNG_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
 
