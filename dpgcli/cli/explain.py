@@ -23,7 +23,8 @@ from dpgcli.cli.streams import put
 
 if TYPE_CHECKING:
     from dpgcli.design.scene import Source
-    from dpgcli.states.plan import Omission, Plan
+    from dpgcli.states.omissions import Omission
+    from dpgcli.states.plan import Plan
 
 
 class PlanFormat(StrEnum):
