@@ -44,7 +44,7 @@ from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.sweeps.evaluation import LEVEL_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import METRICS
 
 ROOT = Path(__file__).parents[1]
@@ -187,7 +187,7 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in README}
-    named = {c.name for c in (*METRICS, *RUNG_COLUMNS)} | {*DesignStatus, *ABLATIONS}
+    named = {c.name for c in (*METRICS, *LEVEL_COLUMNS)} | {*DesignStatus, *ABLATIONS}
     named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
     assert not {name for name in named if f"`{name}" not in README}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}

@@ -13,9 +13,9 @@ from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.states import plan
 from dpgcli.states import predict as states
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.plan import Plan, Request
 from dpgcli.states.predict import Prediction, Summary
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd

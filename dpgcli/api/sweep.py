@@ -19,7 +19,7 @@ from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
 from dpgcli.files.table_reader import read_run, read_undamaged
 from dpgcli.files.yaml_file import Document
-from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
     DESIGNS,

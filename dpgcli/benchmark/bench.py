@@ -30,11 +30,11 @@ from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
-from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from dpgcli.design.scene import Scene
+from dpgcli.states.accuracy import Exactness
 from dpgcli.states.pairs.halves import Split
-from dpgcli.states.rungs import Exactness
 from dpgcli.states.units import UnitSolutions
 
 

@@ -11,6 +11,14 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.accuracy import (
+    DEFAULT_TOLERANCE,
+    AccuracyLevel,
+    Exactness,
+    bar_flexibility,
+    check_exactness,
+    exactnesses,
+)
 from dpgcli.states.certify import Status
 from dpgcli.states.chosen_columns import chosen_columns
 from dpgcli.states.columns import Group
@@ -21,14 +29,6 @@ from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.quantities import ALWAYS, Quantity, declared
 from dpgcli.states.rows import RowRequest
-from dpgcli.states.rungs import (
-    DEFAULT_TOLERANCE,
-    Exactness,
-    Rung,
-    bar_flexibility,
-    check_exactness,
-    exactnesses,
-)
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 
@@ -49,7 +49,7 @@ class Request:
     """What is asked of a scene: which states (globs, none = all), which columns, how exactly.
 
     `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d. With a
-    `target_error` (mm, of the tip) the plan takes the cheapest rung that is bounded by it.
+    `target_error` (mm, of the tip) the plan takes the cheapest level that is bounded by it.
     """
 
     patterns: tuple[str, ...] = ()
@@ -66,7 +66,7 @@ class Plan:
     `selection` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
     bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
-    `rung` was chosen for the target error, if there is one; `error_bound` (mm) is what it
+    `accuracy_level` was chosen for the target error, if there is one; `error_bound` (mm) is what it
     promises for every tip, and infinite where nothing can be promised before the work.
     """
 
@@ -103,9 +103,9 @@ class Plan:
         return self.exactness.units
 
     @property
-    def rung(self) -> Rung | None:
+    def accuracy_level(self) -> AccuracyLevel | None:
         """What was chosen for the target error, if there is one."""
-        return self.exactness.rung
+        return self.exactness.accuracy_level
 
     @property
     def dropped_error(self) -> float:

@@ -12,9 +12,9 @@ from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
+from dpgcli.states.accuracy import exactnesses
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
-from dpgcli.states.rungs import exactnesses
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
@@ -47,7 +47,7 @@ class Evaluation:
 
     `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
     a design that has a value which its key cannot have, from its values. `values` are the columns
-    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest rung
+    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest level
     that is bounded by it.
     """
 
@@ -79,8 +79,8 @@ class Evaluation:
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
         metrics = (c for c in METRICS if c.group in self.groups)
-        rung = () if self.target_error is None else RUNG_COLUMNS
-        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
+        chosen = () if self.target_error is None else LEVEL_COLUMNS
+        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
 
     def __call__(self, start: int, values: Mapping[str, Numbers]) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
@@ -182,9 +182,9 @@ class Evaluation:
         for some, exactness in found:
             alike = scene if len(some) == len(places) else scene.take_lanes(some)
             for block in design_states(alike, exactness, self.quantities):
-                if block.metrics is not None and exactness.rung is not None:
-                    name = np.full(len(block.places), exactness.rung.name, "S24")
-                    block.metrics["rung"] = name
+                if block.metrics is not None and exactness.accuracy_level is not None:
+                    name = np.full(len(block.places), exactness.accuracy_level.name, "S24")
+                    block.metrics["accuracy_level"] = name
                     block.metrics["error_bound_mm"] = exactness.error_bounds[block.places]
                 yield _Solved(places[some][block.places], block.rows, block.metrics)
 
@@ -238,8 +238,8 @@ class Evaluation:
 DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
 CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)
 STATUS = Column("status", "", "what became of the design", kind=Kind.TEXT)
-RUNG_COLUMNS = (
-    Column("rung", "", "way chosen for the target error", kind=Kind.TEXT),
+LEVEL_COLUMNS = (
+    Column("accuracy_level", "", "chosen for the target error", kind=Kind.TEXT),
     Column("error_bound_mm", "mm", "bound on the tips' error before the work"),
 )
 EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
