@@ -6,7 +6,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput, figure_path, scene_input
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    as_texts,
+    check_numbers,
+    figure_path,
+    path_of,
+    scene_input,
+)
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
@@ -65,7 +74,7 @@ class PredictResult:
         from dpgcli.files.output import Mark, check_outputs, run_file
         from dpgcli.files.prediction import write_prediction
 
-        table = Path(path)
+        table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE), (run_file(table), Mark.FACTS))
         write_prediction(self.prediction, table, self.given.json, self.blocks)
 
@@ -134,9 +143,10 @@ def request_of(
     target_error: float | None,
 ) -> Request:
     """What is asked of a scene."""
-    names = columns.split(",") if isinstance(columns, str) else columns
+    names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)
+    check_numbers(tolerance=tolerance, target_error=target_error)
     return Request(
-        patterns=(patterns,) if isinstance(patterns, str) else tuple(patterns),
+        patterns=as_texts("patterns", patterns),
         columns=tuple(name.strip() for name in names if name.strip()),
         formulation=formulation,
         tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,

@@ -64,8 +64,8 @@ def fit_bistable(
     (2.0, 2.0)
     """
     mapping = travel_to_opening
-    opening = Opening.of(mapping) if isinstance(mapping, str) else mapping
-    held = _held(fix or {}, None if free is None else as_texts(free))
+    opening = mapping if isinstance(mapping, Opening) else Opening.of(str(mapping))
+    held = _held(fix or {}, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, sizes(where))
