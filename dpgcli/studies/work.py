@@ -7,7 +7,7 @@ from time import process_time
 from typing import IO, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
-from dpgcli.sweeps.evaluation import Evaluation, Numbers, Tables
+from dpgcli.sweeps.evaluation import Evaluation, Tables, Values
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker
 
@@ -32,7 +32,7 @@ class ChunkTask:
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> ChunkResult:
+    def __call__(self, chunk: Chunk, values: dict[str, Values], maker: Maker) -> ChunkResult:
         """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
         check_maker(maker)
         return self.stored(chunk, self.evaluation(chunk.start, values))

@@ -21,7 +21,7 @@ from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.sweeps.space import Space
 
-Numbers = NDArray[Any]
+Values = NDArray[Any]
 
 
 class DesignStatus(StrEnum):
@@ -82,7 +82,7 @@ class Evaluation:
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
 
-    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Iterator[Tables]:
+    def __call__(self, start: int, values: Mapping[str, Values]) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
 
         One design comes in blocks of its states, the row of the design with the last.
@@ -105,7 +105,7 @@ class Evaluation:
         )
 
     def _resolved(
-        self, values: Mapping[str, Numbers], allowed: Flags
+        self, values: Mapping[str, Values], allowed: Flags
     ) -> "tuple[list[tuple[Indices, Scene]], Indices, dict[int, str]]":
         """Designs that share a batch, by their places, with what they describe.
 
@@ -130,7 +130,7 @@ class Evaluation:
         return batches, origins, reasons
 
     def _designs(
-        self, values: Mapping[str, Numbers], places: Indices
+        self, values: Mapping[str, Values], places: Indices
     ) -> Iterator[tuple[Indices, Design]]:
         """The designs at some places, by their number of units."""
         columns = {key: column[places] for key, column in values.items()}
@@ -141,7 +141,7 @@ class Evaluation:
             base = replace(self.base, units=int(n_units), n_designs=len(here))
             yield places[here], base.with_values(own)
 
-    def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
+    def _are_possible(self, values: Mapping[str, Values]) -> Flags:
         """Which designs have only values that their keys can have."""
         own = (key.removeprefix("gripper.") for key in values if key.startswith("gripper."))
         gripper = {*self.base.gripper, *own}
@@ -151,7 +151,7 @@ class Evaluation:
             possible &= are_possible(key.rsplit(".", 1)[-1], column)
         return possible
 
-    def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
+    def failed(self, design: int, values: Mapping[str, Values]) -> Tables:
         """The rows of one design that cannot be evaluated at all."""
         described = {**self._described(design, values), "calibration": np.array([b""])}
         rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
@@ -162,11 +162,11 @@ class Evaluation:
     def _no_designs(self) -> Columns:
         return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.design_columns}
 
-    def _described(self, start: int, values: Mapping[str, Numbers]) -> Columns:
+    def _described(self, start: int, values: Mapping[str, Values]) -> Columns:
         numbers = np.arange(start, start + len(next(iter(values.values()))))
         return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
 
-    def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
+    def allowed(self, values: Mapping[str, Values]) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
         n_designs = len(next(iter(values.values())))
         known: dict[str, Any] = {**self.known, **values}
@@ -249,7 +249,7 @@ REASON = Column("reason", "", "why the design is invalid", kind=Kind.TEXT)
 class _Solved(NamedTuple):
     """Designs at some places of a chunk: rows of their states, and, with the last, metrics."""
 
-    places: Numbers
+    places: Values
     rows: Columns
     metrics: Columns | None
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dpgcli.calibration.grid import GridLaw
 
 T = TypeVar("T")
-Numbers = Annotated[list[float], Field(min_length=1)]
+Samples = Annotated[list[float], Field(min_length=1)]
 Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Size = Annotated[float, Field(ge=0)]  # of an error: what data do not tell has a huge one
 Positives = Annotated[list[Positive], Field(min_length=1)]
@@ -177,7 +177,7 @@ class Calibration(Section):
     made_by: str = Field(description="the program and the versions behind its numbers")
     method: str = Field(description="one line of text")
     values: Values | None = Field(default=None, description="a section of fitted values")
-    correlation: list[Numbers] | None = Field(
+    correlation: list[Samples] | None = Field(
         default=None, description="a symmetric matrix over the values that have errors"
     )
     geometry: Geometry | None = Field(default=None, description="a section of dimensions")

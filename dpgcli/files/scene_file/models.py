@@ -112,10 +112,10 @@ class Spec(Section):
         )
 
 
-def _section(part: UnitOverride | FingerSpec | None) -> dimensions.Section:
+def _section(part: UnitOverride | FingerSpec | None) -> dimensions.GivenValues:
     if part is None:
-        return dimensions.Section()
-    return dimensions.Section(_sizes(part.geometry), _sizes(part.lattice))
+        return dimensions.GivenValues()
+    return dimensions.GivenValues(_sizes(part.geometry), _sizes(part.lattice))
 
 
 def _sizes(section: Section | None) -> dict[str, NDArray[np.float64]]:
