@@ -32,7 +32,7 @@ from dpgcli.sweeps.differences import differences
 
 @dataclass(frozen=True)
 class BenchResult:
-    """What was measured, a row for each way and size; `recorded` are rows of an earlier record."""
+    """Measurements, a row for each method and size; `recorded` are rows of an earlier record."""
 
     name: str
     spec_json: str

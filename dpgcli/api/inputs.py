@@ -1,4 +1,4 @@
-"""What functions take: specs as paths, data or values, settings by key, places in some data."""
+"""Arguments of the functions: specs as paths, data or values, settings by key, points, numbers."""
 
 import json
 import os

@@ -45,7 +45,7 @@ class PredictResult:
 
     @property
     def plan(self) -> Plan:
-        """What was decided: method, columns, what is left out and why."""
+        """The decisions: method, columns, omissions and their reasons."""
         return self.prediction.plan
 
     @property
@@ -142,7 +142,7 @@ def request_of(
     tolerance: float | None,
     target_error: float | None,
 ) -> Request:
-    """What is asked of a scene."""
+    """The request that these arguments make."""
     names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)
     check_numbers(tolerance=tolerance, target_error=target_error)
     return Request(

@@ -61,7 +61,7 @@ class HardCases:
         return verdicts.stress(self.cases)
 
     def result(self, outcomes: Sequence[Outcome]) -> StressResult:
-        """What they came to."""
+        """The result that outcomes make."""
         spec = None if self.given is None or self.given.spec is None else self.given.json
         return StressResult(tuple(outcomes), spec)
 

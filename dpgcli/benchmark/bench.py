@@ -78,7 +78,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Bench:
-    """What to measure: a scene, how often, with what put back, beside what data.
+    """A benchmark: its scene, repeats, ablations and known states.
 
     `target_error` (mm) is that of the plan from which something is put back.
     `known` tips lie in a `frame` of their own. `write` writes a prediction as a table; where it is

@@ -144,7 +144,7 @@ def _omission(left_out: "Omission") -> str:
 
 
 def expected(plan: "Plan") -> str:
-    """What the work takes, before it is done."""
+    """Time and memory of the work, before it is done."""
     return (
         f"about {plan.expected_seconds:,.1f} s on one core and "
         f"{plan.expected_bytes / 2**20:,.0f} MiB (rough: a factor of two either way)"

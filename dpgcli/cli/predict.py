@@ -153,7 +153,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
 
 
 def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
-    """What a target error chose, in words."""
+    """The accuracy level that a target error chose, in words."""
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (

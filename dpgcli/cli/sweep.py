@@ -218,7 +218,7 @@ def _judge(
 
 
 def _chosen(designs: "pd.DataFrame") -> str:
-    """What the designs took for the target error."""
+    """The accuracy levels that designs took for the target error."""
     counts = designs.loc[designs["accuracy_level"] != "", "accuracy_level"].value_counts()
     ways = ", ".join(f"{count:,} {level}" for level, count in counts.items())
     bound = designs["error_bound_mm"].max()

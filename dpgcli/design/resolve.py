@@ -52,7 +52,7 @@ class Resolution:
 
     @property
     def gravest_origins(self) -> Indices:
-        """What to trust least of each design's values, (design,), places in `ORIGINS`.
+        """The gravest origin among each design's values, (design,), as indices of `ORIGINS`.
 
         Values that the geometry alone fixes count as given.
         """
@@ -81,7 +81,7 @@ class Resolution:
         return arrays
 
     def scene(self) -> Scene:
-        """What a single design describes, if nothing is wrong with it."""
+        """The scene of a single design, if nothing is wrong with it."""
         batch = self.batch(np.zeros(1, np.int64))
         gripper, layer = batch.gripper, batch.layer_thickness
         return Scene(
@@ -93,7 +93,7 @@ class Resolution:
         )
 
     def batch(self, designs: Indices) -> Scene:
-        """What some of the designs describe, none of them wrong, with arrays by design.
+        """The scene of some of the designs, none of them wrong, with arrays by design.
 
         Their bars are all rigid or none are; sources and uncertainty are left out.
         """

@@ -1,4 +1,4 @@
-"""How exactly to solve: a ladder of ways to the same states, each with a bound on its error.
+"""Accuracy levels: ways to the same states, from cheap to exact, each with an error bound.
 
 The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
 units of how far the unit may turn, times the length of the finger (our derivation):
@@ -33,7 +33,7 @@ DEFAULT_TOLERANCE = 1e-12
 
 @dataclass(frozen=True)
 class AccuracyLevel:
-    """A way to the states: with or without elastic bars, and to which tolerance.
+    """An accuracy level: with or without elastic bars, and to which tolerance.
 
     `tolerance` is the largest residual over the forces in play.
     """
@@ -67,7 +67,7 @@ def check_exactness(tolerance: float, target_error: float | None) -> None:
 
 @dataclass(frozen=True)
 class Exactness:
-    """How exactly the states of some fingers are found: to a tolerance, or by an accuracy level.
+    """The exactness of some fingers' states: a tolerance, or an accuracy level.
 
     `scene_units` are those of the fingers as they were given.
     """
@@ -98,7 +98,7 @@ class Exactness:
 
     @cached_property
     def dropped_error(self) -> Array:
-        """What dropping the bars adds to the error of each tip, mm, (design,)."""
+        """Bound on the tip displacement by the bars that were dropped, mm, (design,)."""
         if not self.drops_bars:
             return np.zeros(self.scene_units.finger.n_designs)
         return bar_flexibility(self.scene_units)
@@ -107,7 +107,7 @@ class Exactness:
 def exactnesses(
     units: UnitSolutions, tolerance: float, target_error: float | None, *, needs_bars: bool = False
 ) -> Iterator[tuple[Indices, Exactness]]:
-    """How exactly to solve which designs: by the tolerance, or each as the target error allows.
+    """The exactness of each design: the tolerance, or the cheapest level for the target error.
 
     With a target error (mm) each design takes the cheapest level that is bounded by it; rigid bars
     are none where something `needs_bars`. Designs of one level come together.

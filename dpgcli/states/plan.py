@@ -1,4 +1,4 @@
-"""What a scene needs, decided once: `explain` prints the plan, `predict` carries it out."""
+"""The plan of a scene, decided once: `explain` prints it, `predict` carries it out."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -46,7 +46,7 @@ class Method(StrEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a scene: which states (globs, none = all), which columns, how exactly.
+    """A request: which states (globs, none = all), which columns, how exactly.
 
     `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d. With a
     `target_error` (mm, of the tip) the plan takes the cheapest level that is bounded by it.
@@ -104,22 +104,22 @@ class Plan:
 
     @property
     def accuracy_level(self) -> AccuracyLevel | None:
-        """What was chosen for the target error, if there is one."""
+        """The accuracy level chosen for the target error, if there is one."""
         return self.exactness.accuracy_level
 
     @property
     def dropped_error(self) -> float:
-        """What dropping the scene's bars adds to the error of each tip, mm."""
+        """Bound on the tip displacement by the bars that were dropped, mm."""
         return float(self.exactness.dropped_error[0])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Those of its columns, and what every state is judged by."""
+        """The quantities to compute: those of its columns, and those that judge every state."""
         return (*ALWAYS, *(column for column in self.columns if column not in ALWAYS))
 
     @property
     def rows(self) -> RowRequest:
-        """The plan as far as batches of states need it."""
+        """The part of the plan that batches of states need."""
         scene = self.scene
         return RowRequest(
             FORMULATIONS[self.request.formulation],
@@ -222,7 +222,7 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
 
 
 def _asked_for(request: Request) -> Iterator[Quantity]:
-    """What columns ask for by name or by group, as far as every finger has it."""
+    """Quantities that columns name, themselves or by group, among those of every finger."""
     names = {*request.columns, *(Group if "all" in request.columns else ())}
     return (q for q in declared(1, (), False) if q.name in names or q.group in names)
 
@@ -258,7 +258,7 @@ def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> boo
 
 
 def _flexibility(units: UnitSolutions) -> float:
-    """What the bars do to the tip (mm); rigid ones: what a stiffness of 1000 springs would."""
+    """Bound on the tip displacement by bar elasticity, mm; rigid bars count as k_L = 1000 k_b."""
     finger = units.finger
     if finger.is_rigid:
         units = UnitSolutions.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))

@@ -77,7 +77,7 @@ def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
 
 
 def _joined(parts: Sequence[Columns]) -> Columns:
-    """Rows below each other."""
+    """Concatenate rows."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

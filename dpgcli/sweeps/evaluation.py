@@ -25,7 +25,7 @@ Values = NDArray[Any]
 
 
 class DesignStatus(StrEnum):
-    """What became of a design."""
+    """The status of a design."""
 
     STABLE = "stable"  # every pattern has its certified state
     PARTLY_STABLE = "partly_stable"  # some patterns have none
@@ -71,7 +71,7 @@ class Evaluation:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What is told of each state."""
+        """The quantities of each state."""
         every = declared(1, (), bool(self.base.gripper))
         return tuple(quantity for quantity in every if quantity.group in self.groups)
 

@@ -138,7 +138,7 @@ def _held(fix: Mapping[str, float], free: Sequence[str] | None) -> dict[str, flo
 
 
 def _quantity(record: Record, asked: str | None) -> Quantity:
-    """What to fit: what is asked for, or the first that there is."""
+    """The quantity to fit: the one asked for, or the first that the curve has."""
     has = [q for q in Quantity if getattr(record, q.value, None) is not None]
     if asked is None:
         return has[0]

@@ -1,4 +1,4 @@
-"""What a fit came to, and what all fits take."""
+"""The result of a fit, and the arguments that all fits share."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

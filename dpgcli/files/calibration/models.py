@@ -89,7 +89,7 @@ class Curve(Section):
 
     @property
     def known(self) -> calibrations.DomeCurve:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         return calibrations.DomeCurve(
             self.travel_mm, self.energy_mJ, self.opening_per_travel, self.unsampled_mm
         )
@@ -142,7 +142,7 @@ class Grid(Section):
 
     @property
     def known(self) -> calibrations.Grid:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         over = tuple(self.over)
         quantities = frozenset(self.points) - {*over}
         return calibrations.Grid(over, quantities, self.method == "scaling", self.law)
@@ -170,7 +170,7 @@ class DataFile(Section):
 
 
 class Calibration(Section):
-    """What `dpg fit` found out: values for one geometry, or a grid over several."""
+    """A calibration by `dpg fit`: values for one geometry, or a grid over several."""
 
     file: str | None = Field(default=None, description="the name of the file, once it is read")
     calibration_version: Literal[1] = Field(description="1: what this version of dpg reads")
@@ -189,7 +189,7 @@ class Calibration(Section):
 
     @property
     def known(self) -> calibrations.Calibration:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         values = {} if self.values is None else self.values.given()
         return calibrations.Calibration(
             self.file,
