@@ -45,8 +45,8 @@ from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
-from dpgcli.sweeps.metrics import DESIGN_COLUMNS
+from dpgcli.sweeps.evaluation import LEVEL_COLUMNS, DesignStatus
+from dpgcli.sweeps.metrics import METRICS
 
 ROOT = Path(__file__).parents[1]
 COMMANDS = {
@@ -248,7 +248,7 @@ def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
     assert not {name for name in named if f"`{name}" not in MANUAL}
-    named = {c.name for c in (*DESIGN_COLUMNS, *RUNG_COLUMNS)} | {*DesignStatus, *ABLATIONS}
+    named = {c.name for c in (*METRICS, *LEVEL_COLUMNS)} | {*DesignStatus, *ABLATIONS}
     named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
     assert not {name for name in named if f"`{name}" not in MANUAL}
     assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", MANUAL, re.M)}
