@@ -47,7 +47,7 @@ class CompareResult:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is predicted, known, and off."""
+        """Predicted and known values, and their differences."""
         return comparison.columns(self.rows)
 
     @property
@@ -77,7 +77,7 @@ class CompareResult:
             yield Message("warning: ", misfit)
 
     def _times(self) -> Iterator[str]:
-        """What a state took in the data and takes here, where the data say."""
+        """Seconds a state: of the data, where they say, and of the prediction."""
         if not np.isfinite(self.known.seconds).any():
             return
         patterns = self.known.patterns

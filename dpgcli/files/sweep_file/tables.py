@@ -182,7 +182,7 @@ def _check_rows(content: bytes, mark: str) -> None:
 
 
 class Wrong(NamedTuple):
-    """What a column should have, what stands there instead, and a hint."""
+    """A wrong column: what it should have, what it has, and a hint."""
 
     expected: str
     found: str
