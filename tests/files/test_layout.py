@@ -134,6 +134,14 @@ def test_columns_by_place_signs_and_lines_above(read: Read) -> None:
     assert found.curve.force.tolist() == [-5.0, -6.0]
 
 
+def test_no_row_of_numbers_is_taken_for_the_titles_that_are_places(read: Read) -> None:
+    places = Choice({"travel_mm": "1", "force_N": "2"})
+    found = read("0 5\n0.5 6\n1 2\n2 1\n", places)
+    assert found.curve.travel.tolist() == [0, 0.5, 1, 2]
+    named = read("Nr 4;Kraft\nWeg;Kraft\n0;5\n0,5;6\n1;2\n", places)
+    assert named.curve.travel.tolist() == [0, 0.5, 1]
+
+
 def test_a_title_that_begins_with_a_minus_is_itself(read: Read) -> None:
     found = read("-Load,Ext\n5,0.5\n6,1.5\n", Choice({"travel_mm": "Ext", "force_N": "-Load"}))
     assert found.curve.force is not None
