@@ -126,3 +126,11 @@ def test_branches_apart_by_more_than_a_factor_are_asked_about() -> None:
     with pytest.raises(FitError, match=r"are two curves: bistable_stiffness_N_per_mm 17.* and 7.7"):
         fitted(far)
     assert warned(fitted(far, Branches.BOTH), "hysteresis")
+
+
+def test_slow_pieces_have_their_hysteresis_as_well() -> None:
+    record = hysteretic(0.06)
+    slow = Record(BOTH, force=record.force, time=np.linspace(0.0, 40.0, len(BOTH)))
+    found = fitted(slow, Branches.QUASI_STATIC)
+    assert warned(found, "hysteresis")
+    assert found.fit.standard_errors[0] == pytest.approx(0.06 * TRUE[0], rel=0.05)
