@@ -12,7 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.beginning import beginning_warnings, check_sign
-from dpgcli.calibration.branches import branch_of, ways, with_hysteresis
+from dpgcli.calibration.branches import branch_of, in_time, ways, with_hysteresis
 from dpgcli.calibration.choices import (
     LINEARITY,
     STIFFNESS,
@@ -183,7 +183,7 @@ def _with_hysteresis(
     found: Fit, record: Record, choice: BistableOptions, factor: float
 ) -> tuple[Fit, tuple[str, ...]]:
     """The fit with what its two branches say of its errors; a ringing dome has none."""
-    if rings(record):
+    if rings(in_time(record)):
         return found, ()
     alone = partial(_alone, replace(choice, resamples=0), factor)
     is_asked = choice.branches is not None
