@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.calibration.comparison import Comparison
 from dpgcli.calibration.known import KnownStates
-from dpgcli.reports.drawing import drawn_to, titled
+from dpgcli.reports.drawing import drawn_to
 from dpgcli.states.patterns import texts
 
 if TYPE_CHECKING:  # SciPy is in the way of comparisons, which need none
@@ -61,9 +61,10 @@ def draw_comparison(
     """Draw each predicted limiting layer beside the known tip and shape, to SVG or PNG."""
     from matplotlib import colormaps
 
-    words = {"xlabel": "x (mm)", "ylabel": "y (mm)", "title": titled(name)}
-    with drawn_to(path, 9.0, 6.0, aspect="equal", **words) as axes:
-        names = texts(known.patterns)
+    names = [text.decode() for text in texts(known.patterns)]
+    text = "\n".join(_tips(known, found, names))
+    words = {"xlabel": "x (mm)", "ylabel": "y (mm)"}
+    with drawn_to(path, 9.0, 6.0, name, text, aspect="equal", **words) as axes:
         for state, inverted in enumerate(known.patterns.T):
             color = colormaps["viridis"](0.85 * inverted.mean())
             axes.plot(*found.states.layer[:, :, state], ".-", color=color)
@@ -71,7 +72,7 @@ def draw_comparison(
                 axes.plot(*calibrated.states.layer[:, :, state], "--", color=color)
             if known.shapes:
                 axes.plot(*known.shapes[state], "+", color=color, ms=4)
-            _draw_known(axes, known.tip[:, state], names[state].decode(), color)
+            _draw_known(axes, known.tip[:, state], names[state], color)
         axes.plot([], [], "k.-", label="predicted, to its tip")
         if calibrated is not None:
             axes.plot([], [], "k--", label="predicted, calibrated")
@@ -79,6 +80,13 @@ def draw_comparison(
             axes.plot([], [], "k+", ms=4, label="known shape")
         axes.plot([], [], "kx", ms=9, mew=2, label="known tip")
         axes.legend(frameon=False)
+
+
+def _tips(known: KnownStates, found: Comparison, names: list[str]) -> Iterator[str]:
+    """The tips in words, for those who do not see them."""
+    for state, name in enumerate(names):
+        (x, y), (near_x, near_y) = known.tip[:, state], found.states.pose[:2, state]
+        yield f"{name}: known tip {x:.5g}, {y:.5g} mm, predicted {near_x:.5g}, {near_y:.5g} mm"
 
 
 def draw_fitted(study: "FingerFit", found: "Fit", name: str, path: Path) -> None:

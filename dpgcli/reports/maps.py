@@ -1,10 +1,10 @@
 """Figures of a design space: its main metrics over the first two swept values."""
 
-import io
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from dpgcli.reports.drawing import titled
+from dpgcli.reports.drawing import own_figure, svg_text, titled
 from dpgcli.reports.summary import DesignSpace, is_alike
 
 DRAWN = (
@@ -17,8 +17,7 @@ DRAWN = (
 )
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
-SVG_SETTINGS: Any = {"svg.hashsalt": "dpg", "svg.fonttype": "none", "font.size": 9}
-NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
@@ -29,25 +28,25 @@ def figures(space: DesignSpace) -> str:
     metrics = [m for m in metrics if not is_alike(usable[m])]
     if not metrics or not space.swept:
         return "<p>No metric varies.</p>"
+    every = 1 if _is_grid(space) else len(space.designs) // MOST_POINTS + 1
     try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
+        svg = _maps(DesignSpace(space.designs[::every], space.units), metrics)
     except ImportError:
         return f"<p>{escape(NO_MATPLOTLIB)}</p>"
-    every = 1 if _is_grid(space) else len(space.designs) // MOST_POINTS + 1
-    drawn = DesignSpace(space.designs[::every], space.units)
+    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+
+
+def _maps(space: DesignSpace, metrics: Sequence[str]) -> str:
+    """Inline SVG with two maps a row."""
     n_rows = (len(metrics) + 1) // 2
-    content = io.StringIO()
-    with mpl.rc_context(SVG_SETTINGS):
-        figure = Figure(figsize=(10.0, 3.6 * n_rows), layout="constrained", facecolor="white")
+    with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
             axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
-            _draw(axes, drawn, metric)
-        figure.savefig(content, format="svg", metadata=NO_METADATA)
-    text = content.getvalue()
-    names = escape(", ".join(map(space.label, metrics)))
-    svg = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{names}"', 1)
-    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+            _draw(axes, space, metric)
+        over = " and ".join(map(space.label, space.swept[:2]))
+        what = ", ".join(map(space.label, metrics))
+        text = svg_text(figure, what, f"{what} over {over}", NO_METADATA)
+    return text[text.index("<svg") :]
 
 
 def _caption(space: DesignSpace, every: int) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.files.study_tables import json_value
-from dpgcli.reports.drawing import drawn_to, titled
+from dpgcli.reports.drawing import drawn_to
 
 Row = dict[str, Any]
 
@@ -106,9 +106,14 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
     words = {
         "xlabel": "wall time per state (s)",
         "ylabel": "largest tip error (mm)",
-        "title": titled(name),
+        "xscale": "log",
+        "yscale": "log",
     }
-    with drawn_to(path, 9.0, 5.5, xscale="log", yscale="log", **words) as axes:
+    text = "\n".join(
+        f"{_named(number, row)}: {row['seconds_per_state']:.2e} s, {row['max_tip_error_mm']:.1e} mm"
+        for number, row in enumerate(points(rows), start=1)
+    )
+    with drawn_to(path, 9.0, 5.5, name, text, **words) as axes:
         _draw_points(axes, points(rows))
         model = model_error(rows)
         if model is not None:
@@ -133,9 +138,13 @@ def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
             fmt=MARKERS[group],
             color=COLORS[group],
             ms=6,
-            label=f"{number}  {row['way']} ({LABELS[group]})",
+            label=_named(number, row),
         )
         axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(5, 5), fontsize=8)
+
+
+def _named(number: int, row: Row) -> str:
+    return f"{number}  {row['way']} ({LABELS[row['group']]})"
 
 
 def _which(row: Row) -> str:
