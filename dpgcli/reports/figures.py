@@ -19,7 +19,7 @@ from dpgcli.reports.fingers import (
 )
 from dpgcli.reports.outlines import DrawnState, drawn_states, notes
 from dpgcli.reports.overlay import Overlay
-from dpgcli.reports.panels import DIMENSION, LEFT, LENGTHS, Grid, Window
+from dpgcli.reports.panels import DIMENSION, LEFT, LENGTHS, NO_WINDOW, Grid, Window
 from dpgcli.states.predict import Prediction
 
 POINTS = 72.0  # an inch
@@ -40,11 +40,11 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
     title = f"States of a {what} of {prediction.plan.n_units} units"
     text = "\n".join(state.description for state in states)
     if overlay:
-        picture = Overlay.of(states)
-        with figure_to(path, *picture.page, title, text, layout=None) as figure:
-            picture.draw(figure)
+        over = Overlay(states)
+        with figure_to(path, *over.picture.page, title, text, layout=None) as figure:
+            over.draw(figure)
         return
-    window = Window.around(states) or Window(0.0, 1.0, 0.0, 1.0)
+    window = Window.around(states) or NO_WINDOW
     grid = Grid.of(
         len(states), prediction.plan.n_units, window, DIMENSION if scene.gripper else 0.0
     )

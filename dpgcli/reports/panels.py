@@ -7,11 +7,12 @@ from math import ceil, inf, log
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.reports.outlines import DrawnState
+from dpgcli.reports.outlines import DrawnState, Points
 
 LENGTHS = {"m": 1e3, "mm": 1.0, "µm": 1e-3, "nm": 1e-6}  # in mm
 FLATTEST = 1.0 / 6.0  # window: of its larger side
 MARGIN = 0.03  # of the same
+SMALLEST = 1e-9  # window, mm
 
 # in inches
 PAGE, NARROWEST = (11.0, 11.0), 5.6
@@ -37,12 +38,14 @@ class Window:
     def around(cls, states: Sequence[DrawnState]) -> "Window | None":
         """A window around all shapes; None if there are none."""
         points = [finger.points for state in states for finger in state.fingers]
-        if not points:
-            return None
-        both = np.concatenate(points)
-        size = max(np.ptp(both.real), np.ptp(both.imag))
+        return cls.of(np.concatenate(points)) if points else None
+
+    @classmethod
+    def of(cls, points: Points) -> "Window":
+        """A window around points (mm), not too flat, with a margin."""
+        size = max(np.ptp(points.real), np.ptp(points.imag), SMALLEST)
         sides = []
-        for values in (both.real, both.imag):
+        for values in (points.real, points.imag):
             spare = max(0.0, FLATTEST * size - np.ptp(values)) / 2.0 + MARGIN * size
             sides += [float(values.min() - spare), float(values.max() + spare)]
         return cls(*sides)
@@ -60,6 +63,9 @@ class Window:
         ('mm', 'µm')
         """
         return next((unit for unit in LENGTHS if max(self.size) >= LENGTHS[unit]), "nm")
+
+
+NO_WINDOW = Window(0.0, 1.0, 0.0, 1.0)  # where there is nothing to see
 
 
 @dataclass(frozen=True)
