@@ -6,7 +6,6 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from dpgcli.design.scene import Scene
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.fingers import (
     MEASURE,
@@ -48,7 +47,7 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
     grid = Grid.of(
         len(states), prediction.plan.n_units, window, DIMENSION if scene.gripper else 0.0
     )
-    foot = Foot.of(scene, grid.page[0])
+    foot = Foot(notes(scene), scene.gripper is not None, grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
     with figure_to(path, *grid.page, title, text, layout=None) as figure:
         for place, state in enumerate(states):
@@ -95,22 +94,16 @@ def _draw_aperture(axes: Any, state: DrawnState, window: Window) -> None:
 
 @dataclass(frozen=True)
 class Foot:
-    """What stands below the panels: a legend in columns, notes; `height` in inches."""
+    """What stands below the panels: a legend, in two rows if the page is not wide, and notes."""
 
     notes: list[str]
     is_gripper: bool
-    n_columns: int
-
-    @classmethod
-    def of(cls, scene: Scene, page_width: float) -> "Foot":
-        """The legend is one row where the page is wide."""
-        is_gripper = scene.gripper is not None
-        n_handles = len(handles(is_gripper=is_gripper))
-        return cls(notes(scene), is_gripper, n_handles if page_width > WIDE else NARROW_LEGEND)
+    is_wide: bool
 
     @property
     def height(self) -> float:
-        n_rows = 2 if self.n_columns == NARROW_LEGEND else 1
+        """In inches."""
+        n_rows = 1 if self.is_wide else 2
         return AXIS_LABELS + n_rows * LEGEND_ROW + NOTE * len(self.notes) + 0.08
 
     def draw(self, figure: Any, window: Window, grid: Grid) -> None:
@@ -120,11 +113,12 @@ class Foot:
         figure.text(left, middle, f"y ({window.unit})", rotation=90, va="center")
         top = (self.height - 0.22) / height
         figure.text(0.5, top, f"x ({window.unit})", ha="center", va="top")
+        explained = handles(is_gripper=self.is_gripper)
         figure.legend(
-            handles=handles(is_gripper=self.is_gripper),
+            handles=explained,
             loc="upper center",
             bbox_to_anchor=(0.5, (self.height - AXIS_LABELS) / height),
-            ncols=self.n_columns,
+            ncols=len(explained) if self.is_wide else NARROW_LEGEND,
             frameon=False,
             fontsize=8,
             borderaxespad=0.0,
