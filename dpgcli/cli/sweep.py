@@ -169,7 +169,7 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
         return
     from dpgcli.sweeps.executors import start_fork_server
 
-    start_fork_server("dpgcli.studies.sweep", "filelock", "shapely")
+    start_fork_server("dpgcli.studies.work", "filelock", "shapely")
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:

@@ -19,13 +19,10 @@ from dpgcli import __version__
 from dpgcli.arrays import Columns
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.scene_file import spelled
 from dpgcli.files.seal import KEY, UNSEALED, seal
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
-from dpgcli.states.plan import Plan
-from dpgcli.states.predict import Prediction
 
 SCHEMA_VERSION = 1
 DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten
@@ -57,16 +54,6 @@ def schema(columns: tuple[Column, ...]) -> Any:
             for column in columns
         ]
     )
-
-
-def write_states(
-    prediction: Prediction, path: Path, spec_json: str, blocks: Iterable[Columns] | None = None
-) -> None:
-    """Write all states of a prediction, as they come; see `write_table`."""
-    columns = prediction.plan.columns
-    rows = prediction.blocks() if blocks is None else blocks
-    batches = (record_batch(columns, block) for block in rows)
-    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
 
 
 def write_table(
@@ -132,24 +119,6 @@ def write_run(path: Path, facts: dict[str, Any]) -> None:
     text = json.dumps({"written_by": f"dpg {__version__}", **facts}, indent=2)
     with whole_file(path, Mark.FACTS) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
-    request = plan.request
-    return {
-        "dpg.schema_version": str(SCHEMA_VERSION),
-        "dpg.spec": spec_json,
-        "dpg.spec_sha256": hashlib.sha256(spec_json.encode()).hexdigest(),
-        "dpg.patterns": json.dumps(request.patterns),
-        "dpg.formulation": request.formulation,
-        "dpg.method": plan.method,
-        "dpg.tolerance": repr(request.tolerance),
-        "dpg.law": plan.scene.finger.law.description,
-        "dpg.sources": json.dumps(
-            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
-        ),
-        "dpg.versions": versions(),
-    }
 
 
 def _row_groups(batches: Iterable[Any], described: Any) -> Iterator[Any]:
