@@ -8,15 +8,9 @@ from pathlib import Path
 
 from dpgcli.arrays import Columns
 from dpgcli.files.output import run_file
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
-from dpgcli.files.table_writer import (
-    SCHEMA_VERSION,
-    record_batch,
-    schema,
-    versions,
-    write_run,
-    write_table,
-)
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 
