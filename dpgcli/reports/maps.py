@@ -1,12 +1,12 @@
 """Figures of a design space: its main metrics over the first two swept values."""
 
-import io
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
 import pandas as pd
 
-from dpgcli.reports.drawing import titled
+from dpgcli.reports.drawing import own_figure, svg_text, titled
 from dpgcli.reports.summary import DesignSpace, is_alike
 
 DRAWN = (
@@ -19,8 +19,7 @@ DRAWN = (
 )
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
-SVG_SETTINGS: Any = {"svg.hashsalt": "dpg", "svg.fonttype": "none", "font.size": 9}
-NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
@@ -29,25 +28,26 @@ def figures(space: DesignSpace) -> str:
     metrics = [name for name in DRAWN if name in space.designs and _varies(space, name)]
     if not metrics or not space.swept:
         return "<p>No metric varies.</p>"
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError:
-        return f"<p>{escape(NO_MATPLOTLIB)}</p>"
     designs = pd.DataFrame(space.designs)
     every = 1 if _is_grid(space, designs) else len(designs) // MOST_POINTS + 1
+    try:
+        svg = _maps(space, designs[::every], metrics)
+    except ImportError:
+        return f"<p>{escape(NO_MATPLOTLIB)}</p>"
+    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+
+
+def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> str:
+    """Inline SVG with two maps a row."""
     n_rows = (len(metrics) + 1) // 2
-    content = io.StringIO()
-    with mpl.rc_context(SVG_SETTINGS):
-        figure = Figure(figsize=(10.0, 3.6 * n_rows), layout="constrained", facecolor="white")
+    with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
             axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
-            _draw(axes, space, designs[::every], metric)
-        figure.savefig(content, format="svg", metadata=NO_METADATA)
-    text = content.getvalue()
-    names = escape(", ".join(map(space.label, metrics)))
-    svg = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{names}"', 1)
-    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+            _draw(axes, space, designs, metric)
+        over = " and ".join(map(space.label, space.swept[:2]))
+        what = ", ".join(map(space.label, metrics))
+        text = svg_text(figure, what, f"{what} over {over}", NO_METADATA)
+    return text[text.index("<svg") :]
 
 
 def _varies(space: DesignSpace, metric: str) -> bool:
