@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 def predict(
     spec: SpecPath,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
     ] = None,
     printed_as: Annotated[
         Format | None,
@@ -54,7 +55,8 @@ def predict(
     tolerance: Tolerance = None,
     target_error: TargetError = None,
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
+        Path | None,
+        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
