@@ -1,4 +1,4 @@
-"""What a spec describes, in the model's terms, and where its numbers come from."""
+"""A scene: the finger or gripper of a spec in the model's terms; origins of its numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What fitted values may be off by.
+    """Standard errors and correlations of fitted values.
 
     `covariance` (step, step) of steps along `directions`, which change the finger's arrays by the
     values given by name, each (1 or unit, 1).

@@ -1,4 +1,4 @@
-"""What the errors of calibrations mean for the values of a finger."""
+"""Covariance of a finger's values, from the standard errors of calibrations."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple

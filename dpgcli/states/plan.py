@@ -1,45 +1,40 @@
-"""What a scene needs, decided once: `explain` prints the plan, `predict` carries it out."""
+"""The plan of a scene, decided once: `explain` prints it, `predict` carries it out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from dpgcli.design.scene import Scene
-from dpgcli.errors import Field, Message, UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
-from dpgcli.states.certify import Status
-from dpgcli.states.columns import Group
-from dpgcli.states.costs import peak_bytes, seconds
-from dpgcli.states.pairs.compose import paired_states
-from dpgcli.states.pairs.halves import Split
-from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
-from dpgcli.states.quantities import ALWAYS, Quantity, declared, named
-from dpgcli.states.rows import RowRequest
-from dpgcli.states.rungs import (
+from dpgcli.states.accuracy import (
     DEFAULT_TOLERANCE,
+    AccuracyLevel,
     Exactness,
-    Rung,
     bar_flexibility,
     check_exactness,
     exactnesses,
 )
+from dpgcli.states.certify import Status
+from dpgcli.states.chosen_columns import chosen_columns
+from dpgcli.states.columns import Group
+from dpgcli.states.costs import peak_bytes, seconds
+from dpgcli.states.omissions import Omission, omissions
+from dpgcli.states.pairs.compose import paired_states
+from dpgcli.states.pairs.halves import Split
+from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
+from dpgcli.states.quantities import ALWAYS, Quantity, declared
+from dpgcli.states.rows import RowRequest
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 
 FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
 LARGEST_CONTEXT = 4
-ON_REQUEST = (Group.NODES, Group.UNCERTAINTY)
-MOST_STATES_WITH = {
-    Group.EIGENVALUE: 2**10,
-    Group.STIFFNESS: 2**16,
-    Group.ENERGIES: 2**16,
-    Group.OPENINGS: 2**16,
-}
 
 
 class Method(StrEnum):
@@ -51,10 +46,10 @@ class Method(StrEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a scene: which states (globs, none = all), which columns, how exactly.
+    """A request: which states (globs, none = all), which columns, how exactly.
 
     `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d. With a
-    `target_error` (mm, of the tip) the plan takes the cheapest rung that is bounded by it.
+    `target_error` (mm, of the tip) the plan takes the cheapest level that is bounded by it.
     """
 
     patterns: tuple[str, ...] = ()
@@ -65,22 +60,13 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Omission:
-    """Something left out, and why; `keep` is the name by which a benchmark puts it back."""
-
-    what: str
-    why: str
-    keep: str = ""
-
-
-@dataclass(frozen=True)
 class Plan:
     """Decisions for one scene and request, and what they cost.
 
     `selection` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
     bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
-    `rung` was chosen for the target error, if there is one; `error_bound` (mm) is what it
+    `accuracy_level` was chosen for the target error, if there is one; `error_bound` (mm) is what it
     promises for every tip, and infinite where nothing can be promised before the work.
     """
 
@@ -117,23 +103,23 @@ class Plan:
         return self.exactness.units
 
     @property
-    def rung(self) -> Rung | None:
-        """What was chosen for the target error, if there is one."""
-        return self.exactness.rung
+    def accuracy_level(self) -> AccuracyLevel | None:
+        """The accuracy level chosen for the target error, if there is one."""
+        return self.exactness.accuracy_level
 
     @property
     def dropped_error(self) -> float:
-        """What dropping the scene's bars adds to the error of each tip, mm."""
+        """Bound on the tip displacement by the bars that were dropped, mm."""
         return float(self.exactness.dropped_error[0])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Those of its columns, and what every state is judged by."""
+        """The quantities to compute: those of its columns, and those that judge every state."""
         return (*ALWAYS, *(column for column in self.columns if column not in ALWAYS))
 
     @property
     def rows(self) -> RowRequest:
-        """The plan as far as batches of states need it."""
+        """The part of the plan that batches of states need."""
         scene = self.scene
         return RowRequest(
             FORMULATIONS[self.request.formulation],
@@ -165,7 +151,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     is_fitted = scene.uncertainty is not None and request.formulation == "chain"
     available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
     has_bars = not exactness.drops_bars
-    columns, left_out = _columns(available, request.columns, n_states, has_bars=has_bars)
+    columns, left_out = chosen_columns(available, request.columns, n_states, has_bars=has_bars)
     groups = {column.group for column in columns}
     split = _split(units, potential, request, selection is None, groups)
     n_solves = n_states if split is None else split.n_solves
@@ -182,7 +168,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         n_unit_solves=units.wells.exists.size,
         n_finger_solves=n_solves,
         columns=columns,
-        omissions=(*_omissions(scene, units, split, n_solves, exactness), *left_out),
+        omissions=(*omissions(scene, units, split, n_solves, exactness), *left_out),
         residual_limit=request.tolerance * _largest_force(potential),
         bar_flexibility=_flexibility(scene_units),
         error_bound=float(exactness.error_bounds[0]) if is_bounded else np.inf,
@@ -236,44 +222,9 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
 
 
 def _asked_for(request: Request) -> Iterator[Quantity]:
-    """What columns ask for by name or by group, as far as every finger has it."""
+    """Quantities that columns name, themselves or by group, among those of every finger."""
     names = {*request.columns, *(Group if "all" in request.columns else ())}
     return (q for q in declared(1, (), False) if q.name in names or q.group in names)
-
-
-def _columns(
-    available: tuple[Quantity, ...], names: Sequence[str], n_states: int, *, has_bars: bool
-) -> tuple[tuple[Quantity, ...], tuple[Omission, ...]]:
-    """Columns asked for; by default all but nodes and what is costly in a large map."""
-    wanted: set[str] = {"pattern", "status", *names} - {"default", "all"}
-    left_out: tuple[Omission, ...] = ()
-    groups = list(dict.fromkeys(c.group for c in available))
-    if "all" in names:
-        wanted |= set(groups)
-    elif "default" in names:
-        cheap = [
-            g
-            for g in groups
-            if g not in ON_REQUEST
-            and n_states <= MOST_STATES_WITH.get(g, n_states)
-            and (has_bars or g is not Group.STIFFNESS)
-        ]
-        left_out = tuple(
-            Omission(f"{g} columns", _why_left_out(g, n_states), "every-column")
-            for g in groups
-            if g not in {*cheap, *names}
-        )
-        wanted |= set(cheap)
-    return named(available, sorted(wanted)), left_out
-
-
-def _why_left_out(group: Group, n_states: int) -> str:
-    if group in ON_REQUEST:
-        return Message("given on request: ", Field(group))
-    if n_states <= MOST_STATES_WITH[group]:
-        return "the target error drops the bars, without which they would be wrong"
-    most = f"left out above {MOST_STATES_WITH[group]:,} states"
-    return Message(most, ": ", Field("columns"), f" default,{group}")
 
 
 def _split(
@@ -307,46 +258,8 @@ def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> boo
 
 
 def _flexibility(units: UnitSolutions) -> float:
-    """What the bars do to the tip (mm); rigid ones: what a stiffness of 1000 springs would."""
+    """Bound on the tip displacement by bar elasticity, mm; rigid bars count as k_L = 1000 k_b."""
     finger = units.finger
     if finger.is_rigid:
         units = UnitSolutions.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))
     return float(bar_flexibility(units)[0])
-
-
-def _omissions(
-    scene: Scene, units: UnitSolutions, split: Split | None, n_solves: int, exactness: Exactness
-) -> tuple[Omission, ...]:
-    finger = units.finger
-    n = finger.n_units
-    omissions = [Omission("loads, pressure and contact", "the spec has none")]
-    if finger.is_rigid:
-        why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
-        omissions.append(
-            Omission(
-                f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
-                f"{why}; units do not feel each other, "
-                "so the guess is the solution and Newton only certifies it",
-                "bars",
-            )
-        )
-    if not finger.hinge_stiffness.any():
-        omissions.append(Omission("hinge terms", "the hinge stiffness is zero", "hinges"))
-    if units.wells.exists.size < n:
-        omissions.append(
-            Omission(f"{n - 1} of {n} unit wells", "all are equal: one is solved", "every-unit")
-        )
-    if split is not None:
-        omissions.append(
-            Omission(
-                f"{2**n - n_solves:,} of {2**n:,} finger solves",
-                f"states are pairs of {split.n_inner}- and {split.n_outer}-unit halves, each "
-                f"solved with {split.context} units of the other; every pair is certified",
-                "whole-fingers",
-            )
-        )
-    if scene.gripper is not None:
-        omissions.append(
-            Omission("the second finger", "a mirror image: solved once", "second-finger")
-        )
-    return tuple(omissions)

@@ -19,7 +19,7 @@ from dpgcli.states.settle import lanes_at_once
 
 @dataclass
 class Summary:
-    """What a prediction came to, so far; errors and residuals are the largest of stable states.
+    """Summary of the states solved so far; errors and residuals are the largest of stable states.
 
     Residual in N, tip error in mm, times in seconds spent on the states alone.
     """

@@ -1,7 +1,10 @@
-"""What the states of designs come to for each design, gathered block by block."""
+"""Metrics of designs: each with its name, unit, meaning and how the states come to it.
+
+A metric is written here and nowhere else: tables, metadata and the manual follow.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,42 +19,17 @@ TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a f
 CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
 CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
 
-DESIGN_COLUMNS = (
-    Column("n_units", "", "number of units", kind=Kind.COUNT),
-    Column("n_states", "", "number of patterns", kind=Kind.COUNT),
-    Column("n_stable", "", "number of certified states", kind=Kind.COUNT),
-    Column(
-        "n_distinct_tips",
-        "",
-        f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
-        kind=Kind.COUNT,
-    ),
-    Column("workspace_area_mm2", "mm²", "area of the tips' convex hull"),
-    Column("reach_min_mm", "mm", "smallest distance of a tip from the base"),
-    Column("reach_max_mm", "mm", "largest distance of a tip from the base"),
-    Column("aperture_min_mm", "mm", "smallest aperture of the gripper", Group.GRIPPER),
-    Column("aperture_max_mm", "mm", "largest aperture of the gripper", Group.GRIPPER),
-    Column("stiffness_min_N_per_mm", "N/mm", "softest tip direction of any state"),
-    Column("stiffness_max_N_per_mm", "N/mm", "stiffest tip direction of any state"),
-    Column(
-        "min_barrier_mJ", "mJ", "smallest barrier of a unit to snap or reset, bars taken as rigid"
-    ),
-    Column("max_residual_N", "N", "largest unbalanced force of any state"),
-    Column("max_numerical_error_mm", "mm", "largest numerical error of any tip"),
-)
 
-LEAST = {  # metric: what of the states it is the least of
-    "reach_min_mm": "reach",
-    "stiffness_min_N_per_mm": "tip_stiffness_min_N_per_mm",
-    "aperture_min_mm": "aperture_mm",
-}
-MOST = {
-    "reach_max_mm": "reach",
-    "stiffness_max_N_per_mm": "tip_stiffness_max_N_per_mm",
-    "max_residual_N": "residual_N",
-    "max_numerical_error_mm": "numerical_error_mm",
-    "aperture_max_mm": "aperture_mm",
-}
+@dataclass(frozen=True)
+class Metric(Column):
+    """A column of designs: what `of` makes of all their states, (design,).
+
+    Or, with a value `over` the states, the `extreme` of it among a design's stable ones.
+    """
+
+    of: Callable[["Metrics"], Array | Indices] = field(kw_only=True, compare=False)
+    over: str = field(default="", kw_only=True)
+    extreme: np.ufunc = field(default=np.minimum, kw_only=True)
 
 
 @dataclass
@@ -75,49 +53,30 @@ class Metrics:
 
     def add(self, rows: Columns) -> None:
         """Count a block's states in."""
-        table = {
-            name: rows[name].reshape(self.n_designs, -1)
-            for name in ("status", "tip_x_mm", "tip_y_mm", *LEAST.values(), *MOST.values())
-            if name in rows
-        }
-        table["reach"] = np.hypot(table["tip_x_mm"], table["tip_y_mm"])
-        stable = table.pop("status") == Status.STABLE
+        block = {name: values.reshape(self.n_designs, -1) for name, values in rows.items()}
+        block["reach"] = np.hypot(block["tip_x_mm"], block["tip_y_mm"])
+        stable = block["status"] == Status.STABLE
         self.n_stable += stable.sum(axis=1)
-        for names, extreme, sign in ((LEAST, np.minimum, 1.0), (MOST, np.maximum, -1.0)):
-            for name, of in names.items():
-                if of in table:
-                    self._extend(name, extreme, np.where(stable, table[of], sign * np.inf))
-        self._add_tips(table["tip_x_mm"], table["tip_y_mm"], stable)
+        for metric in METRICS:
+            if metric.over in block:
+                self._extend(metric, block[metric.over], stable)
+        self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
     def columns(self) -> Columns:
         """One row per design; NaN where it has no stable state."""
-        n_units = self.units.finger.n_units
-        any_stable = self.n_stable > 0
-        extremes = {n: np.where(any_stable, v, np.nan) for n, v in self.extremes.items()}
-        barrier = barriers(self.units.finger, self.units.wells)
-        return {
-            "n_units": np.full(self.n_designs, n_units),
-            "n_states": np.full(self.n_designs, 2**n_units),
-            "n_stable": self.n_stable,
-            "n_distinct_tips": self.tips.counts(self.n_designs),
-            "workspace_area_mm2": self._area(),
-            "min_barrier_mJ": np.broadcast_to(barrier, self.n_designs),
-            **extremes,
-        }
+        known = (m for m in METRICS if not m.over or m.name in self.extremes)
+        return {metric.name: metric.of(self) for metric in known}
 
-    def _extend(self, name: str, extreme: Callable[..., Array], values: Array) -> None:
-        found = extreme.reduce(values, axis=1)  # type: ignore[attr-defined]
-        self.extremes[name] = extreme(self.extremes.get(name, found), found)
+    def extreme(self, name: str) -> Array:
+        """The extreme of a metric that is one, (design,)."""
+        return np.where(self.n_stable > 0, self.extremes[name], np.nan)
 
-    def _add_tips(self, x: Array, y: Array, stable: Flags) -> None:
-        owner = np.nonzero(stable)[0]
-        tips = np.column_stack((x[stable], y[stable]))
-        self.tips.add(owner, tips * (TIPS_PER_LENGTH / self.length[owner])[:, None])
-        if len(owner):
-            self.hulls.append(hulls_of(owner, tips))
+    def alike(self, value: int | Array) -> Array | Indices:
+        """A value of each design, or one for all, as (design,)."""
+        return np.broadcast_to(value, self.n_designs)
 
-    def _area(self) -> Array:
-        """Area of each design's hull; 0 where it is narrower than rounding."""
+    def area(self) -> Array:
+        """Area of the convex hull of each design's tips, mm²; 0 where it is below rounding."""
         import shapely
 
         area = np.zeros(self.n_designs)
@@ -127,6 +86,74 @@ class Metrics:
             rounding = 8.0 * np.finfo(float).eps * self.length[designs] * around
             area[designs] = np.where(found > rounding, found, 0.0)
         return area
+
+    def _extend(self, metric: Metric, values: Array, stable: Flags) -> None:
+        worst = np.inf if metric.extreme is np.minimum else -np.inf
+        found = metric.extreme.reduce(np.where(stable, values, worst), axis=1)
+        known = self.extremes.get(metric.name, found)
+        self.extremes[metric.name] = metric.extreme(known, found)
+
+    def _add_tips(self, x: Array, y: Array, stable: Flags) -> None:
+        owner = np.nonzero(stable)[0]
+        tips = np.column_stack((x[stable], y[stable]))
+        self.tips.add(owner, tips * (TIPS_PER_LENGTH / self.length[owner])[:, None])
+        if len(owner):
+            self.hulls.append(hulls_of(owner, tips))
+
+
+def _count(name: str, description: str, of: Callable[[Metrics], Array | Indices]) -> Metric:
+    return Metric(name, "", description, kind=Kind.COUNT, of=of)
+
+
+def _least(
+    name: str, unit: str, description: str, over: str, group: Group = Group.STATES
+) -> Metric:
+    return Metric(name, unit, description, group, of=lambda m: m.extreme(name), over=over)
+
+
+def _most(name: str, unit: str, description: str, over: str, group: Group = Group.STATES) -> Metric:
+    return replace(_least(name, unit, description, over, group), extreme=np.maximum)
+
+
+METRICS = (
+    _count("n_units", "number of units", lambda m: m.alike(m.units.finger.n_units)),
+    _count("n_states", "number of patterns", lambda m: m.alike(2**m.units.finger.n_units)),
+    _count("n_stable", "number of certified states", lambda m: m.n_stable),
+    _count(
+        "n_distinct_tips",
+        f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
+        lambda m: m.tips.counts(m.n_designs),
+    ),
+    Metric("workspace_area_mm2", "mm²", "area of the tips' convex hull", of=Metrics.area),
+    _least("reach_min_mm", "mm", "smallest distance of a tip from the base", "reach"),
+    _most("reach_max_mm", "mm", "largest distance of a tip from the base", "reach"),
+    _least(
+        "aperture_min_mm", "mm", "smallest aperture of the gripper", "aperture_mm", Group.GRIPPER
+    ),
+    _most("aperture_max_mm", "mm", "largest aperture of the gripper", "aperture_mm", Group.GRIPPER),
+    _least(
+        "stiffness_min_N_per_mm",
+        "N/mm",
+        "softest tip direction of any state",
+        "tip_stiffness_min_N_per_mm",
+    ),
+    _most(
+        "stiffness_max_N_per_mm",
+        "N/mm",
+        "stiffest tip direction of any state",
+        "tip_stiffness_max_N_per_mm",
+    ),
+    Metric(
+        "min_barrier_mJ",
+        "mJ",
+        "smallest barrier of a unit to snap or reset, bars taken as rigid",
+        of=lambda m: m.alike(barriers(m.units.finger, m.units.wells)),
+    ),
+    _most("max_residual_N", "N", "largest unbalanced force of any state", "residual_N"),
+    _most(
+        "max_numerical_error_mm", "mm", "largest numerical error of any tip", "numerical_error_mm"
+    ),
+)
 
 
 @dataclass

@@ -1,0 +1,56 @@
+"""Omissions of a plan, and their reasons."""
+
+from dataclasses import dataclass
+
+from dpgcli.design.scene import Scene
+from dpgcli.states.accuracy import Exactness
+from dpgcli.states.pairs.halves import Split
+from dpgcli.states.units import UnitSolutions
+
+
+@dataclass(frozen=True)
+class Omission:
+    """Something left out, and why; `keep` is the name by which a benchmark puts it back."""
+
+    what: str
+    why: str
+    keep: str = ""
+
+
+def omissions(
+    scene: Scene, units: UnitSolutions, split: Split | None, n_solves: int, exactness: Exactness
+) -> tuple[Omission, ...]:
+    """Omitted terms, unknowns and solves of a scene."""
+    finger = units.finger
+    n = finger.n_units
+    left_out = [Omission("loads, pressure and contact", "the spec has none")]
+    if finger.is_rigid:
+        why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
+        left_out.append(
+            Omission(
+                f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
+                f"{why}; units do not feel each other, "
+                "so the guess is the solution and Newton only certifies it",
+                "bars",
+            )
+        )
+    if not finger.hinge_stiffness.any():
+        left_out.append(Omission("hinge terms", "the hinge stiffness is zero", "hinges"))
+    if units.wells.exists.size < n:
+        left_out.append(
+            Omission(f"{n - 1} of {n} unit wells", "all are equal: one is solved", "every-unit")
+        )
+    if split is not None:
+        left_out.append(
+            Omission(
+                f"{2**n - n_solves:,} of {2**n:,} finger solves",
+                f"states are pairs of {split.n_inner}- and {split.n_outer}-unit halves, each "
+                f"solved with {split.context} units of the other; every pair is certified",
+                "whole-fingers",
+            )
+        )
+    if scene.gripper is not None:
+        left_out.append(
+            Omission("the second finger", "a mirror image: solved once", "second-finger")
+        )
+    return tuple(left_out)
