@@ -39,6 +39,7 @@ EXAMPLES = {
     ),
     "validate": ("dpg validate finger.yaml", "dpg validate finger.yaml --format github"),
     "init": ("dpg init", "dpg init my_finger.yaml"),
+    "help": ("dpg help", "dpg help tutorial"),
     "schema": ("dpg schema > finger.schema.json",),
     "fit bistable": (
         "dpg fit bistable dome.csv --travel-to-opening stroke:3.5 --spec finger.yaml",
