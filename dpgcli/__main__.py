@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+import warnings
 from contextlib import suppress
 from types import FrameType
 
@@ -27,6 +28,8 @@ def main() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
             signal.signal(number, _end)
     gc.set_threshold(SELDOM)
+    if not sys.warnoptions:  # -W, PYTHONWARNINGS: tests take each for an error
+        warnings.simplefilter("ignore")  # of libraries; what users should know is said by commands
     with suppress(OSError):  # one that was deleted holds nothing
         _leave_out_working_folder()
     from dpgcli.cli.main import main as run  # signals are met by commands from here on

@@ -10,8 +10,10 @@ the run gives up.
 import atexit
 import os
 import signal
+import sys
 import tempfile
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
@@ -382,6 +384,8 @@ def _held_signals() -> Iterator[None]:
 
 
 def _start_worker() -> None:
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, as in the program itself
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
