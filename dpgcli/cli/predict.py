@@ -43,7 +43,8 @@ BRAILLE = "\u28ff"
 def predict(
     spec: SpecPath,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
     ] = None,
     printed_as: Annotated[
         Format | None,
@@ -58,7 +59,8 @@ def predict(
     tolerance: Tolerance = None,
     target_error: TargetError = None,
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
+        Path | None,
+        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
     ] = None,
     overlay: Annotated[
         bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
