@@ -113,8 +113,8 @@ def bench(
             target_error=target_in_mm(target_error),
             keep=tuple(keep or ()),
             against=against,
-            first_station=frame.first_station,
-            tip_offset=frame.tip,
+            first_station=frame[0],
+            tip_offset=frame[1],
             compare=compare,
             watch=watch,
         )

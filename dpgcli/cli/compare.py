@@ -62,12 +62,13 @@ def compare(
         data,
         calibration=calibration,
         shapes=shapes,
-        first_station=frame.first_station,
-        tip_offset=frame.tip,
+        first_station=frame[0],
+        tip_offset=frame[1],
     )
     print_rows(found.columns, found.rows, printed_as)
     if plot is not None:
         found.draw(plot)
     if not quiet:
         sys.stdout.flush()
-        say("\n".join(found.summary))
+        for line in found.summary:
+            say(line)
