@@ -48,7 +48,7 @@ class BenchResult:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """The cheapest way for the target error, and what got slower since the record."""
+        """The cheapest method for the target error, and what got slower since the record."""
         cheapest = (
             () if self.target_error is None else (cheapest_way(self.rows, self.target_error),)
         )

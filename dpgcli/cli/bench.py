@@ -48,7 +48,9 @@ SHOWN = {
 }  # fmt: skip
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
+Repeats = Annotated[
+    int, typer.Option("--repeats", min=1, max=1000, help="How often each method is timed")
+]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
@@ -137,7 +139,7 @@ def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
 
     def show(row: "Row") -> None:
         if interactive:
-            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
+            print(f"\r{row['group']}: {row['method']}"[:70].ljust(71), end="\r", file=sys.stderr)
 
     yield show
     if interactive:
@@ -170,9 +172,9 @@ def _print_tables(rows: "Sequence[Row]") -> None:
             names = SHOWN.get(group, SHOWN["ladder"])
             print(f"{title}\n")
             print_grid(
-                {"way": [row["way"] for row in own]}
+                {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
-                left=("way",),
+                left=("method",),
             )
             print()
     print("\n".join(text_figure(rows)))

@@ -47,7 +47,7 @@ def compare(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold predictions against finite elements or measurements."""
+    """Compare predictions with finite elements or measurements."""
     from dpgcli.api.compare import compare
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs

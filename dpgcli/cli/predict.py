@@ -209,7 +209,8 @@ def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
-            "no method promises that before the work: numerical_error_mm says what was reached"
+            "no accuracy level promises that before the work: "
+            "numerical_error_mm says what was reached"
         )
     return f"chosen for the target error: {level.name}; {promise}"
 

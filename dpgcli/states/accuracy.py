@@ -1,4 +1,4 @@
-"""Accuracy levels: ways to the same states, from cheap to exact, each with an error bound.
+"""Accuracy levels of the same states, from cheap to exact, each with an error bound.
 
 The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
 units of how far the unit may turn, times the length of the finger (our derivation):
