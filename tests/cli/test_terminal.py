@@ -3,6 +3,7 @@
 import fcntl
 import os
 import pty
+import re
 import struct
 import subprocess
 import termios
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 Shown = Callable[..., tuple[int, str]]
+ESCAPES = re.compile(r"\x1b\[[0-9;]*m")
 COLORFUL = (
     {"FORCE_COLOR": "1"},
     {"TTY_COMPATIBLE": "1"},
@@ -47,7 +49,7 @@ def shown(start: Any) -> Shown:
 @pytest.mark.parametrize("env", COLORFUL, ids=lambda env: next(iter(env)))
 @pytest.mark.parametrize(
     "arguments",
-    [("predict", "three_unit.yaml"), ("predict", "--nope")],
+    [("predict", "three_unit.yaml"), ("predict", "--nope"), ("help", "sweeps"), ("help",)],
 )
 def test_no_escape_codes_in_pipes(
     run: Any, env: dict[str, str], arguments: tuple[str, ...]
@@ -75,7 +77,7 @@ def test_a_table_fits_a_terminal_of_80_columns(shown: Shown) -> None:
 def test_a_narrow_terminal_names_what_it_leaves_out(shown: Shown) -> None:
     code, text = shown("predict", "three_unit.yaml", columns=60)
     assert code == 0
-    assert "no room for min_eigenvalue_N_per_mm" in text
+    assert "no room for numerical_error_mm" in text
     code, text = shown("predict", "-q", "three_unit.yaml", columns=40)
     assert code == 0
     assert all(pattern in text for pattern in ("000", "101", "111"))
@@ -92,3 +94,14 @@ def test_no_progress_in_a_pipe(run: Any, folder: Path) -> None:
     assert "\r" not in result.stderr
     assert "%" not in result.stderr
     assert "1,048,576 stable" in result.stderr
+
+
+@pytest.mark.parametrize("columns", [40, 120])
+def test_pages_are_rendered_in_the_width_of_the_terminal(shown: Shown, columns: int) -> None:
+    code, text = shown("help", "sweeps", columns=columns)
+    lines = [ESCAPES.sub("", line) for line in text.split("\n")]
+    assert code == 0
+    assert "\x1b[" in text
+    assert max(map(len, lines)) <= columns
+    assert not any(line.startswith("#") or "|---|" in line for line in lines)
+    assert "(dpg help" in " ".join(" ".join(lines).split())
