@@ -15,12 +15,13 @@ from dpgcli.states.wells import ByUnit, Wells, opening_of, single_units
 class FirstOrder(ByUnit):
     """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
 
-    `rigid_angle` m, and w by which its wall gives way (mm); `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,
-    a strut's by one of its two units; `by_chord`, `by_near_strut`, `by_far_strut` the answer of
-    the near corner to those, rad/mm (of the far corner: near and far exchanged). A ground unit
-    carries no force and has all of them zero. Close to the loss of bistability, and without a
-    hinge, the answers grow without bound: they are then scaled down to a tenth of m. `turn` is
-    what both corners may turn by in any pattern (rad), not scaled down. Shapes as in `Wells`.
+    `rigid_angle` m, and `wall` by which its wall gives way (mm); `chord` and `strut` the
+    extensions (mm) that the rigid unit's forces cause, a strut's by one of its two units;
+    `by_chord`, `by_near_strut`, `by_far_strut` the answer of the near corner to those, rad/mm (of
+    the far corner: near and far exchanged). A ground unit carries no force and has all of them
+    zero. Close to the loss of bistability, and without a hinge, the answers grow without bound:
+    they are then scaled down to a tenth of m. `turn` is what both corners may turn by in any
+    pattern (rad), not scaled down. Shapes as in `Wells`.
     """
 
     rigid_angle: Array
