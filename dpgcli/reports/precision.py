@@ -140,7 +140,7 @@ def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
             fmt=MARKERS[group],
             color=COLORS[group],
             ms=6,
-            label=f"{number}  {row['method']} ({LABELS[group]})",
+            label=_named(number, row),
         )
         places.append((x, y))
     axes.margins(0.08)
@@ -166,6 +166,10 @@ def _near(
         else:
             found.append((place, [number]))
     return found
+
+
+def _named(number: int, row: Row) -> str:
+    return f"{number}  {row['method']} ({LABELS[row['group']]})"
 
 
 def _which(row: Row) -> str:
