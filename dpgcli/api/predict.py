@@ -106,7 +106,8 @@ def predict(
 
     `settings` change keys of the spec; `patterns` are globs such as "1*1", none for all states;
     `columns` names columns or groups of them. `tolerance` is the largest residual over the forces
-    in play; a `target_error` (mm, of the tips) takes the cheapest way that is bounded by it.
+    in play; a `target_error` (mm, of the tips) takes the cheapest accuracy level that is bounded by
+    it.
     Raises SpecError for a wrong spec, UsageError for wrong choices, NothingSelectedError where no
     pattern matches.
 

@@ -43,7 +43,8 @@ BRAILLE = "\u28ff"
 def predict(
     spec: SpecPath,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
     ] = None,
     printed_as: Annotated[
         Format | None,
@@ -58,7 +59,8 @@ def predict(
     tolerance: Tolerance = None,
     target_error: TargetError = None,
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
+        Path | None,
+        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
     ] = None,
     overlay: Annotated[
         bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
@@ -207,7 +209,8 @@ def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
-            "no method promises that before the work: numerical_error_mm says what was reached"
+            "no accuracy level promises that before the work: "
+            "numerical_error_mm says what was reached"
         )
     return f"chosen for the target error: {level.name}; {promise}"
 

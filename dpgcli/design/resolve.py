@@ -31,7 +31,7 @@ NO_BARS = Issue(
     ("finger", LINEAR_STIFFNESS),
     "a stiffness > 0 in N/mm, or .inf",
     "nothing",
-    "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+    "the study calls the bars nearly rigid: 1.0e+4; .inf is rigid",
 )
 Pairs = Sequence[tuple[UnitGroup, Value]]
 

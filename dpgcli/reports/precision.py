@@ -50,10 +50,10 @@ def cheapest_way(rows: Sequence[Row], target: float) -> str:
         if row["group"] == "ladder" and row["max_tip_error_mm"] <= target and not row["n_missing"]
     ]
     if not meets:
-        return f"no way is below {target:g} mm"
+        return f"no method is below {target:g} mm"
     best = min(meets, key=lambda row: float(row["seconds_per_state"]))
     return (
-        f"cheapest below {target:g} mm: {best['way']}, "
+        f"cheapest below {target:g} mm: {best['method']}, "
         f"{best['seconds_per_state'] * 1e6:.3g} µs a state, error {best['max_tip_error_mm']:.1e} mm"
     )
 
@@ -82,7 +82,7 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     axis = f"1e{left:+03d}".ljust(WIDTH - 6) + f"1e{right:+03d}"
     lines.append(f"{'':>7}{axis}  s a state")
     lines += [
-        f"{'':>7}{mark}  {row['way']} ({LABELS[row['group']]})"
+        f"{'':>7}{mark}  {row['method']} ({LABELS[row['group']]})"
         for mark, row in zip(MARKS, shown, strict=False)
     ]
     if model is not None:
@@ -169,7 +169,7 @@ def _near(
 
 
 def _named(number: int, row: Row) -> str:
-    return f"{number}  {row['way']} ({LABELS[row['group']]})"
+    return f"{number}  {row['method']} ({LABELS[row['group']]})"
 
 
 def _which(row: Row) -> str:
@@ -180,7 +180,7 @@ def _which(row: Row) -> str:
 
 def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
     """Slowdowns against a record, by times relative to the NumPy kernel's, in words."""
-    key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
+    key = ("group", "method", "n_units", "n_designs", "stiffness_ratio")
     before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
     slower, n_compared = [], 0
     for row in now:
@@ -190,6 +190,6 @@ def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
         n_compared += 1
         ratio = row["relative_time"] / old
         if ratio > SLOWDOWN:
-            slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, {_which(row)}")
+            slower.append(f"{ratio:.2f} times: {row['group']}, {row['method']}, {_which(row)}")
     verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWDOWN}"
     return [verdict, *slower]
