@@ -9,7 +9,9 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 from typer.models import OptionInfo
@@ -203,6 +205,25 @@ def headings(path: Path) -> set[str]:
     text = FENCED.sub("", path.read_text(encoding="utf-8"))
     titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_the_picture_is_what_the_command_draws(tmp_path: Path) -> None:
+    """To a pixel: other versions of Matplotlib may write the same in other words."""
+    (named,) = re.findall(r"!\[[^]]+\]\((\S+\.svg)\)", PAGES["README"].read_text(encoding="utf-8"))
+    spec = ROOT / "configs" / "three_unit.yaml"
+    plot = str(tmp_path / "states.svg")
+    dpg.predict(spec).draw(plot)
+    shown, drawn = (_drawing(Path(path)) for path in (ROOT / named, plot))
+    assert shown[0] == drawn[0]
+    np.testing.assert_allclose(shown[1], drawn[1], atol=1.0)
+
+
+def _drawing(path: Path) -> tuple[list[str], np.ndarray]:
+    """The texts of a picture and the coordinates of its lines."""
+    elements = list(ElementTree.parse(path).iter())
+    texts = [element.text for element in elements if (element.text or "").strip()]
+    lines = " ".join(element.get("d", "") for element in elements)
+    return texts, np.array(re.findall(r"-?[0-9.]+", lines), float)
 
 
 def test_the_spec_shown_is_valid(tmp_path: Path) -> None:
