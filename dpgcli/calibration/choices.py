@@ -30,9 +30,11 @@ class Quantity(StrEnum):
 
 
 class Branches(StrEnum):
-    """The part of a record that is fitted: all of it, or its slow pieces."""
+    """The part of a record that is fitted: both ways of the travel, one of them, or slow pieces."""
 
-    ALL = "all"
+    BOTH = "both"
+    LOADING = "loading"
+    UNLOADING = "unloading"
     QUASI_STATIC = "quasi-static"
 
 

@@ -30,7 +30,8 @@ def check(
         ProblemFormat, typer.Option("--format", help="How to list designs that fail")
     ] = ProblemFormat.TEXT,
     summary_file: Annotated[
-        Path | None, typer.Option("--summary-file", help="Append Markdown to this file")
+        Path | None,
+        typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
     ] = None,
 ) -> None:
     """Check that every design of a table meets requirements."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.known import Frame
     from dpgcli.states.plan import Request
 
 SpecPath = Annotated[Path, typer.Argument(metavar="SPEC", help="YAML spec; - reads standard input")]
@@ -126,20 +125,19 @@ def check_table_name(path: Path | None) -> None:
         )
 
 
-def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
-    """Where the lattice lies in given data."""
-    from dpgcli.calibration.known import Frame
-
-    return Frame(
-        _point("--first-station", first_station or "0,0"),
-        _point("--tip-offset", tip_offset or "0,0"),
-    )
+def frame_of(
+    first_station: str | None, tip_offset: str | None
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Where the lattice lies in given data, as far as the options say it."""
+    return _point("--first-station", first_station), _point("--tip-offset", tip_offset)
 
 
-def _point(option: str, text: str) -> tuple[float, float]:
+def _point(option: str, text: str | None) -> tuple[float, float] | None:
     from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
 
+    if text is None:
+        return None
     try:
         x, y = map(float, text.split(","))
     except ValueError:

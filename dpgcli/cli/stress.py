@@ -45,7 +45,10 @@ def stress(
         Format, typer.Option("--format", help="A summary, or every case as json or csv")
     ] = Format.TABLE,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write every case to this Parquet file")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write every case to this Parquet file"
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
