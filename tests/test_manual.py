@@ -129,6 +129,7 @@ def test_a_page_does_what_it_shows(
     CalculiX `ccx`.
     """
     names: dict[str, object] = {}
+    before = ""
     for block in blocks(page):
         if ("slow" in block.words and not with_slow) or ("ccx" in block.words and not CCX):
             continue
@@ -138,9 +139,11 @@ def test_a_page_does_what_it_shows(
             capsys.readouterr()
             exec(block.text, names)
         elif block.language == "text":
+            assert before == "python", "what is printed stands below what prints it"
             assert capsys.readouterr().out == block.text
         elif block.words:
             Path(block.words[0]).write_text(block.text, encoding="utf-8")
+        before = block.language
 
 
 CCX = shutil.which("ccx")
