@@ -180,15 +180,18 @@ def _axes(space: Any) -> Any:
     """Axes of a space, data frames among them as values that go together."""
     if not isinstance(space, list | tuple):
         return space
-    return [
-        {"paired": axis["table"].to_dict(orient="list")} if _is_frame(axis) else axis
-        for axis in space
-    ]
+    return [{"paired": _columns(axis["table"])} if _is_frame(axis) else axis for axis in space]
 
 
 def _is_frame(axis: Any) -> bool:
-    """Whether an axis is a table of pandas."""
-    return isinstance(axis, Mapping) and hasattr(axis.get("table"), "to_dict")
+    """Whether an axis is a table of pandas or Arrow."""
+    table = axis.get("table") if isinstance(axis, Mapping) else None
+    return hasattr(table, "to_dict") or hasattr(table, "to_pydict")
+
+
+def _columns(table: Any) -> Any:
+    """The columns of a table of pandas or Arrow as lists."""
+    return table.to_pydict() if hasattr(table, "to_pydict") else table.to_dict(orient="list")
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:
