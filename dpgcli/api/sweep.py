@@ -23,6 +23,7 @@ from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
@@ -180,15 +181,20 @@ def _axes(space: Any) -> Any:
     """Axes of a space, data frames among them as values that go together."""
     if not isinstance(space, list | tuple):
         return space
-    return [
-        {"paired": axis["table"].to_dict(orient="list")} if _is_frame(axis) else axis
-        for axis in space
-    ]
+    return [{"paired": _columns(axis["table"])} if _is_frame(axis) else axis for axis in space]
 
 
 def _is_frame(axis: Any) -> bool:
-    """Whether an axis is a table of pandas."""
-    return isinstance(axis, Mapping) and hasattr(axis.get("table"), "to_dict")
+    """Whether an axis is a table of pandas, of Arrow, or ours."""
+    table = axis.get("table") if isinstance(axis, Mapping) else None
+    return hasattr(table, "to_dict") or hasattr(table, "to_pandas")
+
+
+def _columns(table: Any) -> dict[Any, list[Any]]:
+    frame = frame_of(table)
+    if twice := [str(name) for name in frame.columns[frame.columns.duplicated()]]:
+        raise UsageError(f"table: expected each column once, found {', '.join(twice)} again")
+    return {name: frame[name].tolist() for name in frame}
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:
