@@ -24,9 +24,9 @@ from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
 from dpgcli.files.known_states import states_of
+from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record
-from dpgcli.files.table_writer import write_states
 from dpgcli.reports.precision import changes, cheapest_way, draw_precision
 from dpgcli.sweeps.differences import differences
 
@@ -48,7 +48,7 @@ class BenchResult:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """The cheapest way for the target error, and what got slower since the record."""
+        """The cheapest method for the target error, and what got slower since the record."""
         cheapest = (
             () if self.target_error is None else (cheapest_way(self.rows, self.target_error),)
         )

@@ -98,7 +98,7 @@ def compare(
     first_station: Place = None,
     tip_offset: Place = None,
 ) -> CompareResult:
-    """Hold predictions against finite elements or measurements.
+    """Compare predictions with finite elements or measurements.
 
     `data` has `pattern` and what is known of it; `shapes` the layer's points: see
     `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`

@@ -32,7 +32,7 @@ from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
-from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
@@ -121,7 +121,8 @@ def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
 
 
 def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
-    return with_settings(Document("spec", plain(data), {}), setting_texts(settings))
+    own = without_free_keys(plain(data))
+    return with_settings(Document("spec", own, {}), setting_texts(settings))
 
 
 def setting_texts(settings: Settings, field: str = "settings") -> tuple[str, ...]:

@@ -8,7 +8,7 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
     "stroke_mm",
 )
 
-LEVER = "segment_height_mm"  # fitted to known states by default
+FITTED_BY_DEFAULT = "segment_height_mm"  # what is fitted to known states if nothing is named
 
 
 class Loss(StrEnum):

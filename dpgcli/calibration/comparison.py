@@ -46,7 +46,7 @@ class Comparison:
 
 
 def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
-    """Hold the states of one finger against known ones.
+    """Compare the states of one finger with known ones.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> finger = uniform_finger(2, **STUDY)

@@ -117,8 +117,9 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     settled = settle(units, chain_potential, patterns, DEFAULT_TOLERANCE)
     is_state = settled.status == Status.STABLE
     chain, values = settled.potential.coordinates, settled.equilibrium.coordinates
-    _, near, far, _ = internal(values, finger.is_rigid)
-    angles = np.where(is_state, -np.cumsum(near + far, axis=0), np.nan)
+    shape = internal(chain.without_walls(values), finger.is_rigid)
+    turned = -np.cumsum(shape.near_angle + shape.far_angle, axis=0)
+    angles = np.where(is_state, turned, np.nan)
     stations = chain.stations(values)
     x, y = (np.where(is_state, nodes, np.nan) for nodes in (stations.base_x, stations.base_y))
     pose = np.stack((x[-1], y[-1], angles[-1]))
@@ -127,7 +128,7 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     line = Frame(frame.first_station, (0.0, frame.tip[1])).tips(poses)
     tip = frame.tips(pose)
     openings = chain.openings(values)
-    pushes = -settled.finger.springs(openings).force
+    pushes = -settled.finger.springs(chain.springs(values).extension).force
     return LatticeStates(
         settled=settled,
         pose=pose,

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dpgcli.benchmark.bench import Row
 
 GROUPS = {
-    "ladder": "Ways to the states, in a batch as large as a sweep's",
+    "ladder": "Methods, with a batch of states as large as a sweep's",
     "one finger": "The same, for the states of this finger alone",
     "peer": "What one would do instead, state by state",
     "model": "The lattice against the data given",
@@ -48,26 +48,33 @@ SHOWN = {
 }  # fmt: skip
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
+Repeats = Annotated[
+    int, typer.Option("--repeats", min=1, max=1000, help="How often each method is timed")
+]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
 ]
 Against = Annotated[
-    Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
+    Path | None,
+    typer.Option("--against", metavar="FILE", help="CSV of known tips, for the model's own error"),
 ]
-PrintedAs = Annotated[Format, typer.Option("--format", help="How to print what was measured")]
+PrintedAs = Annotated[Format, typer.Option("--format", help="How to print rows")]
 Output = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
 ]
 Plot = Annotated[
-    Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw error over time: a .svg or .png file"),
 ]
 Record = Annotated[
-    Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write all rows and the machine to this file"),
 ]
 Compare = Annotated[
-    Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
+    Path | None,
+    typer.Option("--compare", metavar="FILE", help="Say what got slower since this --json file"),
 ]
 
 
@@ -132,7 +139,7 @@ def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
 
     def show(row: "Row") -> None:
         if interactive:
-            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
+            print(f"\r{row['group']}: {row['method']}"[:70].ljust(71), end="\r", file=sys.stderr)
 
     yield show
     if interactive:
@@ -165,9 +172,9 @@ def _print_tables(rows: "Sequence[Row]") -> None:
             names = SHOWN.get(group, SHOWN["ladder"])
             print(f"{title}\n")
             print_grid(
-                {"way": [row["way"] for row in own]}
+                {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
-                left=("way",),
+                left=("method",),
             )
             print()
     print("\n".join(text_figure(rows)))

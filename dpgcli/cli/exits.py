@@ -15,6 +15,7 @@ import typer
 
 from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
+from dpgcli.cli.usage import refusal
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
@@ -127,15 +128,23 @@ def _code_of(app: Callable[..., object]) -> int:
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        getattr(error, "show", traceback.print_exc)()
-        return error.exit_code
+        if type(error).__name__ == "NoArgsIsHelpError":
+            print(error, file=sys.stderr)
+        else:
+            say(f"dpg: {refusal(error)}")
+        return ExitCode.USAGE
     except Terminated:  # before a command has begun, or after it is done
         say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
     except (KeyboardInterrupt, typer.Abort):
         say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
-    return code if isinstance(code, int) else ExitCode.DONE
+    except OSError as error:  # commands answer for their own: these are of shell completion
+        say(f"dpg: cannot install completion: {error}")
+        return ExitCode.USAGE
+    if isinstance(code, ExitCode):
+        return code
+    return ExitCode.USAGE if code else ExitCode.DONE  # of typer, which knows none of ours
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

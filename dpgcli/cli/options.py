@@ -24,7 +24,7 @@ Patterns = Annotated[
 ColumnNames = Annotated[
     str,
     typer.Option(
-        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see explain"
+        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see dpg help columns"
     ),
 ]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]
@@ -44,7 +44,9 @@ POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of te
 TargetError = Annotated[
     str | None,
     typer.Option(
-        "--target-error", metavar="LENGTH", help="Cheapest way whose tips are this exact: 0.01mm"
+        "--target-error",
+        metavar="LENGTH",
+        help="Cheapest accuracy level whose tips are this exact: 0.01mm",
     ),
 ]
 

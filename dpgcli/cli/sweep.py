@@ -1,6 +1,8 @@
 """`dpg sweep`: the design space, into two tables."""
 
+import math
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
@@ -27,9 +29,8 @@ from dpgcli.cli.streams import say
 from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from dpgcli.api.sweep import Place
+    from dpgcli.arrays import Columns
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict
@@ -45,7 +46,7 @@ class ExecutorName(StrEnum):
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[  # as it is typed, for Make
-    str, typer.Option("-o", "--output", metavar="<path>", help="Folder of the tables")
+    str, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the tables")
 ]
 Jobs = Annotated[
     int | None,
@@ -67,14 +68,15 @@ Part = Annotated[
 Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
 DepfilePath = Annotated[
-    Path | None, typer.Option("--depfile", help="Write the files read, for Make")
+    Path | None, typer.Option("--depfile", metavar="FILE", help="Write the files read, for Make")
 ]
 Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
 ]
 SummaryFile = Annotated[
-    Path | None, typer.Option("--summary-file", help="Append the report to this file")
+    Path | None,
+    typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
 ]
 
 
@@ -169,7 +171,7 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
         return
     from dpgcli.sweeps.executors import start_fork_server
 
-    start_fork_server("dpgcli.studies.sweep", "filelock", "shapely")
+    start_fork_server("dpgcli.studies.work", "filelock", "shapely")
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
@@ -217,11 +219,11 @@ def _judge(
     return int((designs["status"] == "failed").sum()), code_of(verdicts, is_written=is_written)
 
 
-def _chosen(designs: "pd.DataFrame") -> str:
+def _chosen(designs: "Columns") -> str:
     """The accuracy levels that designs took for the target error."""
-    counts = designs.loc[designs["accuracy_level"] != "", "accuracy_level"].value_counts()
-    ways = ", ".join(f"{count:,} {level}" for level, count in counts.items())
-    bound = designs["error_bound_mm"].max()
+    counts = Counter(level for level in designs["accuracy_level"].tolist() if level)
+    ways = ", ".join(f"{count:,} {level}" for level, count in counts.most_common())
+    bound = max((mm for mm in designs["error_bound_mm"].tolist() if mm == mm), default=math.nan)
     return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 
 

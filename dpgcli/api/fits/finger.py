@@ -21,7 +21,7 @@ from dpgcli.api.inputs import (
     frame_of,
     scene_input,
 )
-from dpgcli.calibration.choices import LEVER, Loss, Target
+from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.errors import Field, UsageError
@@ -37,7 +37,7 @@ def fit_finger(
     spec: SpecInput,
     states: Tabular,
     *,
-    free: str | Sequence[str] = (LEVER,),
+    free: str | Sequence[str] = (FITTED_BY_DEFAULT,),
     target: str = "tips",
     settings: Settings = (),
     first_station: Place = None,

@@ -9,11 +9,15 @@ from dpgcli.calibration.choices import Loss
 from dpgcli.cli.printing import Format
 
 Output = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Write the calibration to this YAML file")
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write the calibration to this YAML file"),
 ]
-Printed = Annotated[Format, typer.Option("--format", help="How to print the values")]
+Printed = Annotated[Format, typer.Option("--format", help="How to print rows")]
 Plot = Annotated[
-    Path | None, typer.Option("--plot", help="Draw data, fit and residuals: a .svg or .png file")
+    Path | None,
+    typer.Option(
+        "--plot", metavar="FILE", help="Draw data, fit and residuals: a .svg or .png file"
+    ),
 ]
 Bootstrap = Annotated[
     int,

@@ -56,7 +56,7 @@ OWN = {
 HINTS = {
     "units": "a whole number without quotes or decimal point",
     "stroke_mm": "stroke is dome height minus unit separation",
-    "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+    "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e+4; .inf is rigid",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
     "segment_height_mm": "half the chamber width + half the limiting layer",
@@ -146,7 +146,7 @@ def _hint(key: str, error: Any) -> str:
     if error["type"] == "model_type":
         return "keys below it, indented"
     if isinstance(value, str) and key not in (*TEXTS, *PAIRS):
-        return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
+        return "a plain number such as 6.5 or 1.0e+4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if is_number and value > 0 and key not in (*BOUNDED, *TEXTS, *PAIRS):
         return OUT_OF_RANGE

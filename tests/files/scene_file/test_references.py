@@ -288,7 +288,7 @@ def test_bars_may_be_fitted_too(write, scene, problems):
     assert scene("[published, a.yaml]").finger.linear_stiffness.item() == 1e4
     assert problems("published", text=soft) == [
         "x.yaml:1:1: finger.linear_stiffness_N_per_mm: expected a stiffness > 0 in N/mm, or .inf, "
-        "found nothing (the study calls the bars nearly rigid: 1.0e4; .inf is rigid)"
+        "found nothing (the study calls the bars nearly rigid: 1.0e+4; .inf is rigid)"
     ]
 
 
