@@ -27,12 +27,7 @@ from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.text import KeyPath
 
 SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
-NO_BARS = Issue(
-    ("finger", LINEAR_STIFFNESS),
-    "a stiffness > 0 in N/mm, or .inf",
-    "nothing",
-    "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
-)
+NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
 Pairs = Sequence[tuple[Group, Value]]
 
 
@@ -54,12 +49,14 @@ class Resolution:
     def gravest_origins(self) -> Indices:
         """What to trust least of each design's values, (design,), places in `ORIGINS`.
 
-        Values that the geometry alone fixes count as given.
+        Values that the geometry alone fixes count as given, as does an assumed stiffness of the bars,
+        which hardly matters.
         """
         gravest = np.zeros(self.design.n_designs, np.int64)
-        derived, given = map(ORIGINS.index, (Origin.DERIVED, Origin.GIVEN))
+        given, *harmless = map(ORIGINS.index, (Origin.GIVEN, Origin.DERIVED, Origin.ASSUMED))
         for _, value in (pair for pairs in self.values.values() for pair in pairs):
-            gravest = np.maximum(gravest, np.where(value.origin == derived, given, value.origin))
+            is_harmless = np.isin(value.origin, harmless)
+            gravest = np.maximum(gravest, np.where(is_harmless, given, value.origin))
         return gravest
 
     @cached_property
@@ -170,11 +167,7 @@ def resolve(design: Design) -> Resolution:
         chosen = [base] if derivation is SEGMENT_HEIGHT else groups
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
-    bars = _bars(design, base)
-    if bars is None:
-        problems.everywhere(NO_BARS)
-    else:
-        values[LINEAR_STIFFNESS] = [(base, bars)]
+    values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
     return Resolution(design, domes, values, problems)
 
 
@@ -197,8 +190,8 @@ def _linearity_issue(where: KeyPath, law: str | None, given: Array, design: int)
     return Issue(where, f"none beside law: {law}", number(of_design(given, design)), hint)
 
 
-def _bars(design: Design, base: Group) -> Value | None:
-    """The stiffness of the bars: given, or fitted."""
+def _bars(design: Design, base: Group) -> Value:
+    """The stiffness of the bars: given, fitted, or assumed."""
     if design.linear_stiffness is not None:
         return all_by(design.linear_stiffness, Origin.GIVEN, "as given")
     for place, calibration in enumerate(base.calibrations):
@@ -209,7 +202,8 @@ def _bars(design: Design, base: Group) -> Value | None:
             return replace(
                 value, standard_error=None if error is None else np.array([error]), file=place
             )
-    return None
+    rule = "the study calls the bars nearly rigid and names no number"
+    return all_by(np.array([NEARLY_RIGID]), Origin.ASSUMED, rule)
 
 
 def _by_unit(n_units: int, pairs: Sequence[tuple[Group, Array]]) -> Array:

@@ -19,6 +19,7 @@ class Origin(StrEnum):
     INTERPOLATED = "interpolated"
     SCALED = "scaled"
     EXTRAPOLATED = "extrapolated"
+    ASSUMED = "assumed"
 
 
 ORIGINS = tuple(Origin)

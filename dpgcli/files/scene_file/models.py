@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.design import dimensions
@@ -26,7 +26,6 @@ from dpgcli.files.sections import (
     UnitLattice,
 )
 
-BARS: list[JsonValue] = [{"required": ["linear_stiffness_N_per_mm"]}, {"required": ["calibration"]}]
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
 
 
@@ -40,14 +39,13 @@ class UnitOverride(Section):
 class FingerSpec(Section):
     """One finger."""
 
-    model_config = ConfigDict(json_schema_extra={"anyOf": BARS})
-
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."
     )
     linear_stiffness_N_per_mm: BarStiffness | None = Field(
         default=None,
-        description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid.",
+        description="Stiffness k_L of every bar, in N/mm: 1e4 unless given or calibrated; "
+        ".inf makes the bars rigid.",
     )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,

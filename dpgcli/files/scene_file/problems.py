@@ -53,7 +53,7 @@ OWN = {
 HINTS = {
     "units": "a whole number without quotes or decimal point",
     "stroke_mm": "stroke is dome height minus unit separation",
-    "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+    "linear_stiffness_N_per_mm": "1.0e4 is assumed where it is left out; .inf is rigid",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
     "segment_height_mm": "half the chamber width + half the limiting layer",
