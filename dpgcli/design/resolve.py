@@ -9,6 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import (
+    LEAVE_ONE_OUT,
     LINEAR_STIFFNESS,
     Design,
     Group,
@@ -18,16 +19,23 @@ from dpgcli.design.dimensions import (
     range_issues,
 )
 from dpgcli.design.domes import Domes, domes_of
+from dpgcli.design.model_error import known_model_error
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
-from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source
-from dpgcli.design.uncertainty import Share, uncertainty_of
+from dpgcli.design.scene import ORIGINS, Gripper, ModelError, Origin, Scene, Source, Uncertainty
+from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.text import KeyPath
 
 SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
 NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
+NO_LEAVE_ONE_OUT = Issue(
+    ("model_error",),
+    "a calibration in use that has a leave-one-out error",
+    "none",
+    "dpg fit finger writes one; or give a percentage such as 5%",
+)
 Pairs = Sequence[tuple[Group, Value]]
 
 
@@ -49,8 +57,8 @@ class Resolution:
     def gravest_origins(self) -> Indices:
         """What to trust least of each design's values, (design,), places in `ORIGINS`.
 
-        Values that the geometry alone fixes count as given, as does an assumed stiffness of the bars,
-        which hardly matters.
+        Values that the geometry alone fixes count as given; so does an assumed stiffness of the
+        bars, which hardly matters.
         """
         gravest = np.zeros(self.design.n_designs, np.int64)
         given, *harmless = map(ORIGINS.index, (Origin.GIVEN, Origin.DERIVED, Origin.ASSUMED))
@@ -86,8 +94,16 @@ class Resolution:
             tuple(self._sources()),
             gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
             None if layer is None else np.asarray(layer).item(),
-            uncertainty_of(self.design.calibrations, self._shares()),
+            self._uncertainty(),
+            self.model_error,
         )
+
+    @property
+    def model_error(self) -> ModelError:
+        """What is known of the model's own error, for a single design."""
+        values = [value for pairs in self.values.values() for _, value in pairs]
+        lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
+        return known_model_error(self.design, lever, values)
 
     def batch(self, designs: Indices) -> Scene:
         """What some of the designs describe, none of them wrong, with arrays by design.
@@ -125,6 +141,13 @@ class Resolution:
                 same[source] = (*same.get(source, ()), *units)
             for source, units in sorted(same.items(), key=lambda item: min(item[1])):
                 yield replace(source, units=_ranges(units))
+
+    def _uncertainty(self) -> Uncertainty | None:
+        """What a single design's values, and the model if the spec counts it in, may be off by."""
+        design = self.design
+        steps = tolerance_steps(design, self.lattice, lambda moved: resolve(moved).lattice)
+        share = None if design.model_error is None else self.model_error.share
+        return uncertainty_of(design.calibrations, [*self._shares()], [*steps], share or 0.0)
 
     def _shares(self) -> Iterator[Share]:
         """Standard errors of what comes from calibration files, unit by unit."""
@@ -168,7 +191,12 @@ def resolve(design: Design) -> Resolution:
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
     values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
-    return Resolution(design, domes, values, problems)
+    resolution = Resolution(design, domes, values, problems)
+    for issue in tolerance_issues(design, [*values]):
+        problems.everywhere(issue)
+    if design.model_error == LEAVE_ONE_OUT and resolution.model_error.share is None:
+        problems.everywhere(NO_LEAVE_ONE_OUT)
+    return resolution
 
 
 def _check_linearities(design: Design, domes: Domes, problems: Problems) -> None:

@@ -148,6 +148,8 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
         "dpg.sources": json.dumps(
             [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),
+        "dpg.model_error": plan.scene.model_error.text,
+        **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
         "dpg.versions": versions(),
     }
 

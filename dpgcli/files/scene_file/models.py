@@ -16,6 +16,7 @@ from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Calibration
+from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
     BarStiffness,
     Geometry,
@@ -88,6 +89,14 @@ class Spec(Section):
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+    uncertainty: Tolerances | None = Field(
+        default=None, description="Standard uncertainties of values, as tolerances of the mold."
+    )
+    model_error: ModelErrorSpec = Field(
+        default=None,
+        description="Standard uncertainty of the model itself: a percentage of the deflection, or "
+        "leave_one_out, that of the calibration.",
+    )
 
     @cached_property
     def resolution(self) -> Resolution:
@@ -99,6 +108,7 @@ class Spec(Section):
         """What it says, as a batch of one design."""
         finger = self.finger
         bars = finger.linear_stiffness_N_per_mm
+        said = self.model_error
         return Design(
             finger.units,
             _section(finger),
@@ -107,6 +117,8 @@ class Spec(Section):
             finger.calibrations,
             finger.law,
             _sizes(self.gripper),
+            tolerances={} if self.uncertainty is None else self.uncertainty.by_key,
+            model_error=said if (share := share_of(said)) is None else share,
         )
 
 
