@@ -23,6 +23,7 @@ ERRORS = np.array([0.1, 0.8, 0.02])  # mm, N mm/rad, mm
 CORRELATION = np.array([[1.0, 0.6, -0.3], [0.6, 1.0, 0.0], [-0.3, 0.0, 1.0]])
 UNCERTAIN = ("tip_x_uncertainty_mm", "tip_y_uncertainty_mm", "tip_angle_uncertainty_rad")
 N_DRAWN = 20_000
+LAYER = 30.0  # mm: so thick that its turning shows
 
 
 def uncertainty() -> Uncertainty:
@@ -112,7 +113,7 @@ def drawn_apertures(finger: Finger, pattern: str, sigma: Array, mount: float) ->
     units = UnitSolutions.of(finger.changed(stroke=finger.stroke + off[[0]]))
     settled = settle(units, chain_potential, inverted, 1e-10)
     gripper = Gripper(60.0 + off[1], mount + off[2])
-    around = Surroundings(gripper, 1.5 + off[3])
+    around = Surroundings(gripper, LAYER + off[3])
     return SolvedFingers.of(settled, around, 0.0, with_compliance=False).in_gripper.aperture
 
 
@@ -131,7 +132,7 @@ def test_that_of_the_aperture_is_the_scatter_of_grippers_that_are_drawn(
         Step("limiting_layer_thickness_mm", {}, layer_thickness=sigma[3]),
     )
     gripper = Gripper(60.0, mount)
-    scene = Scene(finger, (), gripper, 1.5, Uncertainty(steps, np.eye(4)))
+    scene = Scene(finger, (), gripper, LAYER, Uncertainty(steps, np.eye(4)))
     request = Request(patterns=(pattern,), columns=("uncertainty",))
     stated = predict(scene, request).arrays()["aperture_uncertainty_mm"][0]
     assert stated == pytest.approx(drawn_apertures(finger, pattern, sigma, mount).std(), rel=0.02)

@@ -260,7 +260,8 @@ def test_graded_units_scale_one_by_one(write, scene):
     assert (second.units, second.origin) == ("3-4", Origin.SCALED)
     assert second.standard_error == pytest.approx(0.5 * higher / 20.0, rel=1e-14)
     assert found.uncertainty is not None
-    (direction,) = found.uncertainty.directions
+    (step,) = found.uncertainty.steps
+    direction = step.finger
     errors = np.broadcast_to(direction["bistable_stiffness"], (4, 1))[:, 0]
     np.testing.assert_allclose(errors, 0.5 * np.array([1, 1, higher / 20, higher / 20]))
 
@@ -272,7 +273,7 @@ def test_errors_of_one_file_are_correlated_as_it_says_those_of_two_are_not(write
     write("b.yaml", HEAD + STUDY + HINGE)
     found = scene("[a.yaml, b.yaml]").uncertainty
     assert found is not None
-    order = [next(iter(direction)) for direction in found.directions]
+    order = [next(iter(step.finger)) for step in found.steps]
     places = [order.index(n) for n in ("bistable_stiffness", "force_linearity", "hinge_stiffness")]
     expected = [[1, -0.6, 0], [-0.6, 1, 0], [0, 0, 1]]
     assert found.covariance[np.ix_(places, places)].tolist() == expected

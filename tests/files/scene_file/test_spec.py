@@ -316,7 +316,8 @@ def test_settings_reach_overrides_written_as_numbers(read):
         ),
         (
             "zzz=3",
-            "settings: zzz: expected a known key, found zzz (known here: finger, gripper)",
+            "settings: zzz: expected a known key, found zzz "
+            "(known here: finger, gripper, uncertainty, model_error)",
         ),
     ],
 )
