@@ -56,7 +56,7 @@ class Problem:
 
     @property
     def statement(self) -> str:
-        """What is wrong, the place left out."""
+        """The problem in words, without its place."""
         hint = f" ({self.hint})" if self.hint else ""
         return f"{self.key}: expected {self.expected}, found {self.found}{hint}"
 
@@ -81,7 +81,7 @@ class SpecError(DpgError):
 
 
 class UsageError(DpgError):
-    """What was asked for makes no sense for this scene; the message says what to do."""
+    """A choice that makes no sense for this scene; the message says what to do."""
 
 
 class WorkplaceError(DpgError):

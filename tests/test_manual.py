@@ -1,17 +1,18 @@
-"""The README is current: it names everything, and its sessions are what the program prints."""
+"""The manual is current: it names everything, and its sessions are what the program prints."""
 
 import inspect
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 from typer.models import OptionInfo
-from typer.testing import CliRunner
 
 import dpgcli as dpg
 from dpgcli.benchmark.ablation import ABLATIONS
@@ -21,6 +22,7 @@ from dpgcli.cli import (
     compare,
     explain,
     fe,
+    help,
     init,
     merge,
     predict,
@@ -35,7 +37,6 @@ from dpgcli.cli.fit.bistable import bistable
 from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
-from dpgcli.cli.main import app
 from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
@@ -44,11 +45,10 @@ from dpgcli.hard_cases.verdicts import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.sweeps.evaluation import RUNG_COLUMNS, DesignStatus
+from dpgcli.sweeps.evaluation import LEVEL_COLUMNS, DesignStatus
 from dpgcli.sweeps.metrics import METRICS
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = {
     **{
         module.__name__.rpartition(".")[2]: getattr(module, module.__name__.rpartition(".")[2])
@@ -65,6 +65,7 @@ COMMANDS = {
             validate,
             init,
             schema,
+            help,
         )
     },
     "fit bistable": bistable,
@@ -74,44 +75,134 @@ COMMANDS = {
     "fe dome": fe.dome,
     "fe hinge": fe.hinge,
 }
+PAGES = {"README": ROOT / "README.md"} | {
+    path.stem: path for path in sorted((ROOT / "dpgcli" / "manual").glob("*.md"))
+}
+MANUAL = "\n".join(path.read_text(encoding="utf-8") for path in PAGES.values())
+FENCED = re.compile(r"^```(\w+)(.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
+TIMES = re.compile(r"[\d.,]+ (?=s\b|states/s|% of the workers|% in )")
 
 
-def blocks(language: str, text: str = README) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: its language, the words after it, what stands in it."""
+
+    language: str
+    words: tuple[str, ...]
+    text: str
 
 
-def sessions() -> list[list[tuple[str, str]]]:
-    """Commands of each console block with their output."""
-    return [
-        [part.partition("\n")[::2] for part in block.split("$ ")[1:]] for block in blocks("console")
-    ]
+def blocks(page: str) -> list[Block]:
+    found = FENCED.findall(PAGES[page].read_text(encoding="utf-8"))
+    return [Block(language, tuple(words.split()), text) for language, words, text in found]
 
 
-@pytest.mark.parametrize("session", sessions(), ids=lambda session: session[0][0][:60])
-def test_a_session_prints_what_the_manual_shows(
-    session: list[tuple[str, str]], tmp_path: Path
+def stories() -> Iterator[ParameterSet]:
+    """Every page, and those with slow sessions once more with these."""
+    for page in PAGES:
+        yield pytest.param(page, False, id=page)
+        if any("slow" in block.words for block in blocks(page)):
+            yield pytest.param(page, True, id=f"{page}, slow", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("page", "with_slow"), [*stories()])
+def test_a_page_does_what_it_shows(
+    page: str,
+    with_slow: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its commands one after the other, in a folder of its own beside the examples."""
-    (tmp_path / "configs").symlink_to(ROOT / "configs")
-    run = "from dpgcli.__main__ import main; main()"
-    for command, expected in session:
-        program, *arguments = shlex.split(command)
-        assert program == "dpg"
-        result = subprocess.run(
-            [sys.executable, "-c", run, *arguments],
-            cwd=tmp_path,
-            env={**os.environ, "NO_COLOR": "1"},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert LAST_DIGITS.sub("#", result.stdout) == LAST_DIGITS.sub("#", expected)
+    """Its blocks one after the other, in a folder of their own with the examples.
+
+    A `console` block is a session, a `python` block is run and a `text` block after it is what it
+    prints, a block with a file's name is that file. What takes long is marked `slow`, what needs
+    CalculiX `ccx`.
+    """
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    monkeypatch.chdir(tmp_path)
+    programs = Path(sys.executable).parent
+    monkeypatch.setenv("PATH", os.pathsep.join((str(programs), os.environ["PATH"])))
+    monkeypatch.setenv("NO_COLOR", "1")
+    names: dict[str, object] = {}
+    for block in blocks(page):
+        if ("slow" in block.words and not with_slow) or ("ccx" in block.words and not CCX):
+            continue
+        if block.language == "console":
+            run_session(block.text)
+        elif block.language == "python":
+            capsys.readouterr()
+            exec(block.text, names)
+        elif block.language == "text":
+            assert capsys.readouterr().out == block.text
+        elif block.words:
+            Path(block.words[0]).write_text(block.text, encoding="utf-8")
+
+
+CCX = shutil.which("ccx")
+
+
+def run_session(text: str) -> None:
+    """Its commands, each with what it prints: standard output, or all with messages at the end."""
+    for part in text.split("$ ")[1:]:
+        command, _, shown = part.partition("\n")
+        code = re.search(r"# exit code (\d)$", command)
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+        assert done.returncode == (int(code[1]) if code else 0), done.stderr
+        if not is_shown(done.stdout, shown) and not is_shown(done.stdout + done.stderr, shown):
+            assert done.stdout + done.stderr == shown, command
+
+
+def is_shown(printed: str, shown: str) -> bool:
+    """Whether a page shows what is printed; a line of three dots stands for any lines.
+
+    >>> is_shown("1\\n2\\n3\\n", "1\\n...\\n3\\n"), is_shown("1\\n2\\n3\\n", "1\\n3\\n")
+    (True, False)
+    """
+    pattern, printed = (TIMES.sub("#", LAST_DIGITS.sub("#", text)) for text in (shown, printed))
+    lines = (".*?" if line == "...\n" else re.escape(line) for line in pattern.splitlines(True))
+    return re.fullmatch("".join(lines), printed, re.DOTALL) is not None
+
+
+@pytest.mark.parametrize(
+    ("printed", "is_the_same"),
+    [
+        ("a 1.5 mm\n4.1e-13\n0.2 s\n", True),
+        ("a 1.5 mm\n4.5e-13\n0.31 s\n", True),
+        ("a 1.6 mm\n4.1e-13\n0.2 s\n", False),
+        ("a 1.5 mm\n4.1e-13\n0.2 s\nmore\n", False),
+        ("", False),
+    ],
+)
+def test_a_page_that_shows_another_number_is_wrong(printed: str, is_the_same: bool) -> None:
+    assert is_shown(printed, "a 1.5 mm\n4.1e-13\n0.2 s\n") is is_the_same
+
+
+def test_the_readme_fits_on_two_screens() -> None:
+    assert len(PAGES["README"].read_text(encoding="utf-8").splitlines()) <= 150
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    text = FENCED.sub("", PAGES[page].read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)]+)\)", text):
+        name, _, heading = target.partition("#")
+        path = PAGES[page].parent / name if name else PAGES[page]
+        assert path.is_file(), target
+        assert not heading or heading in headings(path), target
+
+
+def headings(path: Path) -> set[str]:
+    """Headings of a page as a forge's links name them."""
+    text = FENCED.sub("", path.read_text(encoding="utf-8"))
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 def test_the_spec_shown_is_valid(tmp_path: Path) -> None:
     path = tmp_path / "spec.yaml"
-    path.write_text(blocks("yaml")[0], encoding="utf-8")
+    path.write_text(unnamed_yaml("spec"), encoding="utf-8")
     assert read_spec(path).finger.units == 5
 
 
@@ -119,53 +210,23 @@ def test_the_sweep_shown_is_valid(tmp_path: Path) -> None:
     (tmp_path / "sweeps").mkdir()
     shutil.copy(ROOT / "configs" / "five_unit.yaml", tmp_path)
     path = tmp_path / "sweeps" / "sweep.yaml"
-    path.write_text(blocks("yaml")[1], encoding="utf-8")
+    path.write_text(unnamed_yaml("sweeps"), encoding="utf-8")
     assert read_sweep(path).space.size == 13 * 3 * 3 * 2 * 64
 
 
-def test_the_examples_in_python_run(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """One after the other, in a folder of their own beside the examples."""
-    (tmp_path / "configs").symlink_to(ROOT / "configs")
-    monkeypatch.chdir(tmp_path)
-    section = re.search(r"^## From Python\n(.*?)^## ", README, re.MULTILINE | re.DOTALL)
-    assert section is not None
-    names: dict[str, object] = {}
-    for example in blocks("python", section[1]):
-        exec(example, names)
-    said = capsys.readouterr().out
-    assert "101" in said
-    assert "met: n_stable == 32: all 3 designs" in said
-    assert (tmp_path / "dome.yaml").exists()
-
-
-def test_the_examples_of_reading_tables_run(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """In a folder with the tables that the commands before them have made."""
-    monkeypatch.chdir(tmp_path)
-    run = CliRunner().invoke
-    sweep_file = ROOT / "configs" / "sweeps" / "height_separation.yaml"
-    assert run(app, ["sweep", str(sweep_file), "-o", "out", "--executor", "serial"]).exit_code == 0
-    spec = ROOT / "configs" / "five_unit.yaml"
-    assert run(app, ["predict", str(spec), "-o", "states.parquet"]).exit_code == 0
-    examples = blocks("python", README.partition("## From Python\n")[0])
-    assert examples
-    for example in examples:
-        exec(example, {})
-    assert "tip_y_mm" in capsys.readouterr().out
+def unnamed_yaml(page: str) -> str:
+    return next(b.text for b in blocks(page) if b.language == "yaml" and not b.words)
 
 
 def test_every_function_is_named() -> None:
     functions = [name for name in dpg.__all__ if inspect.isfunction(getattr(dpg, name))]
-    named = {name for name in functions if re.search(rf"(`|dpg\.){name}\b", README)}
+    named = {name for name in functions if re.search(rf"(`|dpg\.){name}\b", MANUAL)}
     assert set(functions) - named <= {"read_calibration", "uniform_finger"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_and_option_is_named(name: str) -> None:
-    assert f"`dpg {name}" in README
+    assert f"`dpg {name}" in MANUAL
     options = set()
     for parameter in inspect.signature(COMMANDS[name]).parameters.values():
         for metadata in getattr(parameter.annotation, "__metadata__", ()):
@@ -173,21 +234,21 @@ def test_every_command_and_option_is_named(name: str) -> None:
                 said = (metadata.default, *(metadata.param_decls or ()))
                 named = {text for text in said if isinstance(text, str) and text[:1] == "-"}
                 options |= named or {f"--{parameter.name.replace('_', '-')}"}
-    assert not {option for option in options if option not in README}
+    assert not {option for option in options if option not in MANUAL}
 
 
 def test_every_key_of_the_spec_is_named() -> None:
     definitions = json_schema()["$defs"].values()
     keys = {key for part in definitions for key in part.get("properties", {})}
-    assert not {key for key in keys if key not in README}
+    assert not {key for key in keys if key not in MANUAL}
 
 
 def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
     columns = declared(3, ("bistable", "hinge", "bar"), True)
     named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
     named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
-    assert not {name for name in named if f"`{name}" not in README}
-    named = {c.name for c in (*METRICS, *RUNG_COLUMNS)} | {*DesignStatus, *ABLATIONS}
+    assert not {name for name in named if f"`{name}" not in MANUAL}
+    named = {c.name for c in (*METRICS, *LEVEL_COLUMNS)} | {*DesignStatus, *ABLATIONS}
     named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
-    assert not {name for name in named if f"`{name}" not in README}
-    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", README, re.M)}
+    assert not {name for name in named if f"`{name}" not in MANUAL}
+    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", MANUAL, re.M)}

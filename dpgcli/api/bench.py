@@ -5,7 +5,18 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dpgcli.api.inputs import Settings, SpecInput, check_installed, figure_path, point, scene_input
+from dpgcli.api.inputs import (
+    Settings,
+    SpecInput,
+    as_texts,
+    check_installed,
+    check_numbers,
+    check_whole,
+    figure_path,
+    path_of,
+    point,
+    scene_input,
+)
 from dpgcli.api.tables import Table
 from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
 from dpgcli.calibration.known import Frame
@@ -21,7 +32,7 @@ from dpgcli.sweeps.differences import differences
 
 @dataclass(frozen=True)
 class BenchResult:
-    """What was measured, a row for each way and size; `recorded` are rows of an earlier record."""
+    """Measurements, a row for each method and size; `recorded` are rows of an earlier record."""
 
     name: str
     spec_json: str
@@ -44,11 +55,11 @@ class BenchResult:
 
     def save(self, path: str | Path, command: Sequence[str] = ()) -> None:
         """Write all rows to a Parquet file, with the `command` that asked for them."""
-        write_bench(Path(path), self.rows, self.spec_json, command)
+        write_bench(path_of("path", path), self.rows, self.spec_json, command)
 
     def record(self, path: str | Path, command: Sequence[str] = ()) -> None:
         """Write all rows and the machine to a JSON file, for `compare` in a later call."""
-        write_record(Path(path), self.rows, self.spec_json, command)
+        write_record(path_of("path", path), self.rows, self.spec_json, command)
 
     def draw(self, path: str | Path) -> None:
         """Draw error over time to a .svg or .png file."""
@@ -61,7 +72,7 @@ def bench(
     settings: Settings = (),
     repeats: int = 5,
     target_error: float | None = None,
-    keep: Sequence[str] = (),
+    keep: str | Sequence[str] = (),
     against: Tabular | None = None,
     first_station: tuple[float, float] = (0.0, 0.0),
     tip_offset: tuple[float, float] = (0.0, 0.0),
@@ -82,12 +93,14 @@ def bench(
     dpgcli.errors.UsageError: keep hinges: this scene leaves out bars, every-unit, every-column
     """
     check_installed("dpg bench", "mpmath")
+    check_whole(repeats=repeats)
+    check_numbers(target_error=target_error)
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
-    then = None if compare is None else _recorded(Path(compare), given.json)
+    then = None if compare is None else _recorded(path_of("compare", compare), given.json)
     frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
     write = partial(write_states, spec_json="{}")
-    study = Bench(given.scene, repeats, tuple(keep), target_error, known, frame, write)
+    study = Bench(given.scene, repeats, as_texts("keep", keep), target_error, known, frame, write)
     study.check()
     rows = []
     for row in study.rows():

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from dpgcli.api.inputs import as_texts
 from dpgcli.api.tables import Table
 from dpgcli.errors import UsageError
 from dpgcli.files.table_reader import designs_in, read_designs
@@ -28,8 +29,7 @@ def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[Requirem
     >>> verdict.is_met, [failure.design for failure in verdict.failures()]
     (False, [0])
     """
-    texts = (require,) if isinstance(require, str) else tuple(require)
-    return check_designs(designs_of(designs)[0], texts)
+    return check_designs(designs_of(designs)[0], as_texts("require", require))
 
 
 def designs_of(designs: DesignsInput) -> "tuple[pd.DataFrame, dict[str, str]]":

@@ -41,7 +41,7 @@ class CompareResult:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is predicted, known, and off."""
+        """Predicted and known values, and their differences."""
         return comparison.columns(self.rows)
 
     @property
@@ -63,7 +63,7 @@ class CompareResult:
         draw_comparison(self.known, self.found, self.calibrated, self.name, figure_path(path))
 
     def _times(self) -> Iterator[str]:
-        """What a state took in the data and takes here, where the data say."""
+        """Seconds a state: of the data, where they say, and of the prediction."""
         if not np.isfinite(self.known.seconds).any():
             return
         patterns = self.known.patterns

@@ -1,11 +1,15 @@
-"""What functions take: specs as paths, data or values, settings by key, places in some data."""
+"""Arguments of the functions: specs as paths, data or values, settings by key, points, numbers."""
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from enum import StrEnum
 from importlib import util
+from numbers import Integral, Real
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeAlias, TypeVar
 
 from dpgcli.design.dimensions import LARGEST, SMALLEST
@@ -84,7 +88,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
         name, own = "spec", tuple[Path, ...]()
         document = spec_document(spec, settings)
     else:
-        name, own = str(spec), (Path(spec),)
+        name, own = str(spec), (path_of("spec", spec),)
         document = read_scene(spec, setting_texts(settings))
     found = checked(document)
     return SceneInput(name, scene_of(found), found, document, (*own, *document.files))
@@ -94,7 +98,8 @@ def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Sp
     """A spec key by key, as `files.scene_file.read_keys`: calibrations need not exist yet."""
     if isinstance(spec, Mapping):
         return checked_keys(_without_calibrations(spec, settings))
-    return checked_keys(with_settings(read_document(spec), setting_texts(settings)))
+    path = path_of("spec", spec)
+    return checked_keys(with_settings(read_document(path), setting_texts(settings)))
 
 
 def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
@@ -106,14 +111,14 @@ def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Docume
     return with_settings(Document("spec", plain(data), {}), setting_texts(settings))
 
 
-def setting_texts(settings: Settings) -> tuple[str, ...]:
+def setting_texts(settings: Settings, field: str = "settings") -> tuple[str, ...]:
     """Settings as "key=value" texts.
 
     >>> setting_texts({"finger.units": 3, "finger.linear_stiffness_N_per_mm": float("inf")})
     ('finger.units=3', 'finger.linear_stiffness_N_per_mm=".inf"')
     """
     if not isinstance(settings, Mapping):
-        return as_texts(settings)
+        return as_texts(field, settings)
     values = {key: json.dumps(canonical(plain(value))) for key, value in settings.items()}
     return tuple(f"{key}={text}" for key, text in values.items())
 
@@ -134,16 +139,56 @@ def plain(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
     listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
+    if listed is None and not isinstance(value, str | Real | date | NoneType):
+        raise UsageError(f"a spec has no {type(value).__name__}: expected numbers and texts")
     return value if listed is None else listed()
 
 
-def as_texts(texts: str | Sequence[str]) -> tuple[str, ...]:
-    """Texts; one alone is not a sequence of letters.
+def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
+    """Texts; one alone is not a sequence of letters. Raises UsageError for what is none.
 
-    >>> as_texts("abc"), as_texts(["a", "b"])
+    >>> as_texts("only", "abc"), as_texts("only", ["a", "b"])
     (('abc',), ('a', 'b'))
     """
-    return (texts,) if isinstance(texts, str) else tuple(texts)
+    listed = (texts,) if isinstance(texts, str) or not isinstance(texts, Iterable) else tuple(texts)
+    if not all(isinstance(text, str) for text in listed):
+        raise UsageError(Field(field), f" {texts!r}: expected a text or several")
+    return listed
+
+
+def path_of(field: str, path: str | os.PathLike[str]) -> Path:
+    """The path of a file or folder. Raises UsageError for what is none.
+
+    >>> path_of("spec", None)
+    Traceback (most recent call last):
+        ...
+    dpgcli.errors.UsageError: spec None: expected a path
+    """
+    try:
+        return Path(path)
+    except TypeError:
+        raise UsageError(Field(field), f" {path!r}: expected a path") from None
+
+
+def check_numbers(**values: float | None) -> None:
+    """Raise UsageError for an argument that is no number; none where it is optional.
+
+    >>> check_numbers(tolerance=1e-9, target_error=None)
+    """
+    for field, value in values.items():
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if value is not None and not is_number:
+            raise UsageError(Field(field), f" {value!r}: expected a number")
+
+
+def check_whole(**values: int | None) -> None:
+    """Raise UsageError for an argument that is no whole number; none where it is optional.
+
+    >>> check_whole(jobs=2)
+    """
+    for field, value in values.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, Integral)):
+            raise UsageError(Field(field), f" {value!r}: expected a whole number")
 
 
 def point(field: str, place: Sequence[float]) -> tuple[float, float]:
@@ -165,14 +210,16 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
 
 def figure_path(path: str | Path) -> Path:
     """The path of a figure. Raises UsageError for a suffix that cannot be drawn."""
-    if Path(path).suffix.lower() not in (".svg", ".png"):
+    figure = path_of("path", path)
+    if figure.suffix.lower() not in (".svg", ".png"):
         raise UsageError(f"path {path}: expected a name that ends in .svg or .png")
     check_installed("a figure", "matplotlib")
-    return Path(path)
+    return figure
 
 
 def check_resampling(bootstrap: int, seed: int) -> None:
     """Raise UsageError for numbers of samples, or seeds, below zero."""
+    check_whole(bootstrap=bootstrap, seed=seed)
     for field, value in (("bootstrap", bootstrap), ("seed", seed)):
         if value < 0:
             raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
@@ -186,6 +233,7 @@ def check_installed(what: str, package: str) -> None:
 
 def check_positive(field: str, value: float | None) -> None:
     """Raise UsageError for a number, if there is one, that is not above zero or out of reach."""
+    check_numbers(**{field: value})
     if value is not None and not SMALLEST <= value <= LARGEST:
         raise UsageError(
             Field(field), f" {value:g}: expected a number > 0, from {SMALLEST:g} to {LARGEST:g}"

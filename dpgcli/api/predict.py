@@ -6,16 +6,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput, figure_path, scene_input
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    as_texts,
+    check_numbers,
+    figure_path,
+    path_of,
+    scene_input,
+)
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.states import plan
 from dpgcli.states import predict as states
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.plan import Plan, Request
 from dpgcli.states.predict import Prediction, Summary
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +45,7 @@ class PredictResult:
 
     @property
     def plan(self) -> Plan:
-        """What was decided: method, columns, what is left out and why."""
+        """The decisions: method, columns, omissions and their reasons."""
         return self.prediction.plan
 
     @property
@@ -65,7 +74,7 @@ class PredictResult:
         from dpgcli.files.output import Mark, check_outputs, run_file
         from dpgcli.files.prediction import write_prediction
 
-        table = Path(path)
+        table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE), (run_file(table), Mark.FACTS))
         write_prediction(self.prediction, table, self.given.json, self.blocks)
 
@@ -133,10 +142,11 @@ def request_of(
     tolerance: float | None,
     target_error: float | None,
 ) -> Request:
-    """What is asked of a scene."""
-    names = columns.split(",") if isinstance(columns, str) else columns
+    """The request that these arguments make."""
+    names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)
+    check_numbers(tolerance=tolerance, target_error=target_error)
     return Request(
-        patterns=(patterns,) if isinstance(patterns, str) else tuple(patterns),
+        patterns=as_texts("patterns", patterns),
         columns=tuple(name.strip() for name in names if name.strip()),
         formulation=formulation,
         tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dpgcli.api.inputs import path_of
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
@@ -39,7 +40,7 @@ def report(folder: str | Path, *, format: str = "md") -> str:
     """
     if f".{format}" not in PAGES:
         raise UsageError(Field("format"), f" {format!r}: expected md or html")
-    return page(Path(folder), f".{format}", silent)[1]
+    return page(path_of("folder", folder), f".{format}", silent)[1]
 
 
 def page(folder: Path, kind: str, say: Say) -> "tuple[pd.DataFrame, str]":

@@ -10,6 +10,7 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_installed,
+    path_of,
     scene_input,
 )
 from dpgcli.api.tables import Table
@@ -45,7 +46,7 @@ class StressResult:
 
     def save(self, path: str | Path) -> None:
         """Write every case to a Parquet file."""
-        write_stress(Path(path), self.outcomes, self.spec_json)
+        write_stress(path_of("path", path), self.outcomes, self.spec_json)
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class HardCases:
         return verdicts.stress(self.cases)
 
     def result(self, outcomes: Sequence[Outcome]) -> StressResult:
-        """What they came to."""
+        """The result that outcomes make."""
         spec = None if self.given is None or self.given.spec is None else self.given.json
         return StressResult(tuple(outcomes), spec)
 
@@ -81,7 +82,7 @@ def stress(
     >>> len(result.failures), set(result.table["verdict"].tolist())
     (0, {'right'})
     """
-    cases = hard_cases(spec, as_texts(only), settings)
+    cases = hard_cases(spec, as_texts("only", only), settings)
     found = []
     for outcome in cases.outcomes():
         watch(outcome)

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,16 +10,26 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dpgcli.api.inputs import Settings, plain, setting_texts, spec_document
+from dpgcli.api.inputs import (
+    Settings,
+    check_numbers,
+    check_whole,
+    path_of,
+    plain,
+    setting_texts,
+    spec_document,
+)
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
 from dpgcli.files.table_reader import read_run, read_undamaged
 from dpgcli.files.yaml_file import Document
-from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
     DESIGNS,
@@ -125,7 +135,7 @@ def sweep(
 @contextmanager
 def _folder(output: str | Path | None) -> Iterator[Path]:
     if output is not None:
-        yield Path(output)
+        yield path_of("output", output)
         return
     with TemporaryDirectory() as folder:
         yield Path(folder)
@@ -146,6 +156,7 @@ def study_of(
     target_error: float | None = None,
 ) -> Study:
     """A sweep ready to run into a folder."""
+    check_numbers(tolerance=tolerance, target_error=target_error)
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target_error)
     return Study(_read(sweep, settings), folder, exactness, target_error)
@@ -154,12 +165,30 @@ def study_of(
 def _read(sweep: str | Path | Mapping[str, Any], settings: Settings) -> Sweep:
     texts = setting_texts(settings)
     if not isinstance(sweep, Mapping):
-        return read_sweep(Path(sweep), texts)
-    base, data = sweep.get("base"), plain(sweep)
+        return read_sweep(path_of("sweep", sweep), texts)
+    base = sweep.get("base")
+    if isinstance(base, Finger | Scene):
+        raise UsageError("base: a finger's values have no keys that could vary: give a spec")
+    data = plain({**sweep, "space": _axes(sweep.get("space"))})
     if not isinstance(base, Mapping):
         return sweep_in(Document("sweep", data, {}), Path(), texts)
     document = Document("sweep", {**data, "base": "base"}, {})
     return sweep_in(document, Path(), texts, base=spec_document(base, settings))
+
+
+def _axes(space: Any) -> Any:
+    """Axes of a space, data frames among them as values that go together."""
+    if not isinstance(space, list | tuple):
+        return space
+    return [
+        {"paired": axis["table"].to_dict(orient="list")} if _is_frame(axis) else axis
+        for axis in space
+    ]
+
+
+def _is_frame(axis: Any) -> bool:
+    """Whether an axis is a table of pandas."""
+    return isinstance(axis, Mapping) and hasattr(axis.get("table"), "to_dict")
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:
@@ -190,6 +219,8 @@ class Place:
     wait: float | None = None
 
     def __post_init__(self) -> None:
+        check_whole(jobs=self.jobs)
+        check_numbers(wait=self.wait)
         dask, scheduler = Field("executor"), Field("scheduler")
         if self.executor not in EXECUTORS:
             raise UsageError(dask, f" {self.executor!r}: expected {', '.join(EXECUTORS)}")
@@ -239,10 +270,12 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
         ...
     dpgcli.errors.UsageError: nowhere: expected the output of one dpg sweep shard, found no shard
     """
-    folders = [shards] if isinstance(shards, str | Path) else shards
+    is_many = isinstance(shards, Iterable) and not isinstance(shards, str)
+    folders: list[Any] = list(shards) if is_many else [shards]  # type: ignore[arg-type]
     if not folders:
         raise UsageError("shards: expected one folder or more")
-    return merged([Path(folder) for folder in folders], Path(output), silent)
+    paths = [path_of("shards", folder) for folder in folders]
+    return merged(paths, path_of("output", output), silent)
 
 
 def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:

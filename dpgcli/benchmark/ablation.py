@@ -97,7 +97,7 @@ def _request(plan: Plan) -> Request:
 def _with_elastic_bars(plan: Plan) -> Trial | None:
     """Bars that were dropped; rigid ones as springs a thousand times as stiff as the domes."""
     scene, finger = plan.scene, plan.scene.finger
-    if plan.rung is not None and plan.rung.drops_bars:
+    if plan.accuracy_level is not None and plan.accuracy_level.drops_bars:
         return Trial(scene, STATES_ONLY)
     if not finger.is_rigid:
         return None

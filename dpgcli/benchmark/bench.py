@@ -30,11 +30,11 @@ from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import Prediction, predict
-from dpgcli.states.rungs import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -78,7 +78,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Bench:
-    """What to measure: a scene, how often, with what put back, beside what data.
+    """A benchmark: its scene, repeats, ablations and known states.
 
     `target_error` (mm) is that of the plan from which something is put back.
     `known` tips lie in a `frame` of their own. `write` writes a prediction as a table; where it is

@@ -17,9 +17,9 @@ from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.accuracy import ACCURACY_LEVELS, DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
 from dpgcli.states.guess import geometric_guess, stroke_guess
-from dpgcli.states.rungs import DEFAULT_TOLERANCE, RUNGS
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -58,11 +58,11 @@ def package_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod
     if not finger.is_rigid:
         name = "units looked up, poses composed"
         yield way(name, lambda: _looked_up(finger, inverted), certifies=False)
-    for rung in RUNGS:
-        if rung.drops_bars and finger.is_rigid:
+    for level in ACCURACY_LEVELS:
+        if level.drops_bars and finger.is_rigid:
             continue
-        used, name = (rigid, "chain, rigid bars") if rung.drops_bars else (finger, "chain")
-        tolerance = rung.tolerance
+        used, name = (rigid, "chain, rigid bars") if level.drops_bars else (finger, "chain")
+        tolerance = level.tolerance
         yield way(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
     if not finger.is_rigid:
         lattice = _solver(finger, inverted, lattice_potential, DEFAULT_TOLERANCE)

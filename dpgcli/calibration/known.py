@@ -9,8 +9,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 

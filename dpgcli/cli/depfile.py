@@ -1,4 +1,4 @@
-"""What a sweep reads and writes, as a dependency file for Make."""
+"""Dependency file for Make: the files that a sweep reads and writes."""
 
 import os
 import re

@@ -82,7 +82,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "tolerance": plan.request.tolerance,
         "residual_limit_N": plan.residual_limit,
         "bar_flexibility_mm": plan.bar_flexibility,
-        "rung": plan.rung and plan.rung.name,
+        "accuracy_level": plan.accuracy_level and plan.accuracy_level.name,
         "error_bound_mm": spelled(plan.error_bound),
         "model_error": plan.scene.model_error.text,
         "uncertainty": _uncertainty_facts(plan),
@@ -169,7 +169,7 @@ def _omission(left_out: "Omission") -> str:
 
 
 def expected(plan: "Plan") -> str:
-    """What the work takes, before it is done."""
+    """Time and memory of the work, before it is done."""
     return (
         f"about {plan.expected_seconds:,.1f} s on one core and "
         f"{plan.expected_bytes / 2**20:,.0f} MiB (rough: a factor of two either way)"
@@ -200,7 +200,9 @@ def _bar_error(plan: "Plan") -> str:
 def _bound(plan: "Plan") -> str:
     if plan.error_bound == float("inf"):
         return "the tip's numerical error is bounded only after the work, in numerical_error_mm"
-    way = f"{plan.rung.name}, chosen for the target error: " if plan.rung else ""
+    way = (
+        f"{plan.accuracy_level.name}, chosen for the target error: " if plan.accuracy_level else ""
+    )
     return f"{way}the tip's error will be below {plan.error_bound:.1e} mm (the model's left aside)"
 
 

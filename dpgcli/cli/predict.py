@@ -32,8 +32,8 @@ from dpgcli.cli.streams import is_read, say
 
 if TYPE_CHECKING:
     from dpgcli.arrays import Columns
+    from dpgcli.states.accuracy import AccuracyLevel
     from dpgcli.states.predict import Prediction, Summary
-    from dpgcli.states.rungs import Rung
 
 
 def predict(
@@ -140,8 +140,8 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
         f"worst residual {summary.residual:.1e} N, worst tip error {summary.tip_error:.1e} mm "
         "(numerical; not the model's)"
     )
-    if plan.rung is not None:
-        yield _chosen(plan.rung, plan.error_bound, plan.request.target_error or 0.0)
+    if plan.accuracy_level is not None:
+        yield _chosen(plan.accuracy_level, plan.error_bound, plan.request.target_error or 0.0)
     worst = worst if summary.statuses[Status.STABLE] else "no stable state"
     yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
     for status, n in summary.statuses.items():
@@ -165,14 +165,14 @@ def _uncertainty(prediction: "Prediction") -> Iterator[str]:
     yield f"the least certain tip, of {worst.pattern}: ± {worst.total:.2g} mm; {causes} alone"
 
 
-def _chosen(rung: "Rung", bound: float, target: float) -> str:
-    """What a target error chose, in words."""
+def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
+    """The accuracy level that a target error chose, in words."""
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
             "no method promises that before the work: numerical_error_mm says what was reached"
         )
-    return f"chosen for the target error: {rung.name}; {promise}"
+    return f"chosen for the target error: {level.name}; {promise}"
 
 
 def _rate(summary: "Summary") -> str:

@@ -23,7 +23,7 @@ class ProgressLine:
         self.due = self.began + (FIRST_SHOWN if self.interactive else PLAIN_PERIOD)
 
     def resume_at(self, done: int) -> None:
-        """What was there before does not count as progress."""
+        """Begin the count at what was there before."""
         self.start = done
 
     def show(self, done: int) -> None:

@@ -1,4 +1,4 @@
-"""Standard streams in bad company: closed, full, or read by somebody who has had enough."""
+"""Robust standard streams: closed descriptors, full disks, readers that stop early (`| head`)."""
 
 import io
 import os
@@ -11,7 +11,7 @@ from dpgcli.text import printable
 
 
 class Stream(io.RawIOBase):
-    """A standard stream that takes everything: after its first error, all goes nowhere.
+    """A standard stream whose writes never fail: after the first error they are discarded.
 
     So nothing that prints is stopped by whoever reads, or does not: `error` says at the end.
     """
@@ -21,7 +21,7 @@ class Stream(io.RawIOBase):
         self.error: OSError | None = None
 
     def write(self, content: Any, /) -> int:
-        """Write all, or keep why not."""
+        """Write all, or keep the error."""
         rest = memoryview(content)
         while rest and self.error is None:
             try:
@@ -33,7 +33,7 @@ class Stream(io.RawIOBase):
         return len(content)
 
     def drop(self) -> None:
-        """Write no more: what is left may wait for a reader that never comes."""
+        """Discard what follows: the rest could wait for a reader that never comes."""
         self.error = self.error or BrokenPipeError()
 
     def writable(self) -> bool:
@@ -53,7 +53,7 @@ OUTPUT, MESSAGES = Stream(1), Stream(2)
 
 
 def open_streams() -> None:
-    """Point closed streams to nowhere, so that no file gets their number and is written to.
+    """Reopen closed streams on /dev/null, so that no later file gets descriptor 0, 1 or 2.
 
     What a stream cannot spell is escaped.
     """

@@ -218,9 +218,9 @@ def _judge(
 
 
 def _chosen(designs: "pd.DataFrame") -> str:
-    """What the designs took for the target error."""
-    counts = designs.loc[designs["rung"] != "", "rung"].value_counts()
-    ways = ", ".join(f"{count:,} {rung}" for rung, count in counts.items())
+    """The accuracy levels that designs took for the target error."""
+    counts = designs.loc[designs["accuracy_level"] != "", "accuracy_level"].value_counts()
+    ways = ", ".join(f"{count:,} {level}" for level, count in counts.items())
     bound = designs["error_bound_mm"].max()
     return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 

@@ -1,4 +1,4 @@
-"""What fits found out, as values: numbers for one geometry, a law over several, a dome's curve."""
+"""Calibrations as values: numbers for one geometry, a scaling law over several, a dome's curve."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

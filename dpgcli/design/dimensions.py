@@ -61,7 +61,7 @@ class Tolerance(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Section:
+class GivenValues:
     """Dimensions and lattice values that are given of some units, by key; (design,) or (1,)."""
 
     geometry: Sizes = field(default_factory=dict)
@@ -78,8 +78,8 @@ class Design:
     """
 
     units: int
-    finger: Section
-    overrides: Mapping[str, Section] = field(default_factory=dict)
+    finger: GivenValues
+    overrides: Mapping[str, GivenValues] = field(default_factory=dict)
     linear_stiffness: Array | None = None
     calibrations: tuple[str | Calibration, ...] = ()
     law: str | None = None
@@ -92,7 +92,7 @@ class Design:
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
 
         >>> length = {"finger.overrides.4-5.geometry.chamber_length_mm": np.array([9.0, 10.0])}
-        >>> Design(5, Section()).with_values(length).overrides["4-5"].geometry
+        >>> Design(5, GivenValues()).with_values(length).overrides["4-5"].geometry
         {'chamber_length_mm': array([ 9., 10.])}
         """
         design = self
@@ -111,11 +111,11 @@ class Design:
         if parents[1] != "overrides":
             return replace(self, finger=_changed(self.finger, section, key, column))
         units = parents[2]
-        own = _changed(self.overrides.get(units, Section()), section, key, column)
+        own = _changed(self.overrides.get(units, GivenValues()), section, key, column)
         return replace(self, overrides={**self.overrides, units: own})
 
 
-def _changed(part: Section, section: str, key: str, column: Array) -> Section:
+def _changed(part: GivenValues, section: str, key: str, column: Array) -> GivenValues:
     if section == "geometry":
         return replace(part, geometry={**part.geometry, key: column})
     return replace(part, lattice={**part.lattice, key: column})
@@ -131,7 +131,7 @@ def are_possible(key: str, values: Array) -> Flags:
 
 
 @dataclass(frozen=True)
-class Group:
+class UnitGroup:
     """Units that share all values: what the spec gives them, and which of it an override gave."""
 
     units: tuple[int, ...]
@@ -150,15 +150,15 @@ class Group:
         return ("finger", section, key)
 
 
-def groups_of(design: Design) -> list[Group]:
+def groups_of(design: Design) -> list[UnitGroup]:
     """The units without an override, none perhaps, and those of each override."""
     taken = {unit for text in design.overrides for unit in unit_range(text)}
     units = tuple(unit for unit in range(1, design.units + 1) if unit not in taken)
     whole, sizes = design.finger, sizes_of(design.finger.geometry)
     return [
-        Group(units, design.calibrations, sizes, whole.lattice),
+        UnitGroup(units, design.calibrations, sizes, whole.lattice),
         *(
-            Group(
+            UnitGroup(
                 unit_range(text),
                 design.calibrations,
                 {**sizes, **own.geometry},

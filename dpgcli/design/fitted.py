@@ -7,7 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design import geometry
 from dpgcli.design.calibrations import Calibration, Grid
-from dpgcli.design.dimensions import Group, agree, sizes_of
+from dpgcli.design.dimensions import UnitGroup, agree, sizes_of
 from dpgcli.design.problems import Problems
 from dpgcli.design.rules import Derivation, Value, all_by, check_possible, listed, missing_from
 from dpgcli.design.scene import ORIGINS, Origin
@@ -15,7 +15,7 @@ from dpgcli.design.scene import ORIGINS, Origin
 
 def from_file(
     derivation: Derivation,
-    group: Group,
+    group: UnitGroup,
     calibration: Calibration,
     file: int,
     problems: Problems,
@@ -47,7 +47,7 @@ def _fitted(derivation: Derivation, calibration: Calibration) -> Value | None:
     return replace(base, standard_error=np.array([found.standard_error]))
 
 
-def _from_grid(derivation: Derivation, group: Group, grid: Grid) -> Value:
+def _from_grid(derivation: Derivation, group: UnitGroup, grid: Grid) -> Value:
     columns = np.broadcast_arrays(*(group.geometry[key] for key in grid.over))
     estimate = grid.law.at(derivation.key, np.stack(columns, axis=1))
     error = np.real(estimate.value) * estimate.relative_error
@@ -65,7 +65,7 @@ def _from_grid(derivation: Derivation, group: Group, grid: Grid) -> Value:
 
 def _brought(
     derivation: Derivation,
-    group: Group,
+    group: UnitGroup,
     calibration: Calibration,
     base: Value,
     over: tuple[str, ...],

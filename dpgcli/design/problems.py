@@ -1,4 +1,4 @@
-"""What is wrong with designs: for which of them, and the words for each, found only if asked."""
+"""Problems of designs: masks of those that have one, and words, made only if asked for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ class Issue(NamedTuple):
 
     @property
     def statement(self) -> str:
-        """What is wrong, in one line."""
+        """The problem in one line."""
         return Problem("", None, None, dotted(self.path), *self[1:]).statement
 
 

@@ -12,8 +12,8 @@ from dpgcli.design.dimensions import (
     LEAVE_ONE_OUT,
     LINEAR_STIFFNESS,
     Design,
-    Group,
-    Section,
+    GivenValues,
+    UnitGroup,
     check_widths,
     groups_of,
     range_issues,
@@ -36,7 +36,7 @@ NO_LEAVE_ONE_OUT = Issue(
     "none",
     "dpg fit finger writes one; or give a percentage such as 5%",
 )
-Pairs = Sequence[tuple[Group, Value]]
+Pairs = Sequence[tuple[UnitGroup, Value]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Resolution:
 
     @property
     def gravest_origins(self) -> Indices:
-        """What to trust least of each design's values, (design,), places in `ORIGINS`.
+        """The gravest origin among each design's values, (design,), as indices of `ORIGINS`.
 
         Values that the geometry alone fixes count as given; so does an assumed stiffness of the
         bars, which hardly matters.
@@ -86,7 +86,7 @@ class Resolution:
         return arrays
 
     def scene(self) -> Scene:
-        """What a single design describes, if nothing is wrong with it."""
+        """The scene of a single design, if nothing is wrong with it."""
         batch = self.batch(np.zeros(1, np.int64))
         gripper, layer = batch.gripper, batch.layer_thickness
         return Scene(
@@ -106,7 +106,7 @@ class Resolution:
         return known_model_error(self.design, lever, values)
 
     def batch(self, designs: Indices) -> Scene:
-        """What some of the designs describe, none of them wrong, with arrays by design.
+        """The scene of some of the designs, none of them wrong, with arrays by design.
 
         Their bars are all rigid or none are; sources and uncertainty are left out.
         """
@@ -169,7 +169,7 @@ def resolve(design: Design) -> Resolution:
     ...     "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
     ...     "hinge_stiffness_N_mm_per_rad": 24.2}
     >>> lattice = {key: np.array([value]) for key, value in section.items()}
-    >>> base = Design(2, Section(lattice=lattice), linear_stiffness=np.array([np.inf]))
+    >>> base = Design(2, GivenValues(lattice=lattice), linear_stiffness=np.array([np.inf]))
     >>> found = resolve(base.with_values({"finger.lattice.stroke_mm": np.array([3.0, 3.5])}))
     >>> found.lattice["stroke"], found.are_wrong
     (array([[3. , 3.5]]), array([False, False]))
@@ -203,7 +203,7 @@ def _check_linearities(design: Design, domes: Domes, problems: Problems) -> None
     """Note force linearities beside a law that has none."""
     if FORCE_LINEARITY in domes.derivations:
         return
-    paths: dict[KeyPath, Section] = {("finger", "lattice"): design.finger}
+    paths: dict[KeyPath, GivenValues] = {("finger", "lattice"): design.finger}
     for units, own in design.overrides.items():
         paths["finger", "overrides", units, "lattice"] = own
     for path, section in paths.items():
@@ -218,7 +218,7 @@ def _linearity_issue(where: KeyPath, law: str | None, given: Array, design: int)
     return Issue(where, f"none beside law: {law}", number(of_design(given, design)), hint)
 
 
-def _bars(design: Design, base: Group) -> Value:
+def _bars(design: Design, base: UnitGroup) -> Value:
     """The stiffness of the bars: given, fitted, or assumed."""
     if design.linear_stiffness is not None:
         return all_by(design.linear_stiffness, Origin.GIVEN, "as given")
@@ -234,7 +234,7 @@ def _bars(design: Design, base: Group) -> Value:
     return all_by(np.array([NEARLY_RIGID]), Origin.ASSUMED, rule)
 
 
-def _by_unit(n_units: int, pairs: Sequence[tuple[Group, Array]]) -> Array:
+def _by_unit(n_units: int, pairs: Sequence[tuple[UnitGroup, Array]]) -> Array:
     """Values by unit, (unit, design), or (1, design) where all units share them."""
     numbers = np.broadcast_arrays(*(values for _, values in pairs))
     if all(np.array_equal(numbers[0], other) for other in numbers[1:]):

@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design import geometry
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import LARGEST, SMALLEST, Group
+from dpgcli.design.dimensions import LARGEST, SMALLEST, UnitGroup
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.scene import ORIGINS, Origin
 
@@ -63,7 +63,7 @@ class Derivation:
         low, high = self.bounds
         return np.asarray((low <= np.real(values)) & (np.real(values) <= high))
 
-    def of(self, group: Group) -> Array:
+    def of(self, group: UnitGroup) -> Array:
         """The value that the rule yields for a group of units whose geometry is known."""
         with np.errstate(all="ignore"):  # what is impossible is found among the values
             return self.value(*(group.geometry[need] for need in self.needs))
@@ -130,7 +130,7 @@ DERIVATIONS = (
 
 
 def missing_from(
-    derivation: Derivation, group: Group, missing: Sequence[str], why: str | None = None
+    derivation: Derivation, group: UnitGroup, missing: Sequence[str], why: str | None = None
 ) -> Issue:
     """A value that the geometry should yield, but does not state enough for."""
     return Issue(
@@ -141,7 +141,9 @@ def missing_from(
     )
 
 
-def check_possible(derivation: Derivation, group: Group, value: Value, problems: Problems) -> Flags:
+def check_possible(
+    derivation: Derivation, group: UnitGroup, value: Value, problems: Problems
+) -> Flags:
     """Note where no finger can have a value that a rule gives; where it can, (design,) or (1,)."""
     needs = [need for need in derivation.needs if need in group.own_geometry]
     path = group.path("geometry", (needs or derivation.needs)[0])

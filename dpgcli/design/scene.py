@@ -1,4 +1,4 @@
-"""What a spec describes, in the model's terms, and where its numbers come from."""
+"""A scene: the finger or gripper of a spec in the model's terms; origins of its numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -108,7 +108,9 @@ class ModelError:
     share: float | None = None
 
 
-UNKNOWN = ModelError("unknown for these values: nothing was compared with them (dpg help accuracy)")
+UNKNOWN = ModelError(
+    "unknown for this law and these values; dpg compare finds it: dpg help accuracy"
+)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What errors of calibrations, tolerances and the model's own error mean for a finger's values."""
+"""Covariance of what a finger's values may be off by: errors of calibrations, tolerances."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import Design, Section, Sizes, Tolerance, unit_of
+from dpgcli.design.dimensions import Design, GivenValues, Sizes, Tolerance, unit_of
 from dpgcli.design.problems import Issue, number, of_design
 from dpgcli.design.scene import FITTED, Step, Uncertainty
 from dpgcli.mechanics.finger import KEYS
@@ -126,7 +126,7 @@ def _moved(design: Design, key: str, tolerance: Tolerance) -> Design:
             return sizes
         return {**sizes, key: sizes[key] + 1j * COMPLEX_STEP * tolerance.of(sizes[key])}
 
-    def moved(section: Section) -> Section:
+    def moved(section: GivenValues) -> GivenValues:
         return replace(section, geometry=stepped(section.geometry))
 
     overrides = {units: moved(section) for units, section in design.overrides.items()}

@@ -10,7 +10,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.calibrations import PUBLISHED, Calibration
-from dpgcli.design.dimensions import Group, agree
+from dpgcli.design.dimensions import UnitGroup, agree
 from dpgcli.design.fitted import from_file
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import (
@@ -25,7 +25,9 @@ from dpgcli.design.rules import (
 from dpgcli.design.scene import ORIGINS, Origin
 
 
-def value_of(derivation: Derivation, group: Group, base: Group, problems: Problems) -> Value | None:
+def value_of(
+    derivation: Derivation, group: UnitGroup, base: UnitGroup, problems: Problems
+) -> Value | None:
     """The lattice value of a group of units; None where, for all designs, there is none.
 
     Where some designs have none their numbers make no sense; `problems` have them.
@@ -45,7 +47,7 @@ def value_of(derivation: Derivation, group: Group, base: Group, problems: Proble
     return _derived_value(derivation, group, problems)
 
 
-def _derived_value(derivation: Derivation, group: Group, problems: Problems) -> Value | None:
+def _derived_value(derivation: Derivation, group: UnitGroup, problems: Problems) -> Value | None:
     """A value by the rule, if the geometry is there."""
     missing = [need for need in derivation.needs if need not in group.geometry]
     if missing:
@@ -60,11 +62,13 @@ def _derived_value(derivation: Derivation, group: Group, problems: Problems) -> 
     return Value(value.numbers, origin, rules, origin)
 
 
-def _derived(derivation: Derivation, group: Group) -> Value:
+def _derived(derivation: Derivation, group: UnitGroup) -> Value:
     return all_by(derivation.of(group), Origin.DERIVED, derivation.rule)
 
 
-def _given_value(derivation: Derivation, group: Group, base: Group, problems: Problems) -> Value:
+def _given_value(
+    derivation: Derivation, group: UnitGroup, base: UnitGroup, problems: Problems
+) -> Value:
     """A value from the lattice section; noted is what in the geometry speaks against it."""
     given = group.lattice[derivation.key]
     is_checked = derivation.origin is None and set(derivation.needs) <= set(group.geometry)
@@ -83,7 +87,7 @@ def _given_value(derivation: Derivation, group: Group, base: Group, problems: Pr
 
 
 def _check_unmoved(
-    derivation: Derivation, group: Group, base: Group, given: Array, problems: Problems
+    derivation: Derivation, group: UnitGroup, base: UnitGroup, given: Array, problems: Problems
 ) -> None:
     """Note where an override changes dimensions under a value given for the whole finger."""
     if derivation is FORCE_LINEARITY or derivation.key in group.own_lattice:
@@ -97,7 +101,7 @@ def _check_unmoved(
     problems.add(np.any(np.broadcast_arrays(*differs.values()), axis=0), issue)
 
 
-def _differs(group: Group, base: Group, need: str) -> Flags:
+def _differs(group: UnitGroup, base: UnitGroup, need: str) -> Flags:
     """Where a dimension of a group is another than that of the finger."""
     own, general = group.geometry.get(need), base.geometry.get(need)
     if own is None or general is None:
@@ -112,7 +116,7 @@ def _calibration_rule(derivation: Derivation, origin: Origin) -> str:
     return f"published value, {derivation.rule}{beyond}"
 
 
-def _uncalibrated(derivation: Derivation, group: Group) -> Issue:
+def _uncalibrated(derivation: Derivation, group: UnitGroup) -> Issue:
     return Issue(
         group.path("lattice", derivation.key),
         "a value, or a calibration to take it from",
@@ -122,7 +126,7 @@ def _uncalibrated(derivation: Derivation, group: Group) -> Issue:
     )
 
 
-def _disagreement(derivation: Derivation, group: Group, given: float, derived: float) -> Issue:
+def _disagreement(derivation: Derivation, group: UnitGroup, given: float, derived: float) -> Issue:
     changed = [need for need in derivation.needs if need in group.own_geometry]
     path = group.path("lattice", derivation.key)
     if changed and derivation.key not in group.own_lattice:
@@ -131,7 +135,7 @@ def _disagreement(derivation: Derivation, group: Group, given: float, derived: f
     return Issue(path, f"{number(derived)} as the geometry has it", found, derivation.rule)
 
 
-def _moved(derivation: Derivation, group: Group, given: float, changed: list[str]) -> Issue:
+def _moved(derivation: Derivation, group: UnitGroup, given: float, changed: list[str]) -> Issue:
     """A spring constant measured at one geometry that would be used at another."""
     return Issue(
         ("finger", "overrides", str(group.override), "lattice", derivation.key),

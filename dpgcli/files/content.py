@@ -44,7 +44,7 @@ def content_of(path: Path, place: Location, most: int | None = None, hint: str =
 
 
 def _piped(path: Path, place: Location, most: int, hint: str) -> bytes:
-    """What comes out of a pipe, as that of `<(...)`.
+    """The content of a pipe, such as that of `<(...)`.
 
     Raises OSError for one that nobody has open to write to: it would be waited for, in silence.
     """
@@ -87,7 +87,7 @@ def quoted_if(path: Path, key: str, expected: str) -> Iterator[None]:
 
 
 def bounded(stream: BinaryIO, place: Location, most: int, hint: str = "") -> bytes:
-    """What a stream holds, at most `most` bytes; raises SpecError for more."""
+    """The content of a stream, at most `most` bytes; raises SpecError for more."""
     content = stream.read(most + 1)
     if len(content) > most:
         raise _too_large(place, most, "more", hint)

@@ -99,7 +99,7 @@ def name_of(source: Tabular) -> str:
 
 
 def _content(source: Tabular) -> tuple[str, bytes]:
-    """What the source is called in messages, and its text as CSV."""
+    """The name of the source in messages, and its text as CSV."""
     if isinstance(source, str | Path):
         hint = "a curve or a table of states is short"
         return str(source), content_of(Path(source), Location(str(source)), MAX_BYTES, hint)

@@ -129,7 +129,7 @@ def _by_unit(name: str, n_units: int) -> list[str]:
 
 
 def _check_numbers(sheet: Sheet, n_units: int) -> None:
-    """All columns at once, so that one message has what is wrong in any of them."""
+    """Read all columns at once, so that one message has the problems of all."""
     openings, pushes = (_by_unit(name, n_units) for name in ("opening{}_mm", "push{}_N"))
     _columns(sheet, [*TIP, TIP_ANGLE, *_angle_names(n_units), *openings, *pushes, SECONDS])
 

@@ -66,7 +66,7 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
 
 
 def is_own(path: Path, mark: Mark) -> bool:
-    """Whether a file has the mark, or nothing in it that could be lost."""
+    """Whether a file has the mark, or is empty."""
     with path.open("rb") as stream:
         head = stream.read(ENDS)
         stream.seek(max(len(head), stream.seek(0, os.SEEK_END) - ENDS))
@@ -75,14 +75,14 @@ def is_own(path: Path, mark: Mark) -> bool:
 
 
 def marks_of(path: Path) -> list[Mark]:
-    """What a file is, if it is of this program."""
+    """The kinds of file of this program that a file looks like; none for an empty one."""
     if not path.stat().st_size:
         return []
     return [mark for mark in Mark if mark is not Mark.ANY and is_own(path, mark)]
 
 
 def check_outputs(sources: Iterable[Path], *outputs: Output) -> None:
-    """Fail before the work: files that can be written, under names of their own.
+    """Check outputs before the work: files that can be written, under names of their own.
 
     Raises OutputError for what cannot be written, UsageError for one name twice or for one of
     the files that are read.
@@ -125,7 +125,7 @@ def run_file(table: Path) -> Path:
 
 
 def check_appendable(path: Path, sources: Iterable[Path]) -> None:
-    """Fail before the work rather than after it.
+    """Raise OutputError before the work rather than after it.
 
     Raises OutputError for what cannot be written, or is no text to append Markdown to;
     UsageError for one of the files that are read.
@@ -162,7 +162,7 @@ def _check_text(path: Path) -> None:
 
 
 def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:
-    """Fail before the work rather than after it."""
+    """Raise OutputError before the work rather than after it."""
     target = Path(os.path.realpath(path))
     try:
         with _beside(target):
@@ -204,7 +204,7 @@ def sole_use(folder: Path) -> Iterator[None]:
 
 
 def _handle(folder: Path) -> int:
-    """What is locked for a folder: itself, on Windows a file in it that goes when it is closed."""
+    """The path that is locked for a folder: itself; on Windows a file in it."""
     if OPENS_FOLDERS:
         return os.open(folder, os.O_RDONLY)
     return os.open(folder / ".dpg.lock", os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0))

@@ -38,7 +38,7 @@ FINGERPRINT = "dpg.fingerprint"
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
-    """The SHA-256 of what a sweep is about."""
+    """The SHA-256 of a sweep's metadata."""
     rest = {key: text for key, text in said.items() if key != FINGERPRINT}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
@@ -65,7 +65,7 @@ def write_part(
 
 
 def _as_list(batch: Any) -> Any:
-    """Rows as one list of them."""
+    """Blocks of rows, concatenated."""
     rows = batch.to_struct_array()
     ends = pa.py_buffer(np.array([0, len(rows)], np.int32))
     return pa.Array.from_buffers(pa.list_(rows.type), 1, [None, ends], children=[rows])
@@ -123,7 +123,7 @@ class PartStore:
         return not is_linked and (not os.path.lexists(said) or _is_description(said))
 
     def say(self, said: dict[str, str]) -> None:
-        """Keep what the sweep is about beside its parts; in no folder that is linked from here."""
+        """Write the sweep's metadata (sweep.json) beside its parts, never through a link."""
         for folder in (self.folder.parent, self.folder):
             if folder.is_symlink():
                 raise OutputError(f"cannot write {folder}: a link, and what it leads to may go")
@@ -136,7 +136,7 @@ class PartStore:
                 temporary.write_text(json.dumps(said, indent=2), encoding="utf-8", newline="\n")
 
     def said(self) -> dict[str, str]:
-        """What the sweep is about; empty where that is not said, or is damaged.
+        """The sweep's metadata (sweep.json); empty where the file is missing or damaged.
 
         Raises UsageError for what cannot be read.
         """
@@ -174,7 +174,7 @@ class PartStore:
         return [part for part in self.parts() if part.is_damaged]
 
     def missing(self, ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-        """What of these ranges, in their order, no part covers."""
+        """The parts of these ranges, in order, that are not stored yet."""
         waiting, gaps = deque(self.parts()), []
         for start, stop in ranges:
             here = start
@@ -196,7 +196,7 @@ def _is_description(path: Path) -> bool:
 
 
 def _digest(path: Path, sweep: Path) -> str:
-    """Of a part's bytes, as one of the sweep that a folder is of."""
+    """The SHA-256 of a part's bytes together with its sweep's name."""
     digest = hashlib.sha256(sweep.name.encode())
     with path.open("rb") as file:
         hashlib.file_digest(file, lambda: digest)

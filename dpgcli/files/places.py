@@ -1,4 +1,4 @@
-"""Where something stands in a file, and how problems with it are worded and put in order."""
+"""Locations in files, and how problems with them are worded and ordered."""
 
 import json
 import math

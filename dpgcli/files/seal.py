@@ -48,7 +48,7 @@ def is_whole_in(stream: BinaryIO) -> bool | None:
 
 
 def _place(stream: BinaryIO) -> int | None:
-    """Where the digits stand."""
+    """The byte range of the digits."""
     size = stream.seek(0, os.SEEK_END)
     start = stream.seek(max(size - TAIL, 0))
     found = stream.read(TAIL).rfind(HEAD)
@@ -56,7 +56,7 @@ def _place(stream: BinaryIO) -> int | None:
 
 
 def _sha256(stream: BinaryIO, place: int) -> bytes:
-    """Of all bytes but the digits at a place, as hexadecimal text."""
+    """SHA-256 of all bytes but the digits at a place, as hexadecimal text."""
     digest = hashlib.sha256()
     stream.seek(0)
     while block := stream.read(min(BLOCK, place - stream.tell())):

@@ -23,14 +23,14 @@ EXPECTED = {  # where it is not a length
 
 
 def wrong_width(sizes: Mapping[str, float]) -> Issue | None:
-    """What is wrong where the widths of cell and chamber disagree."""
+    """The problem, if unit_cell_mm contradicts chamber_width_mm."""
     problems = Problems()
     check_widths({key: np.array([size]) for key, size in sizes.items()}, problems)
     return next(iter(problems.of(0)), None)
 
 
 def expected_of(key: str) -> str:
-    """What a key of the geometry or the lattice expects, in words."""
+    """The values that a key of the geometry or the lattice can have, in words."""
     return EXPECTED.get(key, "a length > 0 in mm")
 
 

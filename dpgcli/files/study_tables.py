@@ -1,4 +1,4 @@
-"""What `bench` and `stress` found, as tables, and records of benchmarks for later ones."""
+"""Tables of `bench` and `stress`, and records of benchmarks for later ones."""
 
 import json
 import os
@@ -47,7 +47,7 @@ def write_stress(path: Path, outcomes: Sequence[Outcome], spec_json: str | None)
 
 
 def json_value(value: Any) -> Any:
-    """As JSON can say it: null for what was not measured, and .inf as in a spec."""
+    """The rows as JSON: null for what was not measured, and .inf as in a spec."""
     if not isinstance(value, float):
         return value
     return None if value != value else spelled(value)

@@ -16,7 +16,7 @@ from dpgcli.errors import UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
 
-TEXTS = ("calibration", "status", "reason", "rung")
+TEXTS = ("calibration", "status", "reason", "accuracy_level")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 MOST_FACTS = 2**26  # bytes

@@ -10,10 +10,10 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
 from dpgcli.states.margins import last_where, limits, margins
 from dpgcli.states.patterns import inverted_units, texts
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells

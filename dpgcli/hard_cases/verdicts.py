@@ -15,10 +15,10 @@ from dpgcli.hard_cases.cases import Case
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.plan import FORMULATIONS
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions

@@ -98,7 +98,7 @@ class Position:
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Of e, a and b of every unit, or of a and b."""
+        """Rows of e, a and b of every unit, or of a and b."""
         step, used = (2, (0, 1)) if self.is_rigid else (4, (0, 1, 2))
         return tuple(Row(1, step * unit + k) for unit in range(self.n_units) for k in used)
 

@@ -186,6 +186,9 @@ STUDY = {  # published; mm, N/mm, N mm/rad
 }
 
 
+MAY_BE_ZERO = ("force_linearity", "hinge_stiffness")
+
+
 def uniform_finger(
     n_units: int,
     *,
@@ -204,7 +207,16 @@ def uniform_finger(
     ...     bistable_stiffness=12.84, force_linearity=0.043, hinge_stiffness=24.2)
     >>> finger.is_rigid, finger.is_uniform, finger.n_designs
     (True, True, 1)
+    >>> uniform_finger(3, **{**STUDY, "stroke": -3.5})
+    Traceback (most recent call last):
+        ...
+    ValueError: stroke -3.5: expected a number > 0
     """
     values = {name: value for name, value in locals().items() if name != "n_units"}
+    if n_units < 1:
+        raise ValueError(f"n_units {n_units}: expected 1 or more")
+    for name, value in values.items():
+        if not (value > 0.0 or (value == 0.0 and name in MAY_BE_ZERO)):
+            raise ValueError(f"{name} {value}: expected a number > 0")
     arrays = {name: np.array([[float(value)]]) for name, value in values.items()}
     return Finger(n_units, **arrays)  # type: ignore[arg-type]  # all arrays

@@ -1,10 +1,10 @@
-"""What a plan leaves out of a scene, and why."""
+"""Omissions of a plan, and their reasons."""
 
 from dataclasses import dataclass
 
 from dpgcli.design.scene import Scene
+from dpgcli.states.accuracy import Exactness
 from dpgcli.states.pairs.halves import Split
-from dpgcli.states.rungs import Exactness
 from dpgcli.states.units import UnitSolutions
 
 
@@ -20,7 +20,7 @@ class Omission:
 def omissions(
     scene: Scene, units: UnitSolutions, split: Split | None, n_solves: int, exactness: Exactness
 ) -> tuple[Omission, ...]:
-    """What the plan of a scene leaves out of its energy, its unknowns and its solves."""
+    """Omitted terms, unknowns and solves of a scene."""
     finger = units.finger
     n = finger.n_units
     left_out = [Omission("loads, pressure and contact", "the spec has none")]

@@ -1,4 +1,4 @@
-"""What a scene needs, decided once: `explain` prints the plan, `predict` carries it out."""
+"""The plan of a scene, decided once: `explain` prints it, `predict` carries it out."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -11,6 +11,14 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.accuracy import (
+    DEFAULT_TOLERANCE,
+    AccuracyLevel,
+    Exactness,
+    bar_flexibility,
+    check_exactness,
+    exactnesses,
+)
 from dpgcli.states.certify import Status
 from dpgcli.states.chosen_columns import chosen_columns
 from dpgcli.states.columns import Group
@@ -21,14 +29,6 @@ from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.quantities import ALWAYS, Quantity, declared, shares
 from dpgcli.states.rows import RowRequest
-from dpgcli.states.rungs import (
-    DEFAULT_TOLERANCE,
-    Exactness,
-    Rung,
-    bar_flexibility,
-    check_exactness,
-    exactnesses,
-)
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 
@@ -46,10 +46,10 @@ class Method(StrEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a scene: which states (globs, none = all), which columns, how exactly.
+    """A request: which states (globs, none = all), which columns, how exactly.
 
     `tolerance` is the largest residual over the forces in play, (k_b + k_θ/H²) d. With a
-    `target_error` (mm, of the tip) the plan takes the cheapest rung that is bounded by it.
+    `target_error` (mm, of the tip) the plan takes the cheapest level that is bounded by it.
     """
 
     patterns: tuple[str, ...] = ()
@@ -66,7 +66,7 @@ class Plan:
     `selection` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
     bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
-    `rung` was chosen for the target error, if there is one; `error_bound` (mm) is what it
+    `accuracy_level` was chosen for the target error, if there is one; `error_bound` (mm) is what it
     promises for every tip, and infinite where nothing can be promised before the work.
     """
 
@@ -103,18 +103,18 @@ class Plan:
         return self.exactness.units
 
     @property
-    def rung(self) -> Rung | None:
-        """What was chosen for the target error, if there is one."""
-        return self.exactness.rung
+    def accuracy_level(self) -> AccuracyLevel | None:
+        """The accuracy level chosen for the target error, if there is one."""
+        return self.exactness.accuracy_level
 
     @property
     def dropped_error(self) -> float:
-        """What dropping the scene's bars adds to the error of each tip, mm."""
+        """Bound on the tip displacement by the bars that were dropped, mm."""
         return float(self.exactness.dropped_error[0])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Those of its columns, what every state is judged by, and shares of uncertainties."""
+        """The quantities to compute: those of its columns, those that judge every state, shares."""
         wanted = dict.fromkeys((*ALWAYS, *self.columns, *self.shares.values()))
         return tuple(wanted)
 
@@ -132,7 +132,7 @@ class Plan:
 
     @property
     def rows(self) -> RowRequest:
-        """The plan as far as batches of states need it."""
+        """The part of the plan that batches of states need."""
         scene = self.scene
         return RowRequest(
             FORMULATIONS[self.request.formulation],
@@ -235,7 +235,7 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
 
 
 def _asked_for(request: Request) -> Iterator[Quantity]:
-    """What columns ask for by name or by group, as far as every finger has it."""
+    """Quantities that columns name, themselves or by group, among those of every finger."""
     names = {*request.columns, *(Group if "all" in request.columns else ())}
     return (q for q in declared(1, (), False) if q.name in names or q.group in names)
 
@@ -271,7 +271,7 @@ def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> boo
 
 
 def _flexibility(units: UnitSolutions) -> float:
-    """What the bars do to the tip (mm); rigid ones: what a stiffness of 1000 springs would."""
+    """Bound on the tip displacement by bar elasticity, mm; rigid bars count as k_L = 1000 k_b."""
     finger = units.finger
     if finger.is_rigid:
         units = UnitSolutions.of(finger.with_bars(1e3 * float(finger.bistable_stiffness.max())))

@@ -28,7 +28,7 @@ class Breakdown:
 
 @dataclass
 class Summary:
-    """What a prediction came to, so far; errors and residuals are the largest of stable states.
+    """Summary of the states solved so far; errors and residuals are the largest of stable states.
 
     Residual in N, tip error in mm, times in seconds spent on the states alone. `breakdown` is of
     the least certain state, by the columns of `shares`, if there are any.

@@ -307,7 +307,7 @@ _LAYERS = {"B": "limiting-layer node", "T": "dome-axis node"}
 
 
 def _nodes(n_units: int, *fingers: str) -> tuple[Quantity, ...]:
-    """Of one finger, or of the two of a gripper."""
+    """Node positions of one finger, or of the two of a gripper."""
     return tuple(
         _node(finger, layer, station, axis)
         for finger in fingers

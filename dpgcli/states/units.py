@@ -1,4 +1,4 @@
-"""What is known of a finger's units before any pattern is solved."""
+"""Solutions of single units: wells, barriers and openings, before any pattern is solved."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twic
 
 @dataclass(frozen=True)
 class UnitSolutions:
-    """What is known of a finger's units before any pattern is solved."""
+    """Solutions of single units: wells, barriers and openings, before any pattern is solved."""
 
     finger: Finger
     wells: Wells

@@ -1,4 +1,4 @@
-"""A single unit with rigid bars: where it rests, where it turns over, and what it bears.
+"""Wells and barrier of one unit with rigid bars, and the moment it bears before it snaps.
 
 By symmetry both corners open by m = φ/2, so x = 2H sin m, and a zero of the force other than
 x = 0 is a root of r(u) = 1 + β(2u² − 3u) + κ φ/sin φ with u = x/d, κ = k_θ/(k_b H²). r is convex

@@ -31,7 +31,7 @@ THREADS = (
     "CCX_NPROC_RESULTS",
     "NUMBER_OF_CPUS",
 )
-"""What CalculiX reads the number of its threads from (manual, "How to run CalculiX")."""
+"""Variables that set the threads of CalculiX (its manual, "How to run CalculiX")."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Output:
-    """What a run printed: displacements, and its log."""
+    """The output of a run: displacements, and its log."""
 
     displacements: str
     log: str
@@ -67,7 +67,7 @@ def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
 
 
 def files(deck: Path) -> tuple[Path, ...]:
-    """What is written on the way from a deck to its curve."""
+    """The files between a deck and its curve."""
     return tuple(deck.with_suffix(suffix) for suffix in MARKS)
 
 

@@ -78,7 +78,7 @@ def _write_tables(
 
 
 def cost(study: Study) -> str:
-    """What a sweep takes, in words."""
+    """Time, disk and memory of a sweep, in words."""
     extent = study.extent
     less = ", less what constraints exclude" if study.sweep.constraints else ""
     return (

@@ -17,7 +17,7 @@ from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
-from dpgcli.states.rungs import DEFAULT_TOLERANCE
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
@@ -118,7 +118,7 @@ class Study:
 
     @cached_property
     def extent(self) -> Extent:
-        """What the sweep takes."""
+        """Time, disk and memory of the sweep."""
         allowed = self.evaluation.allowed if self.sweep.constraints else None
         return Extent(self.sweep.space, self.sweep.base.finger.units, allowed)
 
@@ -276,7 +276,7 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
 
 
 def outputs(folder: Path) -> tuple[tuple[Path, Mark], ...]:
-    """What a finished sweep writes into its folder."""
+    """The files of a finished sweep."""
     tables = ((folder / name, Mark.TABLE) for name in (STATES, DESIGNS))
     return (*tables, (folder / RUN, Mark.FACTS), (folder / REPORT, Mark.REPORT))
 
@@ -294,7 +294,7 @@ def drop_half_written(folder: Path) -> None:
 
 
 def stores(folder: Path) -> list[PartStore]:
-    """What unfinished sweeps left in a folder."""
+    """The parts of unfinished sweeps in a folder."""
     return [store for store in _stores(folder) if (store.folder / SAID).exists()]
 
 

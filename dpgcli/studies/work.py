@@ -1,4 +1,4 @@
-"""What a worker does with a chunk of designs, and what it sends back."""
+"""A worker's task: evaluate a chunk of designs, store its part, send back counts."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from time import process_time
 from typing import IO, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
-from dpgcli.sweeps.evaluation import Evaluation, Numbers, Tables
+from dpgcli.sweeps.evaluation import Evaluation, Tables, Values
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker
 
 
 class ChunkResult(NamedTuple):
-    """What a worker sends back: counts, CPU seconds, and the part if it could not store it.
+    """A worker's result: counts, CPU seconds, and the part if it could not store it.
 
     Without the bytes it is shorter than what a pipe takes at once: a worker that is killed
     while it sends leaves no half of a message, for the rest of which the pool would wait.
@@ -27,12 +27,12 @@ class ChunkResult(NamedTuple):
 
 @dataclass(frozen=True)
 class ChunkTask:
-    """What a worker does with a chunk; `store` is None where it sees no common disk."""
+    """The task of a chunk; `store` is None where the worker sees no common disk."""
 
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Numbers], maker: Maker) -> ChunkResult:
+    def __call__(self, chunk: Chunk, values: dict[str, Values], maker: Maker) -> ChunkResult:
         """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
         check_maker(maker)
         return self.stored(chunk, self.evaluation(chunk.start, values))

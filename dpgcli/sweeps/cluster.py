@@ -17,7 +17,7 @@ SILENCE = 10  # s after which a word is said
 
 @dataclass
 class Watch:
-    """Says that workers are missing or silent, and gives up after `limit` seconds without any."""
+    """Reports missing or silent workers, and gives up after `limit` seconds without any."""
 
     name: str
     n_workers: Callable[[], int]
@@ -96,7 +96,7 @@ def _client(scheduler: str) -> Any:
 
 
 def _threads(client: Any) -> dict[str, int]:
-    """Threads of each worker; none of a scheduler that does not answer."""
+    """Threads of each worker; empty if the scheduler does not answer."""
     try:
         found: dict[str, int] = client.nthreads(callback_timeout=PATIENCE)
     except OSError:
@@ -105,7 +105,7 @@ def _threads(client: Any) -> dict[str, int]:
 
 
 def _answers(client: Any, question: Callable[[], Any]) -> dict[str, Any]:
-    """What each worker says; nothing of any while one is stopped."""
+    """The answer of each worker; no answers while one is stopped."""
     try:
         found: dict[str, Any] = client.run(question, on_error="return", callback_timeout=PATIENCE)
     except TimeoutError:

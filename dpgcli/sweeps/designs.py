@@ -8,10 +8,10 @@ import numpy as np
 from dpgcli.arrays import Array, Codes, Columns, Indices
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.accuracy import Exactness
 from dpgcli.states.patterns import chunks, inverted_units
 from dpgcli.states.quantities import Quantity
 from dpgcli.states.rows import RowRequest, solved_rows
-from dpgcli.states.rungs import Exactness
 from dpgcli.states.settle import lanes_at_once
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
@@ -77,7 +77,7 @@ def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
 
 
 def _joined(parts: Sequence[Columns]) -> Columns:
-    """Rows below each other."""
+    """Concatenate rows."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

@@ -12,20 +12,20 @@ from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
+from dpgcli.states.accuracy import exactnesses
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
-from dpgcli.states.rungs import exactnesses
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.sweeps.space import Space
 
-Numbers = NDArray[Any]
+Values = NDArray[Any]
 
 
 class DesignStatus(StrEnum):
-    """What became of a design."""
+    """The status of a design."""
 
     STABLE = "stable"  # every pattern has its certified state
     PARTLY_STABLE = "partly_stable"  # some patterns have none
@@ -47,7 +47,7 @@ class Evaluation:
 
     `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
     a design that has a value which its key cannot have, from its values. `values` are the columns
-    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest rung
+    of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest level
     that is bounded by it.
     """
 
@@ -71,7 +71,7 @@ class Evaluation:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What is told of each state."""
+        """The quantities of each state."""
         every = declared(1, (), bool(self.base.gripper))
         return tuple(quantity for quantity in every if quantity.group in self.groups)
 
@@ -79,10 +79,10 @@ class Evaluation:
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
         metrics = (c for c in METRICS if c.group in self.groups)
-        rung = () if self.target_error is None else RUNG_COLUMNS
-        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *rung)
+        chosen = () if self.target_error is None else LEVEL_COLUMNS
+        return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
 
-    def __call__(self, start: int, values: Mapping[str, Numbers]) -> Iterator[Tables]:
+    def __call__(self, start: int, values: Mapping[str, Values]) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
 
         One design comes in blocks of its states, the row of the design with the last.
@@ -105,7 +105,7 @@ class Evaluation:
         )
 
     def _resolved(
-        self, values: Mapping[str, Numbers], allowed: Flags
+        self, values: Mapping[str, Values], allowed: Flags
     ) -> "tuple[list[tuple[Indices, Scene]], Indices, dict[int, str]]":
         """Designs that share a batch, by their places, with what they describe.
 
@@ -130,7 +130,7 @@ class Evaluation:
         return batches, origins, reasons
 
     def _designs(
-        self, values: Mapping[str, Numbers], places: Indices
+        self, values: Mapping[str, Values], places: Indices
     ) -> Iterator[tuple[Indices, Design]]:
         """The designs at some places, by their number of units."""
         columns = {key: column[places] for key, column in values.items()}
@@ -141,7 +141,7 @@ class Evaluation:
             base = replace(self.base, units=int(n_units), n_designs=len(here))
             yield places[here], base.with_values(own)
 
-    def _are_possible(self, values: Mapping[str, Numbers]) -> Flags:
+    def _are_possible(self, values: Mapping[str, Values]) -> Flags:
         """Which designs have only values that their keys can have."""
         own = (key.removeprefix("gripper.") for key in values if key.startswith("gripper."))
         gripper = {*self.base.gripper, *own}
@@ -151,7 +151,7 @@ class Evaluation:
             possible &= are_possible(key.rsplit(".", 1)[-1], column)
         return possible
 
-    def failed(self, design: int, values: Mapping[str, Numbers]) -> Tables:
+    def failed(self, design: int, values: Mapping[str, Values]) -> Tables:
         """The rows of one design that cannot be evaluated at all."""
         described = {**self._described(design, values), "calibration": np.array([b""])}
         rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
@@ -162,11 +162,11 @@ class Evaluation:
     def _no_designs(self) -> Columns:
         return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.design_columns}
 
-    def _described(self, start: int, values: Mapping[str, Numbers]) -> Columns:
+    def _described(self, start: int, values: Mapping[str, Values]) -> Columns:
         numbers = np.arange(start, start + len(next(iter(values.values()))))
         return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
 
-    def allowed(self, values: Mapping[str, Numbers]) -> NDArray[np.bool_]:
+    def allowed(self, values: Mapping[str, Values]) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
         n_designs = len(next(iter(values.values())))
         known: dict[str, Any] = {**self.known, **values}
@@ -182,9 +182,9 @@ class Evaluation:
         for some, exactness in found:
             alike = scene if len(some) == len(places) else scene.take_lanes(some)
             for block in design_states(alike, exactness, self.quantities):
-                if block.metrics is not None and exactness.rung is not None:
-                    name = np.full(len(block.places), exactness.rung.name, "S24")
-                    block.metrics["rung"] = name
+                if block.metrics is not None and exactness.accuracy_level is not None:
+                    name = np.full(len(block.places), exactness.accuracy_level.name, "S24")
+                    block.metrics["accuracy_level"] = name
                     block.metrics["error_bound_mm"] = exactness.error_bounds[block.places]
                 yield _Solved(places[some][block.places], block.rows, block.metrics)
 
@@ -238,8 +238,8 @@ class Evaluation:
 DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
 CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)
 STATUS = Column("status", "", "what became of the design", kind=Kind.TEXT)
-RUNG_COLUMNS = (
-    Column("rung", "", "way chosen for the target error", kind=Kind.TEXT),
+LEVEL_COLUMNS = (
+    Column("accuracy_level", "", "chosen for the target error", kind=Kind.TEXT),
     Column("error_bound_mm", "mm", "bound on the tips' error before the work"),
 )
 EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
@@ -249,7 +249,7 @@ REASON = Column("reason", "", "why the design is invalid", kind=Kind.TEXT)
 class _Solved(NamedTuple):
     """Designs at some places of a chunk: rows of their states, and, with the last, metrics."""
 
-    places: Numbers
+    places: Values
     rows: Columns
     metrics: Columns | None
 

@@ -1,4 +1,4 @@
-"""Where chunks of work run: one seam, `concurrent.futures.Executor`, and what to do if it breaks.
+"""Chunks of work on any `concurrent.futures.Executor`, and recovery when a worker dies.
 
 A chunk is a range of cases. A worker that dies takes a whole process pool with it; then the
 chunks that were under way are tried once more, each alone in a pool of its own. A chunk that
@@ -79,7 +79,7 @@ def chunked(missing: Iterable[tuple[int, int]], size: int) -> Iterator[Chunk]:
 
 @dataclass(frozen=True)
 class Result(Generic[T]):
-    """What came of a chunk; no value where its single case killed every worker it met."""
+    """The result of a chunk; no value where its single case killed every worker it met."""
 
     chunk: Chunk
     value: T | None
@@ -148,7 +148,7 @@ class Runner(Generic[T]):
         return list(under_way.values())
 
     def _done(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
-        """What is done as soon as something is; meanwhile the workplace is looked after."""
+        """Wait for the first results, looking after the workers meanwhile."""
         began = monotonic()
         while not (done := wait(futures, PERIOD, FIRST_COMPLETED).done):
             self.workplace.watch(monotonic() - began)
@@ -171,7 +171,7 @@ class Runner(Generic[T]):
             yield Result(chunk, value)
 
     def _check_that_a_worker_starts(self) -> None:
-        """Try a few times: what killed a worker before may hit the one that tries, too."""
+        """Start a worker, up to three attempts."""
         for is_last in (*(False,) * (TRIALS - 1), True):
             try:
                 with self._open(1) as executor:
@@ -199,7 +199,7 @@ class Runner(Generic[T]):
 
 @dataclass(frozen=True)
 class Backend:
-    """Where to run: how to make an executor of n workers, and how many.
+    """A backend: a function that makes an executor of n workers, and their number.
 
     `is_local` says that workers see this machine's files. `broken` is what an executor raises
     when a worker dies, `lost` when there is nobody left to ask. `ask` puts a question to each
@@ -303,7 +303,7 @@ class _Pool(ProcessPoolExecutor):
     """A pool that no signal stops halfway through starting or ending its processes."""
 
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """As of the base; without a fork server the pool is broken.
+        """Submit as the base does; without a fork server the pool is broken.
 
         Raises WorkplaceError where the system allows no more processes.
         """
@@ -325,14 +325,14 @@ class _Pool(ProcessPoolExecutor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As of the base."""
+        """Shut down as the base does."""
         with _held_signals():
             super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 @contextmanager
 def _held_signals() -> Iterator[None]:
-    """Hold back what would stop the main thread until the end of the block."""
+    """Hold back signals to the main thread until the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -357,7 +357,7 @@ def _start_worker() -> None:
 
 
 def _end_with_parent() -> None:
-    """A killed parent cannot end its workers; they would wait for work forever."""
+    """End with the parent: a killed one cannot end its workers, which would wait forever."""
     from multiprocessing import parent_process
     from multiprocessing.connection import wait as wait_for
 

@@ -1,4 +1,4 @@
-"""How much a sweep is, before it is begun: its longest finger, states, time; what is too much."""
+"""Extent of a sweep before it begins: longest finger, states, time, disk; and its limits."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ ASKED_AT_ONCE = 2**14
 
 @dataclass(frozen=True)
 class Extent:
-    """What a sweep takes; constraints count where there are long fingers that they may exclude.
+    """Extent of a sweep; constraints count where there are long fingers that they may exclude.
 
     `base_units` is the number of units where the space leaves it alone. `allowed` says, if there
     are constraints, which designs meet them, from their values by key.
@@ -55,7 +55,7 @@ class Extent:
 
     @property
     def bytes_needed(self) -> int:
-        """Of the disk, at most at once."""
+        """Bytes on the disk, at most at once."""
         return 2 * self.n_states * BYTES_PER_STATE
 
     @property
@@ -71,7 +71,7 @@ class Extent:
 
     @property
     def seconds(self) -> float:
-        """Of one core; rough, good to a factor of two either way."""
+        """Seconds of one core, good to a factor of two either way."""
         of_states = self.n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
         return self.space.size * DESIGN_SECONDS + of_states
 
@@ -126,7 +126,7 @@ def size_text(n_bytes: float) -> str:
 
 
 def _counted(units: NDArray[Any]) -> dict[int, int]:
-    """How many of these numbers of units are which, of those that a finger can have."""
+    """Counts of each possible number of units among these."""
     possible = units[(units >= 1) & (units <= MAX_UNITS)]
     values, counts = np.unique(possible.astype(np.int64), return_counts=True)
     return dict(zip(values.tolist(), counts.tolist(), strict=True))

@@ -72,7 +72,7 @@ class Metrics:
         return np.where(self.n_stable > 0, self.extremes[name], np.nan)
 
     def alike(self, value: int | Array) -> Array | Indices:
-        """What is the same for all designs, or there already, for each, (design,)."""
+        """A value of each design, or one for all, as (design,)."""
         return np.broadcast_to(value, self.n_designs)
 
     def area(self) -> Array:

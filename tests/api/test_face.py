@@ -17,7 +17,7 @@ from dpgcli.cli.spelling import option_of, with_options
 from dpgcli.errors import DpgError, Field, Message, UsageError, respelled
 
 PACKAGE = Path(dpg.__file__).parent
-README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+MANUAL = "".join(p.read_text(encoding="utf-8") for p in (PACKAGE / "manual").glob("*.md"))
 FUNCTIONS = [name for name in dpg.__all__ if inspect.isfunction(getattr(dpg, name))]
 HEAVY = {"numpy", "scipy", "pandas", "pyarrow", "pydantic", "matplotlib"}
 
@@ -75,7 +75,7 @@ def test_messages_name_fields_of_functions() -> None:
 
 @pytest.mark.parametrize("field", sorted(fields()))
 def test_the_command_line_has_an_option_for_each_field(field: str) -> None:
-    assert re.search(rf"`?{option_of(field)}\b", README)
+    assert re.search(rf"`?{option_of(field)}\b", MANUAL)
 
 
 def test_lower_floors_name_no_option() -> None:

@@ -44,6 +44,11 @@ def test_the_start_loads_nothing_heavy(loaded: Loaded, option: str) -> None:
     assert loaded(option) & AT_START == set()
 
 
+@pytest.mark.parametrize("arguments", [(), ("columns",)])
+def test_the_manual_loads_no_numerics(loaded: Loaded, arguments: tuple[str, ...]) -> None:
+    assert loaded("help", *arguments) & (AT_START - {"pydantic"}) == set()
+
+
 @pytest.mark.parametrize("name", ["predict", "validate", "init"])
 def test_help_of_a_command_loads_no_numerics(loaded: Loaded, name: str) -> None:
     assert loaded(name, "--help") & (AT_START - {"pydantic"}) == set()

@@ -407,13 +407,13 @@ def test_designs_choose_by_their_target_error(call: Any, sweep: Path) -> None:
     assert result.exit_code == ExitCode.DONE
     assert "chosen for the target error: " in result.stderr
     fine = pd.read_parquet(out / "designs.parquet").dropna(subset="error_bound_mm")
-    assert set(fine["rung"]) <= {"tolerance 1e-09", "tolerance 1e-12"}
+    assert set(fine["accuracy_level"]) <= {"tolerance 1e-09", "tolerance 1e-12"}
     assert (fine["error_bound_mm"] <= 1e-5).all()
     again = call("sweep", "sweep.yaml", *SERIAL, "--target-error", "0.00001mm")
     assert "up to date" in again.stderr
     assert call("sweep", "sweep.yaml", *SERIAL, "--target-error", "1mm").exit_code == 0
     rough = pd.read_parquet(out / "designs.parquet").dropna(subset="error_bound_mm")
-    assert set(rough["rung"]) == {"rigid bars"}
+    assert set(rough["accuracy_level"]) == {"rigid bars"}
     assert (rough["max_numerical_error_mm"] <= rough["error_bound_mm"]).all()
     assert (rough["error_bound_mm"] <= 1.0).all()
     assert rough["stiffness_max_N_per_mm"].isna().all(), "the bars carry it"

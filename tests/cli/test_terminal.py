@@ -3,6 +3,7 @@
 import fcntl
 import os
 import pty
+import re
 import struct
 import subprocess
 import termios
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 Shown = Callable[..., tuple[int, str]]
+ESCAPES = re.compile(r"\x1b\[[0-9;]*m")
 COLORFUL = (
     {"FORCE_COLOR": "1"},
     {"TTY_COMPATIBLE": "1"},
@@ -47,7 +49,7 @@ def shown(start: Any) -> Shown:
 @pytest.mark.parametrize("env", COLORFUL, ids=lambda env: next(iter(env)))
 @pytest.mark.parametrize(
     "arguments",
-    [("predict", "three_unit.yaml"), ("predict", "--nope")],
+    [("predict", "three_unit.yaml"), ("predict", "--nope"), ("help", "sweeps"), ("help",)],
 )
 def test_no_escape_codes_in_pipes(
     run: Any, env: dict[str, str], arguments: tuple[str, ...]
@@ -92,3 +94,14 @@ def test_no_progress_in_a_pipe(run: Any, folder: Path) -> None:
     assert "\r" not in result.stderr
     assert "%" not in result.stderr.splitlines()[0]
     assert "1,048,576 stable" in result.stderr
+
+
+@pytest.mark.parametrize("columns", [40, 120])
+def test_pages_are_rendered_in_the_width_of_the_terminal(shown: Shown, columns: int) -> None:
+    code, text = shown("help", "sweeps", columns=columns)
+    lines = [ESCAPES.sub("", line) for line in text.split("\n")]
+    assert code == 0
+    assert "\x1b[" in text
+    assert max(map(len, lines)) <= columns
+    assert not any(line.startswith("#") or "|---|" in line for line in lines)
+    assert "(dpg help" in " ".join(" ".join(lines).split())

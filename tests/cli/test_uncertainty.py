@@ -68,7 +68,10 @@ def test_a_summary_ends_with_what_is_known_of_the_model(call: Call, name: str) -
     )
     other = call("predict", name, *lever, "-s", f"finger.lattice={lattice}")
     assert other.exit_code == 0
-    assert "the model's own error: unknown for these values" in other.stderr.splitlines()[-1]
+    assert (
+        "the model's own error: unknown for this law and these values"
+        in other.stderr.splitlines()[-1]
+    )
 
 
 def test_what_uncertainties_cover_is_said_on_every_output(call: Call, folder: Path) -> None:

@@ -10,7 +10,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.design.calibrations import PUBLISHED, Calibration, DomeCurve, Fitted, Grid
-from dpgcli.design.dimensions import Design, Section, are_possible
+from dpgcli.design.dimensions import Design, GivenValues, are_possible
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import ORIGINS
 from dpgcli.files.scene_file.models import FingerSpec, GripperSpec
@@ -55,17 +55,17 @@ def dome() -> Calibration:
 
 
 DESIGNS = {
-    "published": Design(5, Section(sizes(**GEOMETRY)), {}, np.array([1e4]), (PUBLISHED,)),
+    "published": Design(5, GivenValues(sizes(**GEOMETRY)), {}, np.array([1e4]), (PUBLISHED,)),
     "graded": Design(
         5,
-        Section(sizes(**GEOMETRY)),
-        {"4-5": Section(sizes(dome_height_mm=7.1, unit_separation_mm=3.3))},
+        GivenValues(sizes(**GEOMETRY)),
+        {"4-5": GivenValues(sizes(dome_height_mm=7.1, unit_separation_mm=3.3))},
         np.array([1e4]),
         (PUBLISHED,),
     ),
     "given": Design(
         3,
-        Section(sizes(**GEOMETRY), sizes(stroke_mm=3.5, hinge_stiffness_N_mm_per_rad=20.0)),
+        GivenValues(sizes(**GEOMETRY), sizes(stroke_mm=3.5, hinge_stiffness_N_mm_per_rad=20.0)),
         {},
         np.array([np.inf]),
         (PUBLISHED,),
@@ -73,7 +73,7 @@ DESIGNS = {
     **{
         f"{method}, {is_regular}": Design(
             2,
-            Section(sizes(**{**GEOMETRY, "elastic_modulus_MPa": 28.0})),
+            GivenValues(sizes(**{**GEOMETRY, "elastic_modulus_MPa": 28.0})),
             {},
             np.array([1e4]),
             (grid(method, is_regular=is_regular), PUBLISHED),
@@ -82,7 +82,9 @@ DESIGNS = {
         for is_regular in (True, False)
     },
     **{
-        law: Design(4, Section(sizes(**GEOMETRY)), {}, np.array([1e4]), (dome(), PUBLISHED), law)
+        law: Design(
+            4, GivenValues(sizes(**GEOMETRY)), {}, np.array([1e4]), (dome(), PUBLISHED), law
+        )
         for law in ("tabulated", "push_only")
     },
 }

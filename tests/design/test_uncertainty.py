@@ -7,7 +7,7 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.design.calibrations import PUBLISHED, Calibration, DomeCurve, Fitted
-from dpgcli.design.dimensions import LEAVE_ONE_OUT, Design, Section, Tolerance
+from dpgcli.design.dimensions import LEAVE_ONE_OUT, Design, GivenValues, Tolerance
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import FITTED, MODEL, UNKNOWN, Step, Uncertainty
 from dpgcli.mechanics.finger import KEYS
@@ -51,10 +51,10 @@ def dome() -> Calibration:
     return Calibration("dome.yaml", values, HERE, curve=DomeCurve(travel, energy, 1.0))
 
 
-BASE = Design(4, Section(GEOMETRY), calibrations=(PUBLISHED,))
+BASE = Design(4, GivenValues(GEOMETRY), calibrations=(PUBLISHED,))
 DESIGNS = {
     "published": BASE,
-    "graded": replace(BASE, overrides={"2-3": Section({"dome_height_mm": np.array([7.1])})}),
+    "graded": replace(BASE, overrides={"2-3": GivenValues({"dome_height_mm": np.array([7.1])})}),
     "fitted at its own geometry": replace(BASE, calibrations=(LEVER, PUBLISHED)),
     "a dome that only pushes": replace(BASE, calibrations=(dome(), PUBLISHED), law="push_only"),
 }
@@ -70,7 +70,7 @@ def tolerated(design: Design, **tolerances: Tolerance) -> Uncertainty:
 def moved(design: Design, key: str, share: float) -> dict[str, Array]:
     """The lattice with a dimension changed by a share in all units."""
 
-    def changed(section: Section) -> Section:
+    def changed(section: GivenValues) -> GivenValues:
         own = {k: v * (1.0 + share) if k == key else v for k, v in section.geometry.items()}
         return replace(section, geometry=own)
 
@@ -192,7 +192,7 @@ def test_a_lever_that_is_given_is_the_study_s_or_unknown() -> None:
             "force_linearity": 0.043,
             "hinge_stiffness_N_mm_per_rad": 24.2,
         }
-        return Design(2, Section(lattice={k: np.array([v]) for k, v in lattice.items()}))
+        return Design(2, GivenValues(lattice={k: np.array([v]) for k, v in lattice.items()}))
 
     assert known_of(given(10.75)) == (FINITE_ELEMENTS, None)
     assert known_of(given(13.2)) == (UNKNOWN.text, None)
@@ -214,7 +214,7 @@ def test_a_calibration_in_use_says_its_own() -> None:
     moved_text, _ = known_of(fitted.with_values({"finger.geometry.unit_cell_mm": np.array([24.0])}))
     assert moved_text.endswith(", at the geometry of the fit, which is another")
     lever = {"segment_height_mm": np.array([10.75])}
-    assert known_of(replace(fitted, finger=Section(GEOMETRY, lever))) == (FINITE_ELEMENTS, None)
+    assert known_of(replace(fitted, finger=GivenValues(GEOMETRY, lever))) == (FINITE_ELEMENTS, None)
 
 
 def test_the_spec_s_word_comes_first() -> None:

@@ -157,7 +157,7 @@ def test_dropping_the_bars_stays_within_its_bound(graded_finger: Fingers, law: D
         stable = exact["status"] == "stable"
         cheap = predict(Scene(finger, ()), Request(target_error=1.0))
         bound, found = cheap.plan.error_bound, cheap.arrays()
-        assert cheap.plan.rung is not None and cheap.plan.rung.drops_bars
+        assert cheap.plan.accuracy_level is not None and cheap.plan.accuracy_level.drops_bars
         moved = np.hypot(
             found["tip_x_mm"] - exact["tip_x_mm"], found["tip_y_mm"] - exact["tip_y_mm"]
         )

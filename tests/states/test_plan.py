@@ -14,9 +14,9 @@ from dpgcli.equilibrium.potential import Potential
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states import settle as settle_module
+from dpgcli.states.accuracy import bar_flexibility
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
-from dpgcli.states.rungs import bar_flexibility
 from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]

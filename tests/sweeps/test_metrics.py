@@ -8,10 +8,10 @@ import pytest
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
+from dpgcli.states.accuracy import Exactness
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
-from dpgcli.states.rungs import Exactness
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import Block, design_states
 from dpgcli.sweeps.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics

@@ -64,8 +64,8 @@ def fit_bistable(
     (2.0, 2.0)
     """
     mapping = travel_to_opening
-    opening = Opening.of(mapping) if isinstance(mapping, str) else mapping
-    held = _held(fix or {}, None if free is None else as_texts(free))
+    opening = mapping if isinstance(mapping, Opening) else Opening.of(str(mapping))
+    held = _held(fix or {}, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, sizes(where))
@@ -138,7 +138,7 @@ def _held(fix: Mapping[str, float], free: Sequence[str] | None) -> dict[str, flo
 
 
 def _quantity(record: Record, asked: str | None) -> Quantity:
-    """What to fit: what is asked for, or the first that there is."""
+    """The quantity to fit: the one asked for, or the first that the curve has."""
     has = [q for q in Quantity if getattr(record, q.value, None) is not None]
     if asked is None:
         return has[0]

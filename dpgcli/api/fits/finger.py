@@ -70,7 +70,7 @@ def fit_finger(
     check_loss(weighted, loss_scale)
     met = chosen(Target, "target", target)
     frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
-    keys = as_texts(free)
+    keys = as_texts("free", free)
     if not keys:
         raise UsageError(Field("free"), ": expected one key or more")
     check_resampling(bootstrap, seed)

@@ -1,11 +1,11 @@
-"""What a fit came to, and what all fits take."""
+"""The result of a fit, and the arguments that all fits share."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
-from dpgcli.api.inputs import check_positive, figure_path, keys_of, setting_texts
+from dpgcli.api.inputs import check_positive, figure_path, keys_of, path_of, setting_texts
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.calibration.choices import Loss
@@ -62,7 +62,7 @@ class FitResult(Generic[T]):
 
         Raises OutputError where it cannot be written, or something else stands there.
         """
-        write_calibration(Path(path), self.calibration)
+        write_calibration(path_of("path", path), self.calibration)
 
     def draw(self, path: str | Path) -> None:
         """Draw data, fit and residuals to a .svg or .png file; raises UsageError for a grid."""
@@ -103,7 +103,7 @@ def with_geometry(geometry: GeometryInput, base: Geometry | None) -> Geometry | 
     """A base geometry with values changed or added."""
     if isinstance(geometry, Geometry):
         geometry = sizes(geometry)
-    return geometry_of(setting_texts(geometry), base) if geometry else base
+    return geometry_of(setting_texts(geometry, "geometry"), base) if geometry else base
 
 
 def sizes(geometry: Geometry | None) -> dict[str, float]:

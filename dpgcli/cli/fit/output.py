@@ -1,4 +1,4 @@
-"""What a fit writes and prints: its calibration, its figure, its values, and words about them."""
+"""Output of a fit: its calibration, its figure, its values, and words about them."""
 
 import sys
 from collections.abc import Sequence

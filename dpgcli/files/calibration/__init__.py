@@ -182,7 +182,7 @@ def _problem(document: Document, error: Any) -> Problem:
 
 
 def _expected(path: KeyPath) -> str:
-    """What the value of a key is expected to be, in words."""
+    """The values that a key can have, in words."""
     section, description = _model_at(path)
     if issubclass(section, Fitted) and path[-1] == "value":
         return expected_of(str(path[-2]))
@@ -215,7 +215,7 @@ def _bare(kind: Any) -> Any:
 
 
 def _issues(calibration: Calibration) -> Iterator[Issue]:
-    """What is wrong between keys that are right by themselves."""
+    """Contradictions between keys that are valid by themselves."""
     if calibration.grid is None and not (calibration.values and calibration.values.given()):
         yield (), "values, a grid or both", "neither"
     if calibration.correlation is not None:
@@ -289,7 +289,7 @@ def _grid_issues(grid: Grid) -> Iterator[Issue]:
 
 
 def _law_issues(grid: Grid) -> Iterator[Issue]:
-    """What the points do not yield: an interpolation or a law at all, or the laws as written."""
+    """Problems of a grid: no interpolation, no law, or laws that its points do not yield."""
     quantities = [key for key in grid.points if key not in grid.over]
     middle = np.array([[np.mean(grid.points[key]) for key in grid.over]])
     points = grid.model_copy().law  # what a grid has computed is no part of its file

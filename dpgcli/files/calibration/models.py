@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dpgcli.calibration.grid import GridLaw
 
 T = TypeVar("T")
-Numbers = Annotated[list[float], Field(min_length=1)]
+Samples = Annotated[list[float], Field(min_length=1)]
 Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Size = Annotated[float, Field(ge=0)]  # of an error: what data do not tell has a huge one
 Positives = Annotated[list[Positive], Field(min_length=1)]
@@ -89,7 +89,7 @@ class Curve(Section):
 
     @property
     def known(self) -> calibrations.DomeCurve:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         return calibrations.DomeCurve(
             self.travel_mm, self.energy_mJ, self.opening_per_travel, self.unsampled_mm
         )
@@ -142,7 +142,7 @@ class Grid(Section):
 
     @property
     def known(self) -> calibrations.Grid:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         over = tuple(self.over)
         quantities = frozenset(self.points) - {*over}
         return calibrations.Grid(over, quantities, self.method == "scaling", self.law)
@@ -183,14 +183,14 @@ class DataFile(Section):
 
 
 class Calibration(Section):
-    """What `dpg fit` found out: values for one geometry, or a grid over several."""
+    """A calibration by `dpg fit`: values for one geometry, or a grid over several."""
 
     file: str | None = Field(default=None, description="the name of the file, once it is read")
     calibration_version: Literal[1] = Field(description="1: what this version of dpg reads")
     made_by: str = Field(description="the program and the versions behind its numbers")
     method: str = Field(description="one line of text")
     values: Values | None = Field(default=None, description="a section of fitted values")
-    correlation: list[Numbers] | None = Field(
+    correlation: list[Samples] | None = Field(
         default=None, description="a symmetric matrix over the values that have errors"
     )
     geometry: Geometry | None = Field(default=None, description="a section of dimensions")
@@ -202,7 +202,7 @@ class Calibration(Section):
 
     @property
     def known(self) -> calibrations.Calibration:
-        """What it gives to designs."""
+        """The value that designs are resolved with."""
         values = {} if self.values is None else self.values.given()
         return calibrations.Calibration(
             self.file,

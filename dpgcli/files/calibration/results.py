@@ -147,7 +147,7 @@ def grid_of(law: GridLaw) -> Grid:
 
 
 def grid_doubts(law: GridLaw, table: GridTable) -> Iterator[str]:
-    """What a user should know about a table of points, in words."""
+    """Warnings about a table of points."""
     yield from table.doubts
     if table.ignored:
         yield f"columns not used, since they hold text: {', '.join(table.ignored)}"

@@ -56,7 +56,7 @@ def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
 
 
 def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
-    """What is wrong with a spec's plain data once some keys ("a.b.c") are changed, in one line."""
+    """The problems of a spec's plain data once some keys ("a.b.c") are changed, in one line."""
     try:
         checked(changed(Document("design", dict(data), {}), changes))
     except SpecError as error:

@@ -31,7 +31,7 @@ Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the fil
 
 
 class UnitOverride(Section):
-    """What is different in some units."""
+    """Values of some units that differ from the finger's."""
 
     geometry: UnitGeometry | None = Field(default=None, description="Dimensions of these units.")
     lattice: UnitLattice | None = Field(default=None, description="Lattice values of these units.")
@@ -67,7 +67,7 @@ class FingerSpec(Section):
 
     @property
     def calibrations(self) -> tuple[str | Known, ...]:
-        """What it calibrates by, in its order."""
+        """Its calibrations, in order."""
         said = self.calibration if isinstance(self.calibration, list) else [self.calibration]
         parts = (part for part in said if part is not None)
         return tuple(p.known if isinstance(p, Calibration) else p for p in parts)
@@ -105,7 +105,7 @@ class Spec(Section):
 
     @property
     def design(self) -> Design:
-        """What it says, as a batch of one design."""
+        """The spec as a batch of one design."""
         finger = self.finger
         bars = finger.linear_stiffness_N_per_mm
         said = self.model_error
@@ -122,10 +122,10 @@ class Spec(Section):
         )
 
 
-def _section(part: UnitOverride | FingerSpec | None) -> dimensions.Section:
+def _section(part: UnitOverride | FingerSpec | None) -> dimensions.GivenValues:
     if part is None:
-        return dimensions.Section()
-    return dimensions.Section(_sizes(part.geometry), _sizes(part.lattice))
+        return dimensions.GivenValues()
+    return dimensions.GivenValues(_sizes(part.geometry), _sizes(part.lattice))
 
 
 def _sizes(section: Section | None) -> dict[str, NDArray[np.float64]]:

@@ -148,7 +148,7 @@ def _expected(path: KeyPath) -> str:
 
 
 def _hint(key: str, error: Any) -> str:
-    """What to do, by the kind of mistake before the kind of key."""
+    """Hints, by the kind of mistake before the kind of key."""
     value = error["input"]
     if error["type"] == "model_type":
         return "keys below it, indented"

@@ -38,7 +38,7 @@ TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in
 
 @dataclass(frozen=True)
 class Sweep:
-    """What to compute: the base spec with its plain data, the space, constraints, files read.
+    """A sweep: its base spec with the plain data, space, constraints, and the files read.
 
     `said` is the space as the file says it, `digests` the SHA-256 of the tables it names.
     """

@@ -131,7 +131,7 @@ def _check_separator(header: list[str]) -> None:
 
 
 class Wrong(NamedTuple):
-    """What a column should have, what stands there instead, and a hint."""
+    """A wrong column: what it should have, what it has, and a hint."""
 
     expected: str
     found: str

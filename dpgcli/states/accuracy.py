@@ -1,4 +1,4 @@
-"""How exactly to solve: a ladder of ways to the same states, each with a bound on its error.
+"""Accuracy levels: ways to the same states, from cheap to exact, each with an error bound.
 
 The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
 units of how far the unit may turn, times the length of the finger (our derivation):
@@ -32,8 +32,8 @@ DEFAULT_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Rung:
-    """A way to the states: with or without elastic bars, and to which tolerance.
+class AccuracyLevel:
+    """An accuracy level: with or without elastic bars, and to which tolerance.
 
     `tolerance` is the largest residual over the forces in play.
     """
@@ -43,9 +43,9 @@ class Rung:
     tolerance: float
 
 
-RUNGS = (  # from the cheapest to the most exact
-    Rung("rigid bars", True, DEFAULT_TOLERANCE),
-    *(Rung(f"tolerance {t:g}", False, t) for t in (1e-3, 1e-6, 1e-9, DEFAULT_TOLERANCE)),
+ACCURACY_LEVELS = (  # from the cheapest to the most exact
+    AccuracyLevel("rigid bars", True, DEFAULT_TOLERANCE),
+    *(AccuracyLevel(f"tolerance {t:g}", False, t) for t in (1e-3, 1e-6, 1e-9, DEFAULT_TOLERANCE)),
 )
 
 
@@ -67,19 +67,19 @@ def check_exactness(tolerance: float, target_error: float | None) -> None:
 
 @dataclass(frozen=True)
 class Exactness:
-    """How exactly the states of some fingers are found: to a tolerance, or by a rung.
+    """The exactness of some fingers' states: a tolerance, or an accuracy level.
 
     `scene_units` are those of the fingers as they were given.
     """
 
     scene_units: UnitSolutions
     tolerance: float
-    rung: Rung | None = None
+    accuracy_level: AccuracyLevel | None = None
 
     @property
     def drops_bars(self) -> bool:
         """Whether the fingers are solved without their bars."""
-        return self.rung is not None and self.rung.drops_bars
+        return self.accuracy_level is not None and self.accuracy_level.drops_bars
 
     @cached_property
     def units(self) -> UnitSolutions:
@@ -92,11 +92,13 @@ class Exactness:
     def error_bounds(self) -> Array:
         """Bound on the error of every tip before the work, mm, (design,); infinite where none."""
         bounds = error_bounds(self.scene_units)
-        return np.asarray(bounds[RUNGS.index(self.rung) if self.rung else -1])
+        return np.asarray(
+            bounds[ACCURACY_LEVELS.index(self.accuracy_level) if self.accuracy_level else -1]
+        )
 
     @cached_property
     def dropped_error(self) -> Array:
-        """What dropping the bars adds to the error of each tip, mm, (design,)."""
+        """Bound on the tip displacement by the bars that were dropped, mm, (design,)."""
         if not self.drops_bars:
             return np.zeros(self.scene_units.finger.n_designs)
         return bar_flexibility(self.scene_units)
@@ -105,10 +107,10 @@ class Exactness:
 def exactnesses(
     units: UnitSolutions, tolerance: float, target_error: float | None, *, needs_bars: bool = False
 ) -> Iterator[tuple[Indices, Exactness]]:
-    """How exactly to solve which designs: by the tolerance, or each as the target error allows.
+    """The exactness of each design: the tolerance, or the cheapest level for the target error.
 
-    With a target error (mm) each design takes the cheapest rung that is bounded by it; rigid bars
-    are none where something `needs_bars`. Designs of one rung come together.
+    With a target error (mm) each design takes the cheapest level that is bounded by it; rigid bars
+    are none where something `needs_bars`. Designs of one level come together.
     """
     if target_error is None:
         yield np.arange(units.finger.n_designs), Exactness(units, tolerance)
@@ -120,30 +122,30 @@ def exactnesses(
     for index in np.unique(chosen):
         places = np.flatnonzero(chosen == index)
         some = units if len(places) == len(chosen) else units.take_lanes(places)
-        yield places, Exactness(some, RUNGS[index].tolerance, RUNGS[index])
+        yield places, Exactness(some, ACCURACY_LEVELS[index].tolerance, ACCURACY_LEVELS[index])
 
 
 def error_bounds(units: UnitSolutions) -> Array:
-    """Bound on the tip's error (mm) by each rung, shape (rung, design); infinite where none.
+    """Bound on the tip's error (mm) by each level, shape (level, design); infinite where none.
 
-    The first rung needs elastic bars to drop, and a second well of every unit without them.
+    The first level needs elastic bars to drop, and a second well of every unit without them.
     """
     finger = units.finger
     softness, length = _softness(units), finger.straight_length
     rounding = 10.0 * TIP_ROUNDING * (1.0 + finger.n_units / 64.0 + softness) * length
     bounds = [
-        SAFETY * 2.0 * rung.tolerance * softness * length
+        SAFETY * 2.0 * level.tolerance * softness * length
         + rounding
-        + (dropped_bars(units) if rung.drops_bars else 0.0)
-        for rung in RUNGS
+        + (dropped_bars(units) if level.drops_bars else 0.0)
+        for level in ACCURACY_LEVELS
     ]
     return np.where(units.are_soft.any(axis=0), np.inf, np.stack(bounds))
 
 
 def cheapest(bounds: Array, target: float) -> Indices:
-    """Index of the first rung whose bound meets the target (mm), by design; else of the last."""
+    """Index of the first level whose bound meets the target (mm), by design; else of the last."""
     meets = bounds <= target
-    return np.where(meets.any(axis=0), meets.argmax(axis=0), len(RUNGS) - 1)
+    return np.where(meets.any(axis=0), meets.argmax(axis=0), len(ACCURACY_LEVELS) - 1)
 
 
 def dropped_bars(units: UnitSolutions) -> Array:

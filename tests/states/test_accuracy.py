@@ -9,10 +9,10 @@ from dpgcli.design.scene import Scene
 from dpgcli.errors import UsageError
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.accuracy import ACCURACY_LEVELS, bar_flexibility, cheapest, error_bounds
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.plan import Request, explain
 from dpgcli.states.predict import predict
-from dpgcli.states.rungs import RUNGS, bar_flexibility, cheapest, error_bounds
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -56,16 +56,16 @@ def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
     is_state = certify(exact, units, 1e-12) == Status.STABLE
     rigid = UnitSolutions.of(finger.with_bars(np.inf))
     n_checked = []
-    for rung, bound in zip(RUNGS, bounds, strict=True):
-        own = rigid if rung.drops_bars else units
-        batch = settle(own, chain_potential, inverted, rung.tolerance)
-        says_stable = certify(batch, own, rung.tolerance) == Status.STABLE
+    for level, bound in zip(ACCURACY_LEVELS, bounds, strict=True):
+        own = rigid if level.drops_bars else units
+        batch = settle(own, chain_potential, inverted, level.tolerance)
+        says_stable = certify(batch, own, level.tolerance) == Status.STABLE
         bounded = np.isfinite(bound)
         assert not (says_stable & ~is_state & bounded).any(), "stable only where it is"
         both = says_stable & is_state & bounded
         pose = tip(batch, with_compliance=False).pose
         error = np.hypot(*(pose[:2] - truth.pose[:2])) - truth.error
-        assert (error <= bound)[both].all(), (rung.name, (error / bound)[both].max())
+        assert (error <= bound)[both].all(), (level.name, (error / bound)[both].max())
         n_checked.append(int(both.sum()))
     assert min(n_checked) > 0.2 * n_designs, "many have a bound and a state"
 
@@ -104,7 +104,7 @@ def test_rigid_bars_cannot_be_dropped(reference_finger: Fingers) -> None:
 
 def test_the_cheapest_that_meets_the_target_is_chosen() -> None:
     bounds = np.array([[1e-2, 5.0, np.inf], [1e-3, 1.0, np.inf], [1e-9, 1e-4, np.inf]])
-    assert cheapest(bounds, 2e-3).tolist() == [1, 2, len(RUNGS) - 1]
+    assert cheapest(bounds, 2e-3).tolist() == [1, 2, len(ACCURACY_LEVELS) - 1]
 
 
 @pytest.mark.parametrize("target", [1.0, 1e-2, 1e-5, 1e-7])
@@ -124,7 +124,7 @@ def test_predict_meets_its_target_and_says_so_in_every_row(
 def test_a_rung_without_bars_has_fewer_unknowns(reference_finger: Fingers) -> None:
     scene = Scene(reference_finger(5, 1e4), ())
     plan = explain(scene, Request(target_error=0.1))
-    assert plan.rung == RUNGS[0]
+    assert plan.accuracy_level == ACCURACY_LEVELS[0]
     assert (plan.unknowns, plan.terms) == (10, ("bistable", "hinge"))
     assert any("the target error allows it" in omission.why for omission in plan.omissions)
 
@@ -156,10 +156,10 @@ def test_stiffness_that_is_asked_for_keeps_the_bars(reference_finger: Fingers) -
     scene = Scene(reference_finger(3, 1e4), ())
     for names in (("default", "stiffness"), ("tip_stiffness_min_N_per_mm",), ("all",)):
         plan = explain(scene, Request(columns=names, target_error=0.1))
-        assert plan.rung is not None, names
-        assert not plan.rung.drops_bars, names
+        assert plan.accuracy_level is not None, names
+        assert not plan.accuracy_level.drops_bars, names
     plan = explain(scene, Request(target_error=0.1))
-    assert plan.rung == RUNGS[0]
+    assert plan.accuracy_level == ACCURACY_LEVELS[0]
     assert not [column for column in plan.columns if column.name.startswith("tip_stiffness")]
 
 
@@ -211,7 +211,7 @@ def test_what_dropping_the_bars_costs_is_in_the_error_of_each_tip(
 ) -> None:
     finger = reference_finger(3, 1e3)
     prediction = predict(Scene(finger, ()), Request(target_error=1.0))
-    assert prediction.plan.rung is not None and prediction.plan.rung.drops_bars
+    assert prediction.plan.accuracy_level is not None and prediction.plan.accuracy_level.drops_bars
     cost = float(bar_flexibility(UnitSolutions.of(finger))[0])
     assert prediction.plan.dropped_error == prediction.plan.bar_flexibility == cost
     errors = prediction.arrays()["numerical_error_mm"]

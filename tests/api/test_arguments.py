@@ -1,0 +1,100 @@
+"""Arguments of a wrong type are the user's mistake: they are named, with what was expected."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import dpgcli as dpg
+from dpgcli.mechanics.finger import STUDY, uniform_finger
+
+FINGER = uniform_finger(2, **STUDY)
+LATTICE = {f"{name}_{unit}": STUDY[name] for name, unit in (
+    ("segment_length", "mm"),
+    ("segment_height", "mm"),
+    ("stroke", "mm"),
+    ("bistable_stiffness", "N_per_mm"),
+    ("hinge_stiffness", "N_mm_per_rad"),
+)} | {"force_linearity": 0.043}  # fmt: skip
+BASE = {"finger": {"units": 2, "linear_stiffness_N_per_mm": 1e4, "lattice": LATTICE}}
+STROKES = {"finger.lattice.stroke_mm": [2.5, 3.5], "finger.units": [1, 2]}
+SWEEP = {"base": BASE, "space": [{"paired": STROKES}]}
+DOME = {"travel_mm": [0.0, 1.0, 2.0], "energy_mJ": [0.0, 1.0, 0.5]}
+DESIGNS = {"design": [0], "calibration": ["given"], "status": ["stable"], "reason": [""]}
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: dpg.predict(None), "spec None: expected a path"),
+        (lambda: dpg.predict([BASE]), r"spec \[.*: expected a path"),
+        (lambda: dpg.predict(FINGER, tolerance="1e-9"), "tolerance '1e-9': expected a number"),
+        (lambda: dpg.predict(FINGER, target_error="1um"), "target_error '1um': expected a number"),
+        (lambda: dpg.predict(FINGER, patterns=[11]), r"patterns \[11\]: expected a text"),
+        (lambda: dpg.predict(FINGER, columns=None), "columns None: expected a text"),
+        (lambda: dpg.predict(BASE, settings=3), "settings 3: expected a text"),
+        (lambda: dpg.predict({"finger": pd.DataFrame()}), "a spec has no DataFrame: expected"),
+        (lambda: dpg.predict(FINGER).save(3), "path 3: expected a path"),
+        (lambda: dpg.predict(FINGER).draw(None), "path None: expected a path"),
+        (lambda: dpg.sweep(None), "sweep None: expected a path"),
+        (lambda: dpg.sweep(SWEEP, 3), "output 3: expected a path"),
+        (lambda: dpg.sweep(SWEEP, jobs=1.5), "jobs 1.5: expected a whole number"),
+        (lambda: dpg.sweep(SWEEP, wait="5m"), "wait '5m': expected a number"),
+        (lambda: dpg.sweep({**SWEEP, "base": FINGER}), "base: a finger's values have no keys"),
+        (lambda: dpg.merge(3, "x"), "shards 3: expected a path"),
+        (lambda: dpg.check({**DESIGNS, "n_stable": [4]}, 3), "require 3: expected a text"),
+        (lambda: dpg.report(None), "folder None: expected a path"),
+        (lambda: dpg.stress(only=3), "only 3: expected a text"),
+        (lambda: dpg.bench(FINGER, repeats="5"), "repeats '5': expected a whole number"),
+        (lambda: dpg.fit_bistable(DOME, travel_to_opening=2.0), "travel_to_opening 2.0: expected"),
+        (
+            lambda: dpg.fit_bistable(DOME, travel_to_opening="equal", geometry=[6.5]),
+            r"geometry \[6.5\]: expected a text",
+        ),
+        (
+            lambda: dpg.fit_bistable(DOME, travel_to_opening="equal", bootstrap=True),
+            "bootstrap True: expected a whole number",
+        ),
+    ],
+)
+def test_what_it_cannot_be_is_named(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(dpg.UsageError, match=f"^{said}"):
+        call()
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    tolerance = np.float32(1e-9)
+    assert dpg.predict(FINGER, tolerance=tolerance).plan.request.tolerance == tolerance
+
+
+def test_patterns_of_a_series(tmp_path: Path) -> None:
+    chosen = pd.Series(["01", "10"])
+    assert dpg.predict(FINGER, patterns=chosen).table["pattern"].tolist() == ["01", "10"]
+
+
+def test_a_data_frame_is_an_axis() -> None:
+    frame = dpg.sweep({"base": BASE, "space": [{"table": pd.DataFrame(STROKES)}]}, jobs=1)
+    paired = dpg.sweep(SWEEP, jobs=1)
+    pd.testing.assert_frame_equal(frame.designs.to_pandas(), paired.designs.to_pandas())
+    assert frame.designs["n_states"].tolist() == [2, 4]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"stroke": -3.5}, "stroke -3.5: expected"),
+        ({"segment_length": np.nan}, "segment_length nan: expected"),
+        ({"hinge_stiffness": -1.0}, "hinge_stiffness -1.0: expected"),
+        ({"n_units": 0}, "n_units 0: expected"),
+    ],
+)
+def test_no_finger_has_such_values(values: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        uniform_finger(**{"n_units": 2, **STUDY, **values})
+
+
+def test_hinges_may_have_no_stiffness() -> None:
+    assert uniform_finger(2, **{**STUDY, "hinge_stiffness": 0.0}).n_units == 2
