@@ -23,9 +23,9 @@ from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
 from dpgcli.files.known_states import states_of
+from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record
-from dpgcli.files.table_writer import write_states
 from dpgcli.reports.precision import changes, cheapest_way, draw_precision
 from dpgcli.sweeps.differences import differences
 

@@ -14,7 +14,7 @@ from dpgcli.benchmark.methods import BenchmarkResult
 from dpgcli.calibration.known import KnownStates
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.errors import UsageError
-from dpgcli.files.table_writer import write_states
+from dpgcli.files.prediction import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.plan import Request, explain

@@ -16,9 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.sections import UnitGeometry
 from dpgcli.files.sweep_file import Sweep, read_sweep
-from dpgcli.files.table_writer import record_batch, schema, write_table
+from dpgcli.files.table_writer import write_table
 from dpgcli.states.columns import Column, Group, Kind
 
 CONFIGS = Path(__file__).parents[3] / "configs"
