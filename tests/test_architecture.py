@@ -12,6 +12,7 @@ FLOORS = {
     "errors": 0,
     "arrays": 0,
     "code": 0,
+    "cores": 0,
     "signals": 0,
     "temporary": 0,
     "text": 0,

@@ -1,4 +1,4 @@
-"""`check`: hold a table of designs against requirements."""
+"""`check`: test a table of designs against requirements."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ DesignsInput: TypeAlias = str | Path | Table | Any
 
 
 def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[RequirementVerdict, ...]:
-    """Hold every design of a table against requirements, one verdict each.
+    """Test every design of a table against requirements, one verdict each.
 
     Raises UsageError for what is no table of designs or no requirement, NothingSelectedError
     where every design is excluded.

@@ -27,7 +27,7 @@ from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
 from dpgcli.files.table_reader import read_undamaged
-from dpgcli.files.yaml_file import Document
+from dpgcli.files.yaml_file import Document, without_free_keys
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reports.summary import DesignSpace
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
@@ -176,7 +176,7 @@ def _read(sweep: str | Path | Mapping[str, Any], settings: Settings) -> Sweep:
     base = sweep.get("base")
     if isinstance(base, Finger | Scene):
         raise UsageError("base: a finger's values have no keys that could vary: give a spec")
-    data = plain({**sweep, "space": _axes(sweep.get("space"))})
+    data = without_free_keys(plain({**sweep, "space": _axes(sweep.get("space"))}))
     if not isinstance(base, Mapping):
         return sweep_in(Document("sweep", data, {}), Path(), texts)
     document = Document("sweep", {**data, "base": "base"}, {})

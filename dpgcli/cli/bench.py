@@ -48,26 +48,33 @@ SHOWN = {
 }  # fmt: skip
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
+Repeats = Annotated[
+    int, typer.Option("--repeats", min=1, max=1000, help="How often each method is timed")
+]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
 ]
 Against = Annotated[
-    Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
+    Path | None,
+    typer.Option("--against", metavar="FILE", help="CSV of known tips, for the model's own error"),
 ]
-PrintedAs = Annotated[Format, typer.Option("--format", help="How to print what was measured")]
+PrintedAs = Annotated[Format, typer.Option("--format", help="How to print rows")]
 Output = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
 ]
 Plot = Annotated[
-    Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw error over time: a .svg or .png file"),
 ]
 Record = Annotated[
-    Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write all rows and the machine to this file"),
 ]
 Compare = Annotated[
-    Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
+    Path | None,
+    typer.Option("--compare", metavar="FILE", help="Say what got slower since this --json file"),
 ]
 
 
@@ -108,8 +115,8 @@ def bench(
             target_error=target_in_mm(target_error),
             keep=tuple(keep or ()),
             against=against,
-            first_station=frame.first_station,
-            tip_offset=frame.tip,
+            first_station=frame[0],
+            tip_offset=frame[1],
             compare=compare,
             watch=watch,
         )
@@ -132,7 +139,7 @@ def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
 
     def show(row: "Row") -> None:
         if interactive:
-            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
+            print(f"\r{row['group']}: {row['method']}"[:70].ljust(71), end="\r", file=sys.stderr)
 
     yield show
     if interactive:
@@ -165,9 +172,9 @@ def _print_tables(rows: "Sequence[Row]") -> None:
             names = SHOWN.get(group, SHOWN["ladder"])
             print(f"{title}\n")
             print_grid(
-                {"way": [row["way"] for row in own]}
+                {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
-                left=("way",),
+                left=("method",),
             )
             print()
     print("\n".join(text_figure(rows)))

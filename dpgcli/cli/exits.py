@@ -15,6 +15,7 @@ import typer
 
 from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
+from dpgcli.cli.usage import refusal
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
@@ -31,6 +32,7 @@ P = ParamSpec("P")
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
+MOST_PROBLEMS = 10  # that are shown
 
 
 class ExitCode(IntEnum):
@@ -61,10 +63,8 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
-            for problem in map(problem_with_options, error.problems):
-                say(str(problem))  # which starts with its place
-            count = len(error.problems)
-            fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
+            say_problems(error)
+            raise typer.Exit(ExitCode.USAGE) from None
         except NoWorkerError as error:
             fail(ExitCode.FAILED_CASES, error.message)
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
@@ -79,6 +79,15 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             _internal_error()
 
     return run
+
+
+def say_problems(error: SpecError) -> None:
+    """Say the first problems, each of which starts with its place, and how many there are."""
+    for problem in map(problem_with_options, error.problems[:MOST_PROBLEMS]):
+        say(str(problem))
+    count = len(error.problems)
+    rest = f", the first {MOST_PROBLEMS} of them above" if count > MOST_PROBLEMS else ""
+    say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
 
 
 def fail(code: ExitCode, message: str) -> NoReturn:
@@ -119,15 +128,23 @@ def _code_of(app: Callable[..., object]) -> int:
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        getattr(error, "show", traceback.print_exc)()
-        return error.exit_code
+        if type(error).__name__ == "NoArgsIsHelpError":
+            print(error, file=sys.stderr)
+        else:
+            say(f"dpg: {refusal(error)}")
+        return ExitCode.USAGE
     except Terminated:  # before a command has begun, or after it is done
         say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
     except (KeyboardInterrupt, typer.Abort):
         say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
-    return code if isinstance(code, int) else ExitCode.DONE
+    except OSError as error:  # commands answer for their own: these are of shell completion
+        say(f"dpg: cannot install completion: {error}")
+        return ExitCode.USAGE
+    if isinstance(code, ExitCode):
+        return code
+    return ExitCode.USAGE if code else ExitCode.DONE  # of typer, which knows none of ours
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

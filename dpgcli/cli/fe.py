@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.exits import command
+from dpgcli.cli.commands import add_command
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
 from dpgcli.cli.streams import put, say
 
@@ -42,7 +42,7 @@ class Mesh(StrEnum):
 
 
 Out = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of deck and results")
+    Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of deck and results")
 ]
 Poisson = Annotated[float, typer.Option("--poisson", help="Poisson's ratio, below 0.5")]
 MeshOption = Annotated[Mesh, typer.Option("--mesh", help="How fine the mesh is")]
@@ -192,4 +192,4 @@ def _as_before(name: str) -> str:
 
 
 for _function in (dome, hinge):
-    app.command(context_settings={"token_normalize_func": _as_before})(command(_function))
+    add_command(app, _function, "fe", context_settings={"token_normalize_func": _as_before})

@@ -15,7 +15,9 @@ def merge(
     shards: Annotated[
         list[Path], typer.Argument(metavar="FOLDER...", help="Output folders of the shards")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the tables")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the tables")
+    ],
     max_failed: MaxFailed = 0,
     quiet: Quiet = False,
 ) -> None:

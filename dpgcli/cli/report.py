@@ -10,7 +10,9 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a finished sweep")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File, .md or .html  [default: standard output]"),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="File, .md or .html  [default: standard output]"
+        ),
     ] = None,
 ) -> None:
     """Summarize a design space: what is best, what failed and why, where bistability ends."""

@@ -47,7 +47,7 @@ class ExecutorName(StrEnum):
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[  # as it is typed, for Make
-    str, typer.Option("-o", "--output", metavar="<path>", help="Folder of the tables")
+    str, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the tables")
 ]
 Jobs = Annotated[
     int | None,
@@ -69,14 +69,15 @@ Part = Annotated[
 Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
 DepfilePath = Annotated[
-    Path | None, typer.Option("--depfile", help="Write the files read, for Make")
+    Path | None, typer.Option("--depfile", metavar="FILE", help="Write the files read, for Make")
 ]
 Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
 ]
 SummaryFile = Annotated[
-    Path | None, typer.Option("--summary-file", help="Append the report to this file")
+    Path | None,
+    typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
 ]
 
 

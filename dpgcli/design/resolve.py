@@ -22,7 +22,16 @@ from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.model_error import known_model_error
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
-from dpgcli.design.scene import ORIGINS, Gripper, ModelError, Origin, Scene, Source, Uncertainty
+from dpgcli.design.scene import (
+    ORIGINS,
+    Chambers,
+    Gripper,
+    ModelError,
+    Origin,
+    Scene,
+    Source,
+    Uncertainty,
+)
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -96,6 +105,7 @@ class Resolution:
             None if layer is None else np.asarray(layer).item(),
             self._uncertainty(),
             self.model_error,
+            self._chambers(),
         )
 
     @property
@@ -108,7 +118,7 @@ class Resolution:
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
 
-        Their bars are all rigid or none are; sources and uncertainty are left out.
+        Their bars are all rigid or none are; sources, uncertainty and chambers are left out.
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
@@ -122,6 +132,14 @@ class Resolution:
             return []
         is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
         return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+
+    def _chambers(self) -> Chambers:
+        """Sizes of the chambers of the first design."""
+        groups = [group for group in groups_of(self.design) if group.units]
+        keys = ("unit_separation_mm", "chamber_width_mm", "dome_height_mm")
+        unknown = np.full(1, np.nan)
+        pairs = ([(group, group.geometry.get(key, unknown)) for group in groups] for key in keys)
+        return Chambers(*(_by_unit(self.design.units, sizes)[:, 0] for sizes in pairs))
 
     def _gripper(self, designs: Indices) -> Gripper | None:
         given = self.design.gripper

@@ -82,7 +82,7 @@ class Part(NamedTuple):
         """Record batches of its states (0) or designs (1), a block each."""
         with self._opened(which) as file:
             for place in range(file.num_record_batches):
-                yield pa.RecordBatch.from_struct_array(file.get_batch(place).column(0).flatten())
+                yield pa.RecordBatch.from_struct_array(file.get_batch(place).column(0).values)
 
     def schema(self, which: int) -> Any:
         """Columns of its states (0) or designs (1)."""

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Columns
+from dpgcli.arrays import Columns, distinct
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
 
@@ -69,7 +69,7 @@ def _strings(values: NDArray[Any]) -> Any:
 
 
 def _statuses(codes: NDArray[Any]) -> Any:
-    found = np.unique(codes)
+    found = distinct(codes)
     texts = np.array(
         [list(Status)[code].text.encode() for code in found], "S"
     )  # as long as need be

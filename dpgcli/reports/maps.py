@@ -1,20 +1,19 @@
-"""Figures of a design space: its main metrics over the first two swept values."""
+"""Figures of a design space: its metrics that vary, over the first two swept values."""
 
-import io
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from dpgcli.reports.drawing import titled
+from dpgcli.reports.drawing import own_figure, svg_text, titled
 from dpgcli.reports.summary import METRICS, STIFFEST, DesignSpace, bars_alone, is_alike
 
 COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
-SVG_SETTINGS: Any = {"svg.hashsalt": "dpg", "svg.fonttype": "none", "font.size": 9}
-NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
@@ -24,26 +23,27 @@ def figures(space: DesignSpace) -> str:
     metrics = [name for name in every_one if name in space.designs and _varies(space, name)]
     if not metrics or not space.swept:
         return "<p>No metric varies.</p>"
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError:
-        return f"<p>{escape(NO_MATPLOTLIB)}</p>"
     designs = pd.DataFrame(space.designs)
     every = 1 if _is_grid(space, designs) else len(designs) // MOST_POINTS + 1
+    try:
+        svg = _maps(space, designs[::every], metrics)
+    except ImportError:
+        return f"<p>{escape(NO_MATPLOTLIB)}</p>"
+    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+
+
+def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> str:
+    """Inline SVG with two maps a row."""
     n_rows = (len(metrics) + 1) // 2
-    content = io.StringIO()
-    with mpl.rc_context(SVG_SETTINGS):
-        figure = Figure(figsize=(10.0, 3.6 * n_rows), layout="constrained", facecolor="white")
+    with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
             axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
             axes.set_title(titled(_title(space, metric)))
-            _draw(axes, space, designs[::every], metric)
-        figure.savefig(content, format="svg", metadata=NO_METADATA)
-    text = content.getvalue()
-    names = escape(", ".join(map(space.label, metrics)))
-    svg = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{names}"', 1)
-    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+            _draw(axes, space, designs, metric)
+        over = " and ".join(map(space.label, space.swept[:2]))
+        what = ", ".join(map(space.label, metrics))
+        text = svg_text(figure, what, f"{what} over {over}", NO_METADATA)
+    return text[text.index("<svg") :]
 
 
 def _varies(space: DesignSpace, metric: str) -> bool:
@@ -54,12 +54,11 @@ def _varies(space: DesignSpace, metric: str) -> bool:
 
 
 def _title(space: DesignSpace, metric: str) -> str:
-    """What a map shows of designs that share a place."""
-    words = space.label(metric)
+    """What a map shows of designs that share a place; nothing where none do."""
     if not (hidden := space.swept[2:]):
-        return words
+        return ""
     which = "largest" if METRICS.get(metric, True) else "nearest zero"
-    return f"{words}, {which} over {', '.join(map(space.label, hidden))}"
+    return f"{space.label(metric)}, {which} over {', '.join(map(space.label, hidden))}"
 
 
 def _caption(space: DesignSpace, every: int) -> str:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array, Columns, Flags, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.design.scene import Origin
 from dpgcli.reports.base import bar_stiffness, base_lines
@@ -89,7 +89,7 @@ class DesignSpace:
 
     def n_values(self, name: str, rows: Indices) -> int:
         """How many values a column has in some rows."""
-        return len(np.unique(self.designs[name][self.known(name, rows)]))
+        return len(distinct(self.designs[name][self.known(name, rows)]))
 
     def shown(self, name: str, value: float) -> str:
         """A value of a column with its unit."""
@@ -309,7 +309,7 @@ def _lines(space: DesignSpace, name: str, rows: Indices) -> Iterator[Indices]:
     """Those of the rows that share a value of a column, value by value."""
     rows = space.known(name, rows)
     values = space.designs[name][rows]
-    return (rows[values == value] for value in np.unique(values))
+    return (rows[values == value] for value in distinct(values))
 
 
 def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None, ...]]:

@@ -10,8 +10,10 @@ the run gives up.
 import atexit
 import os
 import signal
+import sys
 import tempfile
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
@@ -22,7 +24,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -258,11 +260,18 @@ def start_fork_server(*modules: str) -> None:
     """
     if not _has_fork_server():
         return
-    from multiprocessing import forkserver, resource_tracker
-
     _own_temporary_folder()
     if modules:
+        from multiprocessing import forkserver
+
         forkserver.set_forkserver_preload(list(modules))
+    with _safe_path():
+        _ensure_fork_server()
+
+
+def _ensure_fork_server() -> None:
+    from multiprocessing import forkserver, resource_tracker
+
     # what a terminal sends to all its processes is for this one to answer: the others inherit
     # that it is blocked; the tracker comes first, since starting it unblocks Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGHUP])
@@ -272,6 +281,30 @@ def start_fork_server(*modules: str) -> None:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Have new interpreters import nothing from the working folder, such as somebody's random.py.
+
+    What the program that starts them may import, they get from it later.
+    """
+    safe = {"PYTHONSAFEPATH": "1"}  # the option -P
+    with suppress(OSError):  # a working folder that was deleted
+        here = os.path.realpath(os.curdir)
+        places = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        kept = [place for place in places if os.path.realpath(place) != here]
+        safe["PYTHONPATH"] = os.pathsep.join(kept)
+    before = {name: os.environ.get(name) for name in safe}
+    os.environ.update(safe)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _has_fork_server() -> bool:
@@ -307,7 +340,7 @@ class _Pool(ProcessPoolExecutor):
 
         Raises WorkplaceError where the system allows no more processes.
         """
-        with _held_signals():
+        with _held_signals(), _safe_path():
             try:
                 future = super().submit(fn, *args, **kwargs)
             except (ConnectionError, FileNotFoundError, EOFError) as error:
@@ -351,6 +384,8 @@ def _held_signals() -> Iterator[None]:
 
 
 def _start_worker() -> None:
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, as in the program itself
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()

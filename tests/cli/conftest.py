@@ -49,7 +49,7 @@ def surroundings(changes: Mapping[str, str] | None = None) -> dict[str, str]:
         for name, value in os.environ.items()
         if name not in AMBIENT and not name.startswith(("PYTHONIO", "PYTHONUNB", "PYTHONUTF8"))
     }
-    return {**kept, **(changes or {})}
+    return {**kept, "PYTHONWARNINGS": "error", **(changes or {})}  # as in the tests themselves
 
 
 @pytest.fixture

@@ -254,3 +254,17 @@ def test_times(text: str, expected: float) -> None:
 def test_what_is_no_time(text: str) -> None:
     with pytest.raises(UsageError, match="expected a time in s, m or h: 5m"):
         seconds("--wait", text)
+
+
+def test_warnings_of_libraries_reach_only_those_who_ask(run: Callable[..., Any]) -> None:
+    before = (
+        "import warnings, dpgcli.api.inputs as inputs; read = inputs.read_scene\n"
+        "def warned(*given): warnings.warn('of a library', RuntimeWarning); return read(*given)\n"
+        "inputs.read_scene = warned"
+    )
+    usual = run("predict", "three_unit.yaml", "-q", env={"PYTHONWARNINGS": ""}, before=before)
+    assert (usual.returncode, usual.stderr) == (0, "")
+    asked = run("predict", "three_unit.yaml", env={"PYTHONWARNINGS": "default"}, before=before)
+    assert "RuntimeWarning: of a library" in asked.stderr
+    strict = run("predict", "three_unit.yaml", before=before)
+    assert strict.returncode == ExitCode.INTERNAL, "tests take it for an error"

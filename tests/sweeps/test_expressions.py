@@ -1,6 +1,7 @@
 """Expressions: Python's values for arithmetic, and nothing but arithmetic."""
 
 import math
+import re
 import string
 from contextlib import suppress
 
@@ -204,3 +205,38 @@ def test_deep_nesting_is_an_expression_or_is_refused(text: str) -> None:
 def test_a_long_text_is_refused() -> None:
     with pytest.raises(ExpressionError, match="500"):
         expression("1+" * 300 + "1")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("a^2 > 1", "a power is **"),
+        ("a ^ 2", "a power is **"),
+        ("a > 1 & b > 2", "both is: and"),
+        ("a > 1 && b > 2", "both is: and"),
+        ("(a > 1) | (b > 2)", "either is: or"),
+        ("a > 1 || b > 2", "either is: or"),
+        ("!a > 1", "the opposite is: not"),
+        ("~(a > 1)", "the opposite is: not"),
+        ("a // 2 > 1", "division is /"),
+        ("a = 1", "equal is =="),
+        ("a <> 1", "unequal is !="),
+        ("a ≤ 1", "at most is <="),
+        ("a => 1", "at least is >="),
+        ("a × 2 > 1", "times is *"),
+        ("a > 5,5 mm", "a decimal point is ."),
+        ("a > 5 mm", "numbers have no unit"),
+        ("a²> 1", "a power is **"),
+    ],
+)
+def test_what_other_languages_write_gets_a_hint(text: str, hint: str) -> None:
+    with pytest.raises(ExpressionError) as refused:
+        expression(text)
+    assert str(refused.value) == f"not an expression: {text!r} ({hint})"
+
+
+def test_python_s_names_of_syntax_are_never_shown() -> None:
+    for text in ("a[1]", "a if b else 1", "lambda: 1", "[a]", "a is b", "a in b", "f'{a}'"):
+        with pytest.raises(ExpressionError, match=r"not an expression|only numbers") as refused:
+            expression(text)
+        assert not re.search("Op|Subscript|IfExp|Lambda|List|Is|In|Joined", str(refused.value))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.calibration.choices import LEVER, Loss, Target
+from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
 from dpgcli.cli.fit.options import (
     Bootstrap,
     GeometryValues,
@@ -28,7 +28,9 @@ def finger(
     free: Annotated[
         list[str] | None,
         typer.Option(
-            "--free", metavar="KEY", help=f"Fit this value; repeatable  [default: {LEVER}]"
+            "--free",
+            metavar="KEY",
+            help=f"Fit this value; repeatable  [default: {FITTED_BY_DEFAULT}]",
         ),
     ] = None,
     target: Annotated[Target, typer.Option(help="What of the states to meet")] = Target.TIPS,
@@ -54,10 +56,10 @@ def finger(
     fit = fit_finger(
         given,
         data,
-        free=tuple(free or (LEVER,)),
+        free=tuple(free or (FITTED_BY_DEFAULT,)),
         target=target,
-        first_station=frame.first_station,
-        tip_offset=frame.tip,
+        first_station=frame[0],
+        tip_offset=frame[1],
         geometry=geometry,
         loss=loss,
         loss_scale=loss_scale,

@@ -8,6 +8,7 @@ import typer
 from dpgcli.calibration.choices import Loss
 from dpgcli.cli.fit.options import (
     Bootstrap,
+    ColumnTitles,
     GeometrySpec,
     GeometryValues,
     LossOption,
@@ -16,6 +17,8 @@ from dpgcli.cli.fit.options import (
     Plot,
     Printed,
     Seed,
+    Skip,
+    Units,
 )
 from dpgcli.cli.fit.output import check_files, put_out
 from dpgcli.cli.options import Quiet
@@ -31,6 +34,9 @@ def hinge(
         str | None,
         typer.Option("--where", metavar="COLUMN=TEXT", help="Only rows with this text"),
     ] = None,
+    column: ColumnTitles = None,
+    skip: Skip = None,
+    units: Units = None,
     geometry: GeometryValues = None,
     spec: GeometrySpec = None,
     loss: LossOption = Loss.LINEAR,
@@ -54,5 +60,8 @@ def hinge(
         loss_scale=loss_scale,
         bootstrap=bootstrap,
         seed=seed,
+        column=column or (),
+        skip=skip,
+        units=units or (),
     )
     put_out(fit, output, plot, printed_as, quiet)
