@@ -23,6 +23,20 @@ def total(parts: Array) -> Array:
     return np.asarray(parts.sum(axis=0))
 
 
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """Each value once, in order; of numbers, none of them NaN.
+
+    As `numpy.unique`, which takes ten times as long for whole numbers and loads masked arrays.
+
+    >>> distinct(np.array([3, 1, 3])).tolist()
+    [1, 3]
+    """
+    ordered = np.sort(values)
+    is_new = np.ones(len(ordered), bool)
+    is_new[1:] = ordered[1:] != ordered[:-1]
+    return ordered[is_new]
+
+
 @cache  # once is enough
 def keep_freed_memory() -> None:
     """Let the C library keep the memory of freed arrays for the next ones.

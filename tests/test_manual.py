@@ -183,6 +183,11 @@ def test_the_readme_fits_on_two_screens() -> None:
     assert len(PAGES["README"].read_text(encoding="utf-8").splitlines()) <= 150
 
 
+def test_words_of_our_own_are_only_in_the_glossary() -> None:
+    ours = re.compile(r"\brungs?\b|\blevers?\b|\b(held|hold|holds) \w* ?against\b")
+    assert not ours.findall(MANUAL.replace(PAGES["glossary"].read_text(encoding="utf-8"), ""))
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
     text = FENCED.sub("", PAGES[page].read_text(encoding="utf-8"))

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from dpgcli.api.inputs import (
+    Place,
     Settings,
     SpecInput,
     as_texts,
@@ -13,8 +14,8 @@ from dpgcli.api.inputs import (
     check_numbers,
     check_whole,
     figure_path,
+    frame_of,
     path_of,
-    point,
     scene_input,
 )
 from dpgcli.api.tables import Table
@@ -23,9 +24,9 @@ from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
 from dpgcli.files.known_states import states_of
+from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record
-from dpgcli.files.table_writer import write_states
 from dpgcli.reports.precision import changes, cheapest_way, draw_precision
 from dpgcli.sweeps.differences import differences
 
@@ -47,7 +48,7 @@ class BenchResult:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """The cheapest way for the target error, and what got slower since the record."""
+        """The cheapest method for the target error, and what got slower since the record."""
         cheapest = (
             () if self.target_error is None else (cheapest_way(self.rows, self.target_error),)
         )
@@ -74,8 +75,8 @@ def bench(
     target_error: float | None = None,
     keep: str | Sequence[str] = (),
     against: Tabular | None = None,
-    first_station: tuple[float, float] = (0.0, 0.0),
-    tip_offset: tuple[float, float] = (0.0, 0.0),
+    first_station: Place = None,
+    tip_offset: Place = None,
     compare: str | Path | None = None,
     watch: Callable[[Row], None] = lambda row: None,
 ) -> BenchResult:
@@ -98,7 +99,7 @@ def bench(
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
     then = None if compare is None else _recorded(path_of("compare", compare), given.json)
-    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
+    frame = Frame() if known is None else frame_of(given, known, first_station, tip_offset)[0]
     write = partial(write_states, spec_json="{}")
     study = Bench(given.scene, repeats, as_texts("keep", keep), target_error, known, frame, write)
     study.check()

@@ -12,10 +12,12 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias, TypeVar
 
+from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
@@ -25,6 +27,7 @@ from dpgcli.files.scene_file import (
     recalibrated,
     scene_of,
 )
+from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
@@ -33,6 +36,15 @@ from dpgcli.mechanics.finger import Finger
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 """Values by dotted key of a spec, or "key=value" texts."""
+
+Texts: TypeAlias = Mapping[str, str] | Sequence[str] | str
+"""Texts by name, or "name=text"."""
+
+Place: TypeAlias = Sequence[float] | None
+"""Two numbers in mm; None where somebody else says them."""
+
+ORIGINS = ("as given", "from the data's header", "from the spec")
+FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -192,6 +204,27 @@ def check_whole(**values: int | None) -> None:
             raise UsageError(Field(field), f" {value!r}: expected a whole number")
 
 
+def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
+    """What of a table is read: our names and quantities with its titles and units.
+
+    >>> table_choice(["force_N=Load"], 4, {"force": "kN"})
+    Choice(columns={'force_N': 'Load'}, skip=4, units={'force': 'kN'})
+    """
+    check_whole(skip=skip)
+    return Choice(_by_name("column", column), skip, _by_name("units", units))
+
+
+def _by_name(field: str, texts: Texts) -> dict[str, str]:
+    """Texts by name. Raises UsageError for what is no "name=text"."""
+    if isinstance(texts, Mapping):
+        return {str(name): str(text) for name, text in texts.items()}
+    parts = [(text, *map(str.strip, text.partition("="))) for text in as_texts(field, texts)]
+    for text, name, _, said in parts:
+        if not name or not said:
+            raise UsageError(Field(field), f" {text}: expected {FORMS[field]}")
+    return {name: said for _, name, _, said in parts}
+
+
 def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     """A place in some data, mm. Raises UsageError for what is not two numbers.
 
@@ -207,6 +240,26 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
             Field(field), f" {place}: expected two numbers in mm, such as 5.375, -0.75"
         )
     return x, y
+
+
+def frame_of(
+    given: SceneInput, known: KnownStates, first_station: Place, tip_offset: Place
+) -> tuple[Frame, str]:
+    """The frame of known states, and where it is from: options, else the data, else the spec."""
+    spec = (given.spec and given.spec.data) or DataSpec()
+    said: dict[str, tuple[Place, ...]] = {
+        "first_station": (first_station, known.first_station, spec.first_station_mm),
+        "tip_offset": (tip_offset, known.tip_offset, spec.tip_offset_mm),
+    }
+    points, words = [], []
+    for field, places in said.items():
+        pairs = zip(places, ORIGINS, strict=True)
+        found = [(place, origin) for place, origin in pairs if place is not None]
+        place, origin = found[0] if found else ((0.0, 0.0), "assumed")
+        x, y = point(field, place)
+        points.append((x, y))
+        words.append(f"{field.replace('_', ' ')} {x:g},{y:g} mm ({origin})")
+    return Frame(*points), ", ".join(words)
 
 
 def figure_path(path: str | Path) -> Path:

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dpgcli.api.inputs import path_of
+from dpgcli.arrays import Columns
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
@@ -13,9 +14,6 @@ from dpgcli.files.table_reader import read_designs, read_run
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
 from dpgcli.studies.sweep import DESIGNS, REPORT, RUN
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PAGES = {".md": markdown, ".html": html}
 AT_END = "<!-- written by dpg -->"
@@ -43,13 +41,13 @@ def report(folder: str | Path, *, format: str = "md") -> str:
     return page(path_of("folder", folder), f".{format}", silent)[1]
 
 
-def page(folder: Path, kind: str, say: Say) -> "tuple[pd.DataFrame, str]":
+def page(folder: Path, kind: str, say: Say) -> tuple[Columns, str]:
     """The designs in a folder, and their page; `say` hears of facts that are left out."""
     designs, units = read_designs(folder / DESIGNS)
     return designs, PAGES[kind](designs, units, _facts(folder, say))
 
 
-def summarize(folder: Path, *, is_new: bool, say: Say = silent) -> "tuple[pd.DataFrame, str]":
+def summarize(folder: Path, *, is_new: bool, say: Say = silent) -> tuple[Columns, str]:
     """The designs of a finished sweep and their page, written into its folder if need be."""
     designs, text = page(folder, ".md", say)
     path = folder / REPORT

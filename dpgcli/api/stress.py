@@ -1,4 +1,4 @@
-"""`stress`: stiff and extreme cases, held against extended precision."""
+"""`stress`: stiff and extreme cases beside extended precision."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ def stress(
     settings: Settings = (),
     watch: Callable[[Outcome], None] = lambda outcome: None,
 ) -> StressResult:
-    """Hold stiff and extreme cases against extended precision; needs mpmath.
+    """Compare stiff and extreme cases with extended precision; needs mpmath.
 
     Without a spec the built-in cases alone; `only` names families. `watch` sees each outcome.
     Raises SpecError for a wrong spec, UsageError for unknown families.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.choices import Loss, Target
-from dpgcli.calibration.comparison import Comparison, compare
+from dpgcli.calibration.comparison import Comparison, compare, frame_misfit
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
@@ -105,7 +105,9 @@ class FingerFit:
     def judgments(self, found: Fit) -> Iterator[str]:
         """Warnings about a fit and its data."""
         yield from found.warnings
-        if np.nanmax(self.compared(found).relative, initial=0.0) > LARGE_ERROR:
+        if misfit := frame_misfit(self.finger, self.known, self.compared(None), self.frame):
+            yield misfit
+        elif np.nanmax(self.compared(found).relative, initial=0.0) > LARGE_ERROR:
             yield LARGE_ERROR_WARNING
         if self.known.unused:
             yield f"columns not used: {', '.join(self.known.unused)}"

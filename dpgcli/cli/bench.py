@@ -1,8 +1,7 @@
 """`dpg bench`: error against run time, on the user's own finger."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +20,7 @@ from dpgcli.cli.options import (
     target_in_mm,
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -48,7 +48,9 @@ SHOWN = {
 }  # fmt: skip
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
+Repeats = Annotated[
+    int, typer.Option("--repeats", min=1, max=1000, help="How often each method is timed")
+]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
@@ -106,17 +108,17 @@ def bench(
     outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_outputs([*sources, *given.files], *outputs)
     frame = frame_of(first_station, tip_offset)
-    with _watching(quiet) as watch:
+    with under_way("bench", quiet=quiet) as say_that:
         found = bench(
             given,
             repeats=repeats,
             target_error=target_in_mm(target_error),
             keep=tuple(keep or ()),
             against=against,
-            first_station=frame.first_station,
-            tip_offset=frame.tip,
+            first_station=frame[0],
+            tip_offset=frame[1],
             compare=compare,
-            watch=watch,
+            watch=lambda row: say_that(f"measured: {row['group']}: {row['way']}"),
         )
     command = ("dpg", *sys.argv[1:])
     if output is not None:
@@ -128,20 +130,6 @@ def bench(
     _print(printed_as, found.rows)
     for line in found.findings:
         _tell(printed_as, line)
-
-
-@contextmanager
-def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
-    """Name each row on a terminal as it is measured."""
-    interactive = sys.stderr.isatty() and not quiet
-
-    def show(row: "Row") -> None:
-        if interactive:
-            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
-
-    yield show
-    if interactive:
-        print(" " * 71, end="\r", file=sys.stderr)
 
 
 def _tell(printed_as: Format, line: str) -> None:
@@ -170,9 +158,9 @@ def _print_tables(rows: "Sequence[Row]") -> None:
             names = SHOWN.get(group, SHOWN["ladder"])
             print(f"{title}\n")
             print_grid(
-                {"way": [row["way"] for row in own]}
+                {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
-                left=("way",),
+                left=("method",),
             )
             print()
     print("\n".join(text_figure(rows)))

@@ -1,4 +1,4 @@
-"""`dpg check`: hold a table of designs against requirements."""
+"""`dpg check`: test a table of designs against requirements."""
 
 import os
 from collections.abc import Sequence

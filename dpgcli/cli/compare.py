@@ -47,7 +47,7 @@ def compare(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold predictions against finite elements or measurements."""
+    """Compare predictions with finite elements or measurements."""
     from dpgcli.api.compare import compare
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
@@ -62,12 +62,13 @@ def compare(
         data,
         calibration=calibration,
         shapes=shapes,
-        first_station=frame.first_station,
-        tip_offset=frame.tip,
+        first_station=frame[0],
+        tip_offset=frame[1],
     )
     print_rows(found.columns, found.rows, printed_as)
     if plot is not None:
         found.draw(plot)
     if not quiet:
         sys.stdout.flush()
-        say("\n".join(found.summary))
+        for line in found.summary:
+            say(line)

@@ -36,6 +36,7 @@ NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
 # open files, disk, processes, memory
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
+MOST_PROBLEMS = 10  # that are shown
 
 
 class ExitCode(IntEnum):
@@ -66,10 +67,8 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
-            for problem in map(problem_with_options, error.problems):
-                say(str(problem))  # which starts with its place
-            count = len(error.problems)
-            fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
+            say_problems(error)
+            raise typer.Exit(ExitCode.USAGE) from None
         except NoWorkerError as error:
             fail(ExitCode.FAILED_CASES, error.message)
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
@@ -85,6 +84,15 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             _internal_error()
 
     return run
+
+
+def say_problems(error: SpecError) -> None:
+    """Say the first problems, each of which starts with its place, and how many there are."""
+    for problem in map(problem_with_options, error.problems[:MOST_PROBLEMS]):
+        say(str(problem))
+    count = len(error.problems)
+    rest = f", the first {MOST_PROBLEMS} of them above" if count > MOST_PROBLEMS else ""
+    say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
 
 
 def fail(code: ExitCode, message: str) -> NoReturn:

@@ -1,5 +1,6 @@
 """`dpg predict`: every stable state of a finger or gripper, certified."""
 
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -28,12 +29,15 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import is_read, say
+from dpgcli.cli.streams import is_read, put, say
 
 if TYPE_CHECKING:
     from dpgcli.arrays import Columns
+    from dpgcli.design.scene import Scene
     from dpgcli.states.accuracy import AccuracyLevel
     from dpgcli.states.predict import Prediction, Summary
+
+BRAILLE = "\u28ff"
 
 
 def predict(
@@ -58,11 +62,16 @@ def predict(
         Path | None,
         typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
     ] = None,
+    overlay: Annotated[
+        bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
+    ] = False,
+    sketch: Annotated[
+        bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
     from dpgcli.api.inputs import scene_input
-    from dpgcli.api.predict import check_drawable, draw
     from dpgcli.states import predict as states
 
     given = scene_input(spec, settings or ())
@@ -70,9 +79,9 @@ def predict(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
     prediction = states.predict(given.scene, request)
-    if plot is not None:
-        check_plot(plot)
-        check_drawable(prediction.plan.n_states)
+    _check_figure(plot, prediction.plan.n_states, overlay=overlay)
+    if sketch:
+        _check_sketch(printed_as, prediction.plan.n_states)
     _check_outputs(given.files, output, plot)
     if prediction.plan.expected_seconds > LONG and not quiet:
         say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
@@ -89,8 +98,7 @@ def predict(
     for _ in rows:
         if only_prints and not is_read():  # the work is for nobody
             break
-    if plot is not None:
-        draw(given.scene, request.patterns, plot)
+    _draw(given.scene, request.patterns, plot, overlay=overlay, sketch=sketch and is_read())
     sys.stdout.flush()
     if not quiet and (is_read() or not only_prints):
         say("\n".join(_summary(prediction)))
@@ -105,6 +113,48 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
             line.show(prediction.summary.n_states)
     finally:
         line.clear()
+
+
+def _draw(
+    scene: "Scene", patterns: Sequence[str], plot: Path | None, *, overlay: bool, sketch: bool
+) -> None:
+    """The pictures that are asked for."""
+    from dpgcli.api import predict as face
+
+    if sketch:
+        width = shutil.get_terminal_size().columns
+        put(f"\n{face.sketch(scene, tuple(patterns), width)}")
+    if plot is not None:
+        face.draw(scene, tuple(patterns), plot, overlay=overlay)
+
+
+def _check_figure(plot: Path | None, n_states: int, *, overlay: bool) -> None:
+    """Before any work: a figure that can be drawn; raises UsageError."""
+    from dpgcli.api.predict import check_drawable
+    from dpgcli.errors import UsageError
+
+    if plot is not None:
+        check_plot(plot)
+        check_drawable(n_states)
+    elif overlay:
+        raise UsageError("--overlay draws all states in one picture: name its file with --plot")
+
+
+def _check_sketch(printed_as: Format | None, n_states: int) -> None:
+    """Before any work: sketches that can be shown; raises UsageError."""
+    from dpgcli.api.predict import check_drawable
+    from dpgcli.errors import UsageError
+
+    check_drawable(n_states, "sketch")
+    if printed_as in (Format.CSV, Format.JSON):
+        raise UsageError(f"--sketch draws under a table: drop it, or --format {printed_as}")
+    try:
+        BRAILLE.encode(sys.stdout.encoding)
+    except UnicodeEncodeError:
+        raise UsageError(
+            f"--sketch needs braille, which {sys.stdout.encoding} does not have: set a locale "
+            "with UTF-8, or PYTHONIOENCODING=utf-8"
+        ) from None
 
 
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
@@ -159,7 +209,8 @@ def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
-            "no method promises that before the work: numerical_error_mm says what was reached"
+            "no accuracy level promises that before the work: "
+            "numerical_error_mm says what was reached"
         )
     return f"chosen for the target error: {level.name}; {promise}"
 

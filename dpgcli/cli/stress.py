@@ -1,4 +1,4 @@
-"""`dpg stress`: stiff and extreme cases, held against extended precision."""
+"""`dpg stress`: stiff and extreme cases beside extended precision."""
 
 import math
 import sys
@@ -52,7 +52,7 @@ def stress(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold stiff and extreme cases against extended precision."""
+    """Compare stiff and extreme cases with extended precision."""
     from dpgcli.api.stress import hard_cases
     from dpgcli.files.output import Mark, check_outputs
 

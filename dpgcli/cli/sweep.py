@@ -1,6 +1,8 @@
 """`dpg sweep`: the design space, into two tables."""
 
+import math
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
@@ -28,9 +30,8 @@ from dpgcli.cli.validate import ProblemFormat
 from dpgcli.cores import cores
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from dpgcli.api.sweep import Place
+    from dpgcli.arrays import Columns
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict
@@ -174,7 +175,7 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
         return
     from dpgcli.sweeps.executors import start_fork_server
 
-    start_fork_server("dpgcli.studies.sweep", "filelock", "shapely")
+    start_fork_server("dpgcli.studies.work", "filelock", "shapely")
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
@@ -222,11 +223,11 @@ def _judge(
     return int((designs["status"] == "failed").sum()), code_of(verdicts, is_written=is_written)
 
 
-def _chosen(designs: "pd.DataFrame") -> str:
+def _chosen(designs: "Columns") -> str:
     """The accuracy levels that designs took for the target error."""
-    counts = designs.loc[designs["accuracy_level"] != "", "accuracy_level"].value_counts()
-    ways = ", ".join(f"{count:,} {level}" for level, count in counts.items())
-    bound = designs["error_bound_mm"].max()
+    counts = Counter(level for level in designs["accuracy_level"].tolist() if level)
+    ways = ", ".join(f"{count:,} {level}" for level, count in counts.most_common())
+    bound = max((mm for mm in designs["error_bound_mm"].tolist() if mm == mm), default=math.nan)
     return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 
 

@@ -20,7 +20,7 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
-from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source
+from dpgcli.design.scene import ORIGINS, Chambers, Gripper, Origin, Scene, Source
 from dpgcli.design.uncertainty import Share, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -90,12 +90,13 @@ class Resolution:
             gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
             None if layer is None else np.asarray(layer).item(),
             uncertainty_of(self.design.calibrations, self._shares()),
+            self._chambers(),
         )
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
 
-        Their bars are all rigid or none are; sources and uncertainty are left out.
+        Their bars are all rigid or none are; sources, uncertainty and chambers are left out.
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
@@ -109,6 +110,14 @@ class Resolution:
             return []
         is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
         return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+
+    def _chambers(self) -> Chambers:
+        """Sizes of the chambers of the first design."""
+        groups = [group for group in groups_of(self.design) if group.units]
+        keys = ("unit_separation_mm", "chamber_width_mm", "dome_height_mm")
+        unknown = np.full(1, np.nan)
+        pairs = ([(group, group.geometry.get(key, unknown)) for group in groups] for key in keys)
+        return Chambers(*(_by_unit(self.design.units, sizes)[:, 0] for sizes in pairs))
 
     def _gripper(self, designs: Indices) -> Gripper | None:
         given = self.design.gripper

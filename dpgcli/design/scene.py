@@ -63,11 +63,24 @@ class Gripper:
 
 
 @dataclass(frozen=True)
+class Chambers:
+    """Sizes (mm) of a finger's chambers that its lattice does not have, NaN where none is known.
+
+    Each is (unit,), or (1,) for all: the gap to the next chamber, the inner width, the height of
+    the dome. They are for pictures.
+    """
+
+    gap: Array
+    width: Array
+    dome_height: Array
+
+
+@dataclass(frozen=True)
 class Scene:
     """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known.
 
     Of a batch of fingers gripper and thickness are arrays by design. `uncertainty` is that of
-    fitted values, if any has an error.
+    fitted values, if any has an error; `chambers` are those of a finger given by its geometry.
     """
 
     finger: Finger
@@ -75,9 +88,10 @@ class Scene:
     gripper: Gripper | None = None
     layer_thickness: float | Array | None = None
     uncertainty: Uncertainty | None = None
+    chambers: Chambers | None = None
 
     def take_lanes(self, index: Indices) -> "Scene":
-        """Some designs of a batch; sources and uncertainty are left out."""
+        """Some designs of a batch; sources, uncertainty and chambers are left out."""
         gripper, thickness = self.gripper, self.layer_thickness
         if gripper is not None:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))

@@ -1,12 +1,17 @@
 """A prediction in files: the table of its states, and what differs between runs beside it."""
 
+import hashlib
+import json
 import platform
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from dpgcli.arrays import Columns
 from dpgcli.files.output import run_file
-from dpgcli.files.table_writer import write_run, write_states
+from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.scene_file import spelled
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
+from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 
 
@@ -36,3 +41,31 @@ def write_prediction(
             "command": list(command),
         },
     )
+
+
+def write_states(
+    prediction: Prediction, path: Path, spec_json: str, blocks: Iterable[Columns] | None = None
+) -> None:
+    """Write all states of a prediction, as they come; see `write_table`."""
+    columns = prediction.plan.columns
+    rows = prediction.blocks() if blocks is None else blocks
+    batches = (record_batch(columns, block) for block in rows)
+    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
+
+
+def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
+    request = plan.request
+    return {
+        "dpg.schema_version": str(SCHEMA_VERSION),
+        "dpg.spec": spec_json,
+        "dpg.spec_sha256": hashlib.sha256(spec_json.encode()).hexdigest(),
+        "dpg.patterns": json.dumps(request.patterns),
+        "dpg.formulation": request.formulation,
+        "dpg.method": plan.method,
+        "dpg.tolerance": repr(request.tolerance),
+        "dpg.law": plan.scene.finger.law.description,
+        "dpg.sources": json.dumps(
+            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
+        ),
+        "dpg.versions": versions(),
+    }

@@ -1,10 +1,12 @@
 """Figures of a design space: its main metrics over the first two swept values."""
 
-import io
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from dpgcli.reports.drawing import titled
+import pandas as pd
+
+from dpgcli.reports.drawing import own_figure, svg_text, titled
 from dpgcli.reports.summary import DesignSpace, is_alike
 
 DRAWN = (
@@ -17,37 +19,40 @@ DRAWN = (
 )
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
-SVG_SETTINGS: Any = {"svg.hashsalt": "dpg", "svg.fonttype": "none", "font.size": 9}
-NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
 def figures(space: DesignSpace) -> str:
     """Every main metric over the first two swept values, as one inline SVG."""
-    usable = space.usable
-    metrics = [m for m in DRAWN if m in usable and usable[m].notna().any()]
-    metrics = [m for m in metrics if not is_alike(usable[m])]
+    metrics = [name for name in DRAWN if name in space.designs and _varies(space, name)]
     if not metrics or not space.swept:
         return "<p>No metric varies.</p>"
+    designs = pd.DataFrame(space.designs)
+    every = 1 if _is_grid(space, designs) else len(designs) // MOST_POINTS + 1
     try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
+        svg = _maps(space, designs[::every], metrics)
     except ImportError:
         return f"<p>{escape(NO_MATPLOTLIB)}</p>"
-    every = 1 if _is_grid(space) else len(space.designs) // MOST_POINTS + 1
-    drawn = DesignSpace(space.designs[::every], space.units)
+    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+
+
+def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> str:
+    """Inline SVG with two maps a row."""
     n_rows = (len(metrics) + 1) // 2
-    content = io.StringIO()
-    with mpl.rc_context(SVG_SETTINGS):
-        figure = Figure(figsize=(10.0, 3.6 * n_rows), layout="constrained", facecolor="white")
+    with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
             axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
-            _draw(axes, drawn, metric)
-        figure.savefig(content, format="svg", metadata=NO_METADATA)
-    text = content.getvalue()
-    names = escape(", ".join(map(space.label, metrics)))
-    svg = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{names}"', 1)
-    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+            _draw(axes, space, designs, metric)
+        over = " and ".join(map(space.label, space.swept[:2]))
+        what = ", ".join(map(space.label, metrics))
+        text = svg_text(figure, what, f"{what} over {over}", NO_METADATA)
+    return text[text.index("<svg") :]
+
+
+def _varies(space: DesignSpace, metric: str) -> bool:
+    known = space.known(metric, space.usable)
+    return len(known) > 0 and not is_alike(space.designs[metric][known])
 
 
 def _caption(space: DesignSpace, every: int) -> str:
@@ -58,38 +63,38 @@ def _caption(space: DesignSpace, every: int) -> str:
     return text + (f" One design in {every:,} is drawn." if every > 1 else "")
 
 
-def _draw(axes: Any, space: DesignSpace, metric: str) -> None:
+def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> None:
     """A line over one swept value; over two a map if they form a grid, else points."""
-    designs = space.usable.sort_values(metric, kind="stable")  # the largest is drawn last
+    usable = designs[designs["n_stable"] > 0]
+    usable = usable.sort_values(metric, kind="stable")  # the largest is drawn last
     first, *others = space.swept
     if not others:
-        line = designs.sort_values(first, kind="stable")
+        line = usable.sort_values(first, kind="stable")
         axes.plot(line[first], line[metric], "o-", color="#31688e", ms=3, lw=1)
         axes.set_ylabel(space.label(metric))
         axes.grid(visible=True, alpha=0.25)
         return
     second = others[0]
     axes.set_ylabel(titled(space.label(second)))
-    is_large = len(space.designs) > MOST_VECTORS
-    if _is_grid(space):
-        cells = space.designs.assign(**{metric: designs[metric]})
+    is_large = len(designs) > MOST_VECTORS
+    if _is_grid(space, designs):
+        cells = designs.assign(**{metric: usable[metric]})
         table = cells.groupby([second, first])[metric].max().unstack()
         drawn = axes.pcolormesh(
             table.columns, table.index, table.to_numpy(float), cmap="viridis", rasterized=is_large
         )
         axes.set_facecolor("0.85")
     else:
-        empty = space.designs.drop(designs.index)
+        empty = designs.drop(usable.index)
         axes.plot(empty[first], empty[second], "x", color="0.7", ms=4, rasterized=is_large)
-        values = designs[metric]
         drawn = axes.scatter(
-            designs[first], designs[second], 14, values, cmap="viridis", rasterized=is_large
+            usable[first], usable[second], 14, usable[metric], cmap="viridis", rasterized=is_large
         )
     axes.figure.colorbar(drawn, label=space.label(metric))
 
 
-def _is_grid(space: DesignSpace) -> bool:
+def _is_grid(space: DesignSpace, designs: pd.DataFrame) -> bool:
     """Whether the first two swept values come in all combinations."""
-    places = space.designs[space.swept[:2]]
+    places = designs[space.swept[:2]]
     sizes = places.nunique()
     return len(sizes) == 2 and sizes.min() > 1 and len(places.drop_duplicates()) == sizes.prod()

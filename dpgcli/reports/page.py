@@ -4,10 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import pandas as pd
-from markdown_it import MarkdownIt
-
-from dpgcli.reports.maps import figures
+from dpgcli.arrays import Columns
 from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
 from dpgcli.sweeps.gate import RequirementVerdict
 from dpgcli.text import printable
@@ -32,15 +29,15 @@ svg { max-width: 100%; height: auto; }
 """
 
 
-def markdown(
-    designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None
-) -> str:
+def markdown(designs: Columns, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
     """A design space as GitHub-flavored Markdown; `facts` are those of the run that made it."""
     return _markdown(sections(DesignSpace(designs, units), facts))
 
 
-def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
+def html(designs: Columns, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
     """The same as a page of HTML that needs no other file, with figures if Matplotlib is there."""
+    from dpgcli.reports.maps import figures
+
     space = DesignSpace(designs, units)
     body = _html(_markdown(sections(space, facts)))
     return (
@@ -85,6 +82,8 @@ def _escaped(text: str) -> str:
 
 def _html(text: str) -> str:
     """Markdown as HTML; whatever looks like a tag in the text is none in the page."""
+    from markdown_it import MarkdownIt
+
     page: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     for tag, instead in TAGS.items():
         page = page.replace(tag, instead)

@@ -5,14 +5,15 @@ Same table and facts, same sections: what differs between runs comes from the fa
 
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.scene import Origin
 from dpgcli.sweeps.gate import swept_names
 
@@ -58,44 +59,57 @@ class Section(NamedTuple):
 class DesignSpace:
     """A table of designs with the units of its columns, and its numbers as text."""
 
-    designs: pd.DataFrame
+    designs: Columns
     units: Mapping[str, str]
+
+    def __len__(self) -> int:
+        return len(self.designs["design"])
 
     @property
     def swept(self) -> list[str]:
         return swept_names(self.designs)
 
-    @property
-    def usable(self) -> pd.DataFrame:
-        """Designs that have a state, thus metrics."""
-        return self.designs[self.designs["n_stable"] > 0]
+    @cached_property
+    def usable(self) -> Indices:
+        """Rows of designs that have a state, thus metrics."""
+        return np.flatnonzero(self.designs["n_stable"] > 0)
 
-    def of_status(self, *statuses: str) -> pd.DataFrame:
-        return self.designs[self.designs["status"].isin(statuses)]
+    def of_status(self, *statuses: str) -> Indices:
+        """Rows of designs that are any of these."""
+        found = self.designs["status"]
+        return np.flatnonzero(np.any([found == status for status in statuses], axis=0))
+
+    def known(self, name: str, rows: Indices) -> Indices:
+        """Those of the rows in which a column has a value."""
+        return rows[~np.isnan(self.designs[name][rows])]
+
+    def n_values(self, name: str, rows: Indices) -> int:
+        """How many values a column has in some rows."""
+        return len(distinct(self.designs[name][self.known(name, rows)]))
 
     def shown(self, name: str, value: float) -> str:
         """A value of a column with its unit."""
         text = str(value) if isinstance(value, int | np.integer) else f"{value:.5g}"
         return f"{text} {self.units.get(name, '')}".rstrip()
 
-    def span(self, name: str, designs: pd.DataFrame) -> str:
-        """Smallest to largest value of a column."""
-        column: Any = designs[name]
-        low, high = column.min(), column.max()
+    def span(self, name: str, rows: Indices) -> str:
+        """Smallest to largest value of a column in some rows."""
+        values = self.designs[name][self.known(name, rows)]
+        low, high = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
         return self.shown(name, low) if low == high else f"{low:.5g} … {self.shown(name, high)}"
 
-    def number(self, row: Any) -> str:
+    def number(self, row: int) -> str:
         """The number of the design in a row."""
-        return str(self.designs.at[row, "design"])
+        return str(self.designs["design"][row])
 
-    def point(self, row: Any) -> list[str]:
+    def point(self, row: int) -> list[str]:
         """The swept values of the design in a row."""
         return [self.shown(name, self.designs[name][row]) for name in self.swept]
 
     def label(self, name: str) -> str:
         """A column in words, for an axis.
 
-        >>> DesignSpace(pd.DataFrame(), {"dome_height_mm": "mm"}).label("dome_height_mm")
+        >>> DesignSpace({}, {"dome_height_mm": "mm"}).label("dome_height_mm")
         'dome height (mm)'
         """
         unit = self.units.get(name, "")
@@ -107,7 +121,7 @@ class DesignSpace:
 def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Section]:
     """All sections about a space; `facts` are those of the run that made it."""
     counted = Section("Design space", [_extent(space)])
-    if not len(space.designs):
+    if not len(space):
         return [counted, *_times(facts)]
     return [
         counted,
@@ -121,24 +135,27 @@ def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Sectio
 
 
 def _extent(space: DesignSpace) -> str:
-    n_designs = len(space.designs)
-    if not n_designs:
+    if not len(space):
         return "0 designs."
+    rows = np.arange(len(space))
     spans = [
-        f"{name} ({space.span(name, space.designs)}, {space.designs[name].nunique():,} values)"
+        f"{name} ({space.span(name, rows)}, {space.n_values(name, rows):,} values)"
         for name in space.swept
     ]
-    return f"{n_designs:,} designs over {', '.join(spans)}."
+    return f"{len(space):,} designs over {', '.join(spans)}."
 
 
 def _counts(space: DesignSpace) -> Table:
-    counts = pd.crosstab(space.designs["status"], space.designs["calibration"])
-    kinds = [*(o.value for o in Origin if o.value in counts), *(k for k in counts if k == "")]
+    columns = (space.designs[name].tolist() for name in ("status", "calibration"))
+    counts = Counter(zip(*columns, strict=True))
+    found = {kind for _, kind in counts}
+    kinds = [kind for kind in (*(origin.value for origin in Origin), "") if kind in found]
     head = ["status", "designs", *(kind or "not solved" for kind in kinds)]
+    totals = {s: sum(n for (of, _), n in counts.items() if of == s) for s in STATUSES}
     rows = [
-        [status, *(f"{n:,}" for n in (counts.loc[status].sum(), *counts.loc[status, kinds]))]
-        for status in STATUSES
-        if status in counts.index
+        [status, *(f"{n:,}" for n in (total, *(counts[status, kind] for kind in kinds)))]
+        for status, total in totals.items()
+        if total
     ]
     return Table(head, rows)
 
@@ -153,18 +170,19 @@ def _extremes(space: DesignSpace) -> list[str | Table]:
 
 
 def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[list[str]]:
-    values = space.usable[name].dropna()
-    if values.empty:
+    rows = space.known(name, space.usable)
+    if not len(rows):
         return
-    merit = values if is_largest_best else -values.abs()
+    values = space.designs[name][rows]
+    merit = values if is_largest_best else -np.abs(values)
     ends = {"best": merit.max(), "worst": merit.min()}
     if is_alike(merit):
         ends = {"all alike": merit.max()}
     for word, end in ends.items():
-        alike = values.index[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
-        others = f" and {len(alike) - 1:,} more" if len(alike) > 1 else ""
-        value = space.shown(name, values[alike[0]])
-        yield [name, word, value, space.number(alike[0]) + others, *space.point(alike[0])]
+        first, *others = rows[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
+        more = f" and {len(others):,} more" if others else ""
+        value = space.shown(name, space.designs[name][first])
+        yield [name, word, value, space.number(first) + more, *space.point(first)]
 
 
 def is_alike(values: Any) -> bool:
@@ -175,13 +193,16 @@ def is_alike(values: Any) -> bool:
 def _failures(space: DesignSpace) -> list[str | Table]:
     """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
     others = space.of_status(*STATUSES[1:])
-    if others.empty:
+    if not len(others):
         return ["Every design is stable."]
-    masked = others["reason"].map(lambda reason: NUMBER.sub("#", reason))
-    groups = [(len(g), g.index[0]) for _, g in others.groupby([others["status"], masked])]
+    statuses, reasons = (space.designs[name] for name in ("status", "reason"))
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row in others.tolist():
+        groups.setdefault((statuses[row], NUMBER.sub("#", reasons[row])), []).append(row)
     rows = []
-    for count, row in sorted(groups, key=lambda group: (-group[0], group[1])):
-        status, reason = others.loc[row, ["status", "reason"]]
+    for found in sorted(groups.values(), key=lambda found: (-len(found), found[0])):
+        count, row = len(found), found[0]
+        status, reason = statuses[row], reasons[row]
         why = reason or WITHOUT_REASON.get(status, "")
         rows.append([status, f"{count:,}", why, space.number(row), *space.point(row)])
     head = ["status", "designs", "reason, as of the example", "example", *space.swept]
@@ -190,30 +211,31 @@ def _failures(space: DesignSpace) -> list[str | Table]:
 
 def _bistability(space: DesignSpace) -> list[str | Table]:
     judged = space.of_status(*BOUNDARY_STATUSES)
-    found = [status for status in BOUNDARY_STATUSES if (judged["status"] == status).any()]
+    by_status = {status: space.of_status(status) for status in BOUNDARY_STATUSES}
+    found = [status for status, rows in by_status.items() if len(rows)]
     if found == ["stable"]:
         return ["Nowhere in this space: every design in it is stable."]
     if "stable" not in found:
         return ["No design in this space is stable."]
     rows = [
-        [name, *(space.span(name, judged[judged["status"] == status]) for status in found)]
-        for name in space.swept
+        [name, *(space.span(name, by_status[status]) for status in found)] for name in space.swept
     ]
     return [Table(["range of", *found], rows), *_boundary(space, judged)]
 
 
-def _boundary(space: DesignSpace, judged: pd.DataFrame) -> list[str | Table]:
+def _boundary(space: DesignSpace, judged: Indices) -> list[str | Table]:
     """Runs of stable designs along one swept value, for each value of the other."""
     if not 1 <= len(space.swept) <= 2:
         return []
-    *fixed, along = sorted(space.swept, key=lambda name: judged[name].nunique())
-    if fixed and judged[fixed[0]].nunique() > MOST_ROWS:
+    *fixed, along = sorted(space.swept, key=lambda name: space.n_values(name, judged))
+    if fixed and space.n_values(fixed[0], judged) > MOST_ROWS:
         return []
+    values = space.designs[along]
     rows = []
-    for line in (g for _, g in judged.groupby(fixed)) if fixed else [judged]:
-        line = line.sort_values(along, kind="stable")
+    for line in _lines(space, fixed[0], judged) if fixed else [judged]:
+        line = line[np.argsort(values[line], kind="stable")]
         at = [space.span(name, line) for name in fixed]
-        runs = list(_stable_runs(line[along].to_numpy(), (line["status"] == "stable").to_numpy()))
+        runs = list(_stable_runs(values[line], space.designs["status"][line] == "stable"))
         rows += [
             [*at, *("–" if value is None else space.shown(along, value) for value in run)]
             for run in runs or [(None, None, None, None)]
@@ -221,6 +243,13 @@ def _boundary(space: DesignSpace, judged: pd.DataFrame) -> list[str | Table]:
     head = [*fixed, "not stable up to", "stable from", "stable to", "not stable from"]
     text = f"Along {along}; – where the space ends first or nothing is stable."
     return [text, *shortened(Table(head, rows[:MOST_ROWS]), len(rows))]
+
+
+def _lines(space: DesignSpace, name: str, rows: Indices) -> Iterator[Indices]:
+    """Those of the rows that share a value of a column, value by value."""
+    rows = space.known(name, rows)
+    values = space.designs[name][rows]
+    return (rows[values == value] for value in distinct(values))
 
 
 def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None, ...]]:
@@ -234,9 +263,10 @@ def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None
 def _errors(space: DesignSpace) -> list[str | Table]:
     rows = []
     for name in ERRORS:
-        values: Any = space.usable[name].dropna() if name in space.designs else ()
-        if len(values):
-            row = values.idxmax()
+        known = space.known(name, space.usable) if name in space.designs else ()
+        if len(known):
+            values = space.designs[name]
+            row = known[np.argmax(values[known])]
             value = space.shown(name, values[row])
             rows.append([name, value, space.number(row), *space.point(row)])
     return [Table(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]

@@ -201,7 +201,9 @@ def _check(scene: Scene, request: Request) -> None:
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
         raise UsageError(
-            Field("target_error"), " chooses among ways of the chain: drop ", Field("formulation")
+            Field("target_error"),
+            " chooses among accuracy levels of the chain: drop ",
+            Field("formulation"),
         )
 
 

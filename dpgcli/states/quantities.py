@@ -131,7 +131,7 @@ _NUMERICS = (
     Quantity(
         "residual_N",
         "N",
-        "largest unbalanced force; moments over the lever H",
+        "largest unbalanced force; moments over the segment height H",
         of=lambda s: s.residual,
         is_always=True,
     ),

@@ -12,13 +12,13 @@ from time import perf_counter
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
-from dpgcli.files.scene_file import reason_against, scene_of, spelled
+from dpgcli.files.scene_file import scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
-from dpgcli.studies.work import ChunkTask
+from dpgcli.studies.work import ChunkTask, reason_against
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked

@@ -134,7 +134,7 @@ def test_wrong_data_are_named_by_row(folder: Path) -> None:
         ({"fix": {"force_linearity": 2.0}}, "^fix force_linearity=2: expected a number from 0 to"),
         ({"fix": {"stroke": 2.0}}, "^fix stroke: no value of the law .did you mean stroke_mm"),
         ({"free": ["stroke_mm"]}, "is not free: give its value, fix bistable_stiffness_N_per_mm"),
-        ({"branches": "some"}, "^branches 'some': expected all, quasi-static"),
+        ({"branches": "some"}, "^branches 'some': expected both, loading, unloading, quasi-static"),
         ({"loss": "square"}, "^loss 'square': expected linear, soft_l1, huber, cauchy"),
     ],
 )

@@ -15,7 +15,7 @@ from dpgcli.calibration.bistable import (
     rests,
     slopes,
 )
-from dpgcli.calibration.choices import Quantity, Rule
+from dpgcli.calibration.choices import Branches, Quantity, Rule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 from dpgcli.files.measured import read_curve
@@ -264,7 +264,7 @@ def test_the_dynamic_dome_rings_and_drifts() -> None:
 
 def test_its_quasi_static_pieces_are_near_the_static_dome() -> None:
     record = read_curve(DATA / "dome_dynamic_h6.5_t0.75.csv").curve
-    found = fitted(record, is_quasi_static=True)
+    found = fitted(record, branches=Branches.QUASI_STATIC)
     assert warned(
         found, "quasi-static pieces, time 0.001 to 0.08925, 0.09866 to 0.22: dropped 1194"
     )

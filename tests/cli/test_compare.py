@@ -90,7 +90,7 @@ def test_states_that_do_not_exist_are_said(call: Any, arguments: tuple[str, ...]
         (("--first-station", "nan,0"), "--first-station nan,0: expected two numbers in mm"),
         (("--plot", "c.pdf"), "expected a name that ends in .svg or .png"),
         (("--plot", "none/c.svg"), "cannot write none/c.svg"),
-        (("-s", "finger.units=2"), "three_gap_finger.csv:9: pattern: expected 2 digits 0 and 1"),
+        (("-s", "finger.units=2"), "three_gap_finger.csv:11: pattern: expected 2 digits 0 and 1"),
     ],
 )
 def test_what_makes_no_sense(

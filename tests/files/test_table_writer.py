@@ -9,8 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dpgcli.files.prediction import write_states
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import canonical_json, read_spec, scene_of
-from dpgcli.files.table_writer import record_batch, schema, write_states, write_table
+from dpgcli.files.table_writer import write_table
 from dpgcli.states.columns import Column, Group
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

@@ -14,7 +14,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dpgcli.reports.page import _html, _markdown, html, markdown, verdicts_markdown
+from dpgcli.arrays import Columns
+from dpgcli.reports.page import _html, _markdown, verdicts_markdown
+from dpgcli.reports.page import html as html_of
+from dpgcli.reports.page import markdown as markdown_of
 from dpgcli.reports.summary import Section, Table
 from dpgcli.sweeps.gate import check_requirements, requirement
 from dpgcli.text import printable
@@ -26,6 +29,7 @@ UNITS = {
     "aperture_min_mm": "mm",
     "max_residual_N": "N",
 }
+KINDS = dict.fromkeys(("calibration", "status", "reason"), object)
 
 
 def space(**changes: Any) -> pd.DataFrame:
@@ -53,11 +57,24 @@ def space(**changes: Any) -> pd.DataFrame:
     return designs
 
 
+def columns(designs: pd.DataFrame) -> Columns:
+    """As they are read from a table."""
+    return {name: np.array(designs[name].tolist(), KINDS.get(name)) for name in designs}
+
+
+def markdown(designs: pd.DataFrame, units: Any, facts: Any) -> str:
+    return markdown_of(columns(designs), units, facts)
+
+
+def html(designs: pd.DataFrame, units: Any, facts: Any) -> str:
+    return html_of(columns(designs), units, facts)
+
+
 def section(title: str, designs: pd.DataFrame | None = None, facts: Any = None) -> list[str]:
     """Lines of a section that are not empty."""
-    page = markdown(space() if designs is None else designs, UNITS, facts)
-    found = re.search(rf"^##? {title}\n(.*?)(?=^#|\Z)", page, re.MULTILINE | re.DOTALL)
-    assert found, page
+    text = markdown(space() if designs is None else designs, UNITS, facts)
+    found = re.search(rf"^##? {title}\n(.*?)(?=^#|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert found, text
     return [line for line in found[1].splitlines() if line]
 
 
@@ -299,7 +316,7 @@ def test_without_matplotlib_the_page_says_so(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_verdicts_in_markdown() -> None:
     rules = [requirement(text, ["gap_mm", "n_stable"]) for text in ("gap_mm < 9", "n_stable > 5")]
-    text = verdicts_markdown(check_requirements(space().tail(4), rules))
+    text = verdicts_markdown(check_requirements(columns(space().tail(4)), rules))
     assert text == (
         "# Requirements\n\nmet: gap\\_mm \\< 9: all 4 designs\n\n"
         "not met: n\\_stable \\> 5: 1 of 4 designs\n\n| first that fail |\n| --- |\n"

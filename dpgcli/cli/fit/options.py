@@ -46,3 +46,23 @@ GeometrySpec = Annotated[
     Path | None,
     typer.Option("--spec", metavar="SPEC", help="Take the geometry from this spec's finger"),
 ]
+ColumnTitles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="NAME=TITLE",
+        help="The file's title of a column, force_N=Load; -Load reverses it; repeatable",
+    ),
+]
+Skip = Annotated[
+    int | None,
+    typer.Option(
+        "--skip", metavar="N", min=0, help="Lines above the table's header  [default: found]"
+    ),
+]
+Units = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--units", metavar="QUANTITY=UNIT", help="The file's unit, such as force=kN; repeatable"
+    ),
+]

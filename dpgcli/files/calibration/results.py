@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.calibration.bistable import BistableFit, BistableOptions
-from dpgcli.calibration.choices import GridMethod, Quantity
+from dpgcli.calibration.choices import Branches, GridMethod, Quantity
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import GridLaw
@@ -48,6 +48,8 @@ def bistable_method(found: BistableFit, choice: BistableOptions) -> str:
     text = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
     if choice.quantity is Quantity.PRESSURE:
         text += f", area {choice.area:g} mm2"
+    if choice.branches in (Branches.LOADING, Branches.UNLOADING):
+        text += f", {choice.branches} only"
     return text + (", quasi-static pieces" if choice.is_quasi_static else "")
 
 

@@ -15,7 +15,7 @@ from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
 from dpgcli.design.resolve import Resolution, resolve
-from dpgcli.files.calibration.models import Calibration
+from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.sections import (
     BarStiffness,
     Geometry,
@@ -85,11 +85,28 @@ class GripperSpec(Section):
     )
 
 
+Place = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
+
+
+class DataSpec(Section):
+    """Where the lattice lies in known states: the frame of data about this finger."""
+
+    first_station_mm: Place | None = Field(
+        default=None, description="The lattice's first node in the data, x and y in mm."
+    )
+    tip_offset_mm: Place | None = Field(
+        default=None,
+        description="The data's tip from the last node: along the end phalanx and to its left, "
+        "in mm.",
+    )
+
+
 class Spec(Section):
     """A finger, and the gripper made of two of them."""
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+    data: DataSpec | None = Field(default=None, description="The frame of data about the finger.")
 
     @cached_property
     def resolution(self) -> Resolution:

@@ -9,6 +9,7 @@ from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST, STIFFEST, uni
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file.models import (
+    DataSpec,
     FingerSpec,
     GripperSpec,
     Spec,
@@ -36,6 +37,7 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("finger", "overrides", "*", "geometry"): UnitGeometry,
     ("finger", "overrides", "*", "lattice"): UnitLattice,
     ("gripper",): GripperSpec,
+    ("data",): DataSpec,
 }
 
 SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
@@ -48,6 +50,7 @@ OWN = {
     "calibration": '"published", the name of a calibration file, or a list of these',
     "law": '"published", "tabulated" or "push_only"',
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
+    **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),
 }
 
 HINTS = {
@@ -61,6 +64,7 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 TEXTS = ("calibration", "law")
+PAIRS = tuple(DataSpec.model_fields)
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
@@ -113,6 +117,9 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
+    if path[:1] == ("data",) and error["type"] != "extra_forbidden" and len(path) > 1:
+        path = path[:2]  # of the pair, not of one of its numbers
+        error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
@@ -138,10 +145,10 @@ def _hint(key: str, error: Any) -> str:
     value = error["input"]
     if error["type"] == "model_type":
         return "keys below it, indented"
-    if isinstance(value, str) and key not in TEXTS:
+    if isinstance(value, str) and key not in (*TEXTS, *PAIRS):
         return "a plain number such as 6.5 or 1.0e+4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS):
+    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS, *PAIRS):
         return OUT_OF_RANGE
     return HINTS.get(key, "")
 
@@ -155,7 +162,7 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
     ):
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
-    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS):
+    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
     if parent not in SECTIONS:
         known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]

@@ -317,7 +317,7 @@ def test_settings_reach_overrides_written_as_numbers(read):
         ),
         (
             "zzz=3",
-            "settings: zzz: expected a known key, found zzz (known here: finger, gripper)",
+            "settings: zzz: expected a known key, found zzz (known here: finger, gripper, data)",
         ),
     ],
 )
