@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import Any
 
 from dpgcli.api.inputs import (
@@ -23,8 +23,9 @@ from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
-from dpgcli.files.parts import PartStore
+from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
 from dpgcli.files.table_reader import read_run, read_undamaged
 from dpgcli.files.yaml_file import Document, without_free_keys
@@ -45,6 +46,7 @@ from dpgcli.studies.sweep import (
 )
 from dpgcli.sweeps import cluster, executors
 from dpgcli.sweeps.executors import Backend
+from dpgcli.temporary import temporary_folder
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
@@ -53,24 +55,41 @@ ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The tables of a sweep; of a shard there are none before `merge`.
+    """The tables of a sweep, read when asked for; of a shard there are none before `merge`.
 
-    `n_failed` designs killed their worker, twice. `report` is the page on the space.
+    `n_failed` designs killed their worker, twice. `report` is the page on the space,
+    `fingerprint` that of all the tables depend on.
     """
 
     folder: Path
+    fingerprint: str
     n_failed: int
     report: str = ""
 
     @cached_property
     def designs(self) -> Table:
-        """A row for each design: what became of it, and its metrics."""
-        return Table(read_undamaged(self.folder / DESIGNS))
+        """A row for each design: what became of it, and its metrics.
+
+        Raises UsageError where the folder has the table of another sweep by now, or none.
+        """
+        return self._table(DESIGNS)
 
     @cached_property
     def states(self) -> Table:
-        """A row for each state of each design."""
-        return Table(read_undamaged(self.folder / STATES))
+        """A row for each state of each design. Raises UsageError as `designs` does."""
+        return self._table(STATES)
+
+    def _table(self, name: str) -> Table:
+        path = self.folder / name
+        table = read_undamaged(path)
+        said = (table.schema.metadata or {}).get(FINGERPRINT.encode(), b"").decode()
+        if said != self.fingerprint:
+            raise UsageError(
+                f"{path} is of another sweep by now than this result: give each an ",
+                Field("output"),
+                " of its own, or read its tables before the next",
+            )
+        return Table(table)
 
 
 def sweep(
@@ -137,15 +156,16 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
     if output is not None:
         yield path_of("output", output)
         return
-    with TemporaryDirectory() as folder:
-        yield Path(folder)
+    with temporary_folder(Path(gettempdir()) / "sweep") as folder:
+        yield folder / "output"  # which is locked, as the folder is
 
 
 def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
     if part is not None:
-        return SweepResult(study.folder, study.n_failed)
+        return SweepResult(study.folder, study.metadata[FINGERPRINT], study.n_failed)
     designs, text = summarize(study.folder, is_new=is_new)
-    return SweepResult(study.folder, int((designs["status"] == "failed").sum()), text)
+    n_failed = int((designs["status"] == "failed").sum())
+    return SweepResult(study.folder, study.metadata[FINGERPRINT], n_failed, text)
 
 
 def study_of(
@@ -180,15 +200,20 @@ def _axes(space: Any) -> Any:
     """Axes of a space, data frames among them as values that go together."""
     if not isinstance(space, list | tuple):
         return space
-    return [
-        {"paired": axis["table"].to_dict(orient="list")} if _is_frame(axis) else axis
-        for axis in space
-    ]
+    return [{"paired": _columns(axis["table"])} if _is_frame(axis) else axis for axis in space]
 
 
 def _is_frame(axis: Any) -> bool:
-    """Whether an axis is a table of pandas."""
-    return isinstance(axis, Mapping) and hasattr(axis.get("table"), "to_dict")
+    """Whether an axis is a table of pandas, of Arrow, or ours."""
+    table = axis.get("table") if isinstance(axis, Mapping) else None
+    return hasattr(table, "to_dict") or hasattr(table, "to_pandas")
+
+
+def _columns(table: Any) -> dict[Any, list[Any]]:
+    frame = frame_of(table)
+    if twice := [str(name) for name in frame.columns[frame.columns.duplicated()]]:
+        raise UsageError(f"table: expected each column once, found {', '.join(twice)} again")
+    return {name: frame[name].tolist() for name in frame}
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:
@@ -285,12 +310,12 @@ def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:
         drop_half_written(folder)
         check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
         read_run(folder / RUN)  # what no report can be made beside is refused before the work
-        assemble(found, folder)
+        made = assemble(found, folder)
         designs, text = summarize(folder, is_new=True, say=say)
         for store in found:
             if store.folder.parent.parent.samefile(folder):
                 store.drop()
-    return SweepResult(folder, int((designs["status"] == "failed").sum()), text)
+    return SweepResult(folder, made, int((designs["status"] == "failed").sum()), text)
 
 
 def _store(folder: Path) -> PartStore:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ from dpgcli.states.predict import Prediction, predict
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
+from dpgcli.temporary import temporary_folder
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
@@ -239,10 +240,10 @@ class Bench:
         """All states of a long finger, computed, certified and written to a file."""
         finger = repeated(self.finger, TABLE_UNITS)
 
-        with TemporaryDirectory() as folder:
+        with temporary_folder(Path(gettempdir()) / "bench") as folder:
 
             def whole() -> None:
-                write(predict(Scene(finger, ())), Path(folder) / "states.parquet")
+                write(predict(Scene(finger, ())), folder / "states.parquet")
 
             times = measured(whole, self.repeats)
         n_states = 2**TABLE_UNITS

@@ -16,6 +16,7 @@ from dpgcli.arrays import Array
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.content import content_of, decoded
+from dpgcli.files.frames import frame_of
 from dpgcli.files.headers import headed
 from dpgcli.files.layout import (
     GROUPED,
@@ -175,11 +176,7 @@ def _content(source: Tabular) -> tuple[str, bytes]:
     if isinstance(source, str | Path):
         hint = "a curve or a table of states is short"
         return str(source), content_of(Path(source), Location(str(source)), MAX_BYTES, hint)
-    import pandas as pd
-
-    convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
-    frame = convert() if convert is not None else pd.DataFrame(source)
-    return FRAME, frame.to_csv(index=False).encode()
+    return FRAME, frame_of(source).to_csv(index=False).encode(errors="backslashreplace")
 
 
 def text_of(content: bytes, place: Location) -> str:
@@ -211,34 +208,39 @@ def read_sheet(
 
     A file may have its own separators and marks, titles above the header and units below it: see
     `files.layout`. The header is the row with the titles that are chosen or names that are
-    `wanted`. A data frame is read as the CSV that it would be written to, header in line 1.
+    `wanted`. A data frame is read as the CSV that it would be written to, header in line 1, but
+    for comments: it has none, and every row counts.
 
     Below the header a comment has a space behind the #: spreadsheets write #DIV/0!, and of a row
     such as #5,0.2 nobody knows whether it is meant.
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
     file, content = _content(source)
-    lines = list(io.StringIO(text_of(content, Location(file)), newline=None))
+    is_file = isinstance(source, str | Path)
+    text = text_of(content, Location(file)) if is_file else content.decode()
+    lines = list(io.StringIO(text, newline=None))
     lines[: choice.skip or 0] = ["\n"] * min(choice.skip or 0, len(lines))
-    separator = "," if file == FRAME else separator_of(lines)
-    rows, problems = rows_in(lines, separator, file)
+    separator = separator_of(lines) if is_file else ","
+    rows, problems = rows_in(lines, separator, file, has_comments=is_file)
     if not rows:
         found = problems or [located(Location(file), "file", "a header and rows", "nothing")]
         raise SpecError(in_order(found))
-    head = headed(rows, wanted, choice.columns, is_first=choice.skip is not None)
+    is_first = choice.skip is not None or not is_file
+    head = headed(rows, wanted, choice.columns, is_first=is_first)
     line = head.line
+    below = [row for row in head.rows if is_file or row.line > 1]  # names that are numbers are none
     problems = [problem for problem in problems if (problem.line or 0) > line]
     sheet = Sheet(
         file,
         head.names,
-        [row.cells for row in head.rows],
-        [row.line for row in head.rows],
+        [row.cells for row in below],
+        [row.line for row in below],
         hashlib.sha256(content).hexdigest(),
         separator,
         head.units,
         head.titles,
         head.reversed,
-        tuple(_comments(lines[:line])),
+        tuple(_comments(lines[:line])) if is_file else (),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
     if problems:

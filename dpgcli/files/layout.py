@@ -66,6 +66,7 @@ class _Lines:
 
     lines: Sequence[str]
     separator: str
+    has_comments: bool
     number: int = 0
     is_inside: bool = False
     has_rows: bool = False
@@ -79,7 +80,7 @@ class _Lines:
         """The first line of a row, empty if it is that of none."""
         text = line.strip(" \r\n") if self.separator == "\t" else line.strip()
         is_comment = COMMENT.match(text) is not None if self.has_rows else text.startswith("#")
-        self.is_inside = bool(text) and not is_comment
+        self.is_inside = bool(text) and not (is_comment and self.has_comments)
         return _parted(text, self.separator) if self.is_inside else ""
 
 
@@ -91,10 +92,13 @@ def _parted(text: str, separator: str) -> str:
 
 
 def rows_in(
-    lines: Sequence[str], separator: str, file: str = ""
+    lines: Sequence[str], separator: str, file: str = "", *, has_comments: bool = True
 ) -> tuple[list[Row], list[Problem]]:
-    """The rows of a text without those that are empty, and what is not the row of any table."""
-    source = _Lines(lines, separator)
+    """The rows of a text without those that are empty, and what is not the row of any table.
+
+    Without comments, as a data frame is, rows of empty cells count.
+    """
+    source = _Lines(lines, separator, has_comments)
     mark = separator if separator.strip() else "\t"
     reader = csv.reader(source, delimiter=mark, skipinitialspace=True, strict=True)
     rows: list[Row] = []
@@ -109,7 +113,7 @@ def rows_in(
             place = Location(file, before + 1)
             problems.append(located(place, "row", "cells of a CSV", str(error)))
             continue
-        if cells and any(cells):
+        if cells and (any(cells) or not has_comments):
             rows.append(Row([_in_one_line(cell) for cell in cells], before + 1))
             source.has_rows = True
 
@@ -143,6 +147,7 @@ def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str
 
     Without either it is the row before the numbers, so that a message can say what there is.
     """
+    sources = [source for source in sources if not is_number(source)]  # those are places
     for place, row in enumerate(rows):
         titles = {part for cell in row.cells for part in (cell, name_and_unit(cell)[0])}
         if sources and all(source in titles for source in sources):

@@ -1,11 +1,13 @@
 """`dpg merge`: shards into the tables of one run, or a plain refusal."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.files.parts import fingerprint
 from dpgcli.studies import sweep as studies
 
 SWEEP = """base: three_unit.yaml
@@ -51,6 +53,29 @@ def test_a_gap(call: Any, folder: Path, shard: Any) -> None:
     assert result.exit_code == ExitCode.USAGE
     assert "lack designs 4 to 7" in result.stderr
     assert not tables(folder / "all")
+
+
+def test_a_part_under_the_name_of_other_designs(call: Any, folder: Path, shard: Any) -> None:
+    shards = shard(1, 2, 3)
+    first = next((folder / "s1").glob(".parts/*/0000000000-*.part"))
+    first.rename(first.with_name(first.name.replace("0000000000-", "0000000001-")))
+    result = call("merge", *shards, "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "part is damaged, or of another sweep" in result.stderr
+    assert not tables(folder / "all")
+
+
+def test_a_description_without_its_designs(call: Any, folder: Path, shard: Any) -> None:
+    (shard_folder,) = shard(1)
+    (path,) = (folder / shard_folder).glob(".parts/*/sweep.json")
+    said = json.loads(path.read_text())
+    del said["dpg.designs"]
+    said["dpg.fingerprint"] = fingerprint(said)
+    path.write_text(json.dumps(said))
+    path.parent.rename(path.parent.with_name(said["dpg.fingerprint"][:16]))
+    result = call("merge", shard_folder, "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "sweep.json is damaged: run its sweep again" in result.stderr
 
 
 def test_an_overlap(call: Any, folder: Path, shard: Any) -> None:

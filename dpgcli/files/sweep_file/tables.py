@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dpgcli.errors import SpecError
 from dpgcli.files.csv_file import text_of
+from dpgcli.files.frames import with_index
 from dpgcli.files.layout import marks_in, rows_in, separator_of
 from dpgcli.files.places import Location, shown
 from dpgcli.files.table_reader import DAMAGED, undamaged
@@ -52,7 +53,7 @@ def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFra
         raise ValueError(DAMAGED)
     if not has_room(file.metadata.num_rows, file.metadata.num_columns):
         return None
-    return _with_index(_parquet(file))
+    return with_index(_parquet(file))
 
 
 def _parquet(file: Any) -> pd.DataFrame:
@@ -79,10 +80,6 @@ def _with_floats(table: Any) -> Any:
         if pa.types.is_decimal(field.type):
             table = table.set_column(place, field.name, table.column(place).cast(pa.float64()))
     return table
-
-
-def _with_index(frame: pd.DataFrame) -> pd.DataFrame:
-    return frame.reset_index() if _has_names(frame.index) else frame
 
 
 def _has_names(index: "pd.Index[Any]") -> bool:
