@@ -203,6 +203,19 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"
+    yield from _uncertainty(prediction)
+    yield f"the model's own error: {plan.scene.model_error.text}"
+
+
+def _uncertainty(prediction: "Prediction") -> Iterator[str]:
+    """What uncertainties cover, and what the largest one is made of."""
+    worst = prediction.summary.breakdown
+    if worst is None:
+        return
+    yield f"uncertainties cover: {prediction.plan.covers}"
+    largest_first = sorted(worst.shares.items(), key=lambda item: -item[1])
+    causes = ", ".join(f"{share:.2g} by {cause}" for cause, share in largest_first)
+    yield f"the least certain tip, of {worst.pattern}: ± {worst.total:.2g} mm; {causes} alone"
 
 
 def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
