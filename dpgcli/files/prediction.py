@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from dpgcli.arrays import Columns
+from dpgcli.errors import UsageError
 from dpgcli.files.output import run_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
@@ -41,6 +42,17 @@ def write_prediction(
             "command": list(command),
         },
     )
+
+
+def check_facts(table: Path) -> None:
+    """Raise UsageError where those of another table would go: t and t.parquet share one name."""
+    beside = run_file(table)
+    try:
+        other = json.loads(beside.read_bytes())["table"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
+        return
+    if other != table.name and (table.parent / str(other)).is_file():
+        raise UsageError(f"{beside} has the facts of {other}: give another name")
 
 
 def write_states(
