@@ -157,5 +157,5 @@ def test_no_more_samples_than_by_the_command() -> None:
 
 def test_a_check_without_requirements_is_none() -> None:
     for require in ([], ()):
-        with pytest.raises(dpg.UsageError, match="^require: expected one requirement or more"):
+        with pytest.raises(dpg.UsageError, match=r"^require: expected one requirement or more"):
             dpg.check({**DESIGNS, "n_stable": [4]}, require)
