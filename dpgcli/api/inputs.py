@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from decimal import Decimal
 from enum import StrEnum
 from importlib import util
 from numbers import Integral, Real
@@ -153,6 +154,8 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
+    if isinstance(value, Decimal):  # of a database
+        return float(value)
     listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
     if listed is None and not isinstance(value, str | Real | date | NoneType):
         raise UsageError(f"a spec has no {type(value).__name__}: expected numbers and texts")

@@ -12,7 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.beginning import beginning_warnings, check_sign
-from dpgcli.calibration.branches import branch_of, ways, with_hysteresis
+from dpgcli.calibration.branches import branch_of, in_time, ways, with_hysteresis
 from dpgcli.calibration.choices import (
     LINEARITY,
     STIFFNESS,
@@ -157,10 +157,10 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     well = inverted_well(curve)
     factor = _factor(choice.opening, well)
     found = _fitted(factor * curve.travel, observed, factor, choice)
-    if choice.branches in (None, Branches.BOTH) and not rings(ordered):
-        is_asked = choice.branches is Branches.BOTH
-        alone = partial(_alone, replace(choice, resamples=0), factor)
-        found, differing = with_hysteresis(record, found, alone, is_asked=is_asked)
+    if choice.branches not in (Branches.LOADING, Branches.UNLOADING):
+        found, differing = _with_hysteresis(
+            found, curve if choice.is_quasi_static else record, choice, factor
+        )
         warnings += differing
     energies = None
     try:
@@ -177,6 +177,17 @@ def _by_travel(record: Record) -> Record:
     if record.time is not None or ways(record) is None:
         return record
     return record.points(np.argsort(record.travel, kind="stable"))
+
+
+def _with_hysteresis(
+    found: Fit, record: Record, choice: BistableOptions, factor: float
+) -> tuple[Fit, tuple[str, ...]]:
+    """The fit with what its two branches say of its errors; a ringing dome has none."""
+    if rings(in_time(record)):
+        return found, ()
+    alone = partial(_alone, replace(choice, resamples=0), factor)
+    is_asked = choice.branches is not None
+    return with_hysteresis(record, found, alone, is_asked=is_asked, is_cut=choice.is_quasi_static)
 
 
 def _alone(choice: BistableOptions, factor: float, branch: Record) -> Fit:

@@ -98,12 +98,17 @@ def branch_of(record: Record, branch: Branches) -> Record:
 
 
 def with_hysteresis(
-    record: Record, found: Fit, alone: Callable[[Record], Fit], *, is_asked: bool
+    record: Record,
+    found: Fit,
+    alone: Callable[[Record], Fit],
+    *,
+    is_asked: bool,
+    is_cut: bool = False,
 ) -> tuple[Fit, tuple[str, ...]]:
     """A fit to both branches whose errors have half their difference in them, and what to say.
 
     `alone` fits a static curve. `is_asked` is whether somebody wants both, however far apart they
-    are. Raises FitError where they are too far apart.
+    are, `is_cut` whether only slow pieces are left. Raises FitError where they are too far apart.
     """
     record = in_time(record)
     both = ways(record)
@@ -111,7 +116,7 @@ def with_hysteresis(
         return found, ()
     parts = {"loading": both.loading, "unloading": both.unloading}
     if short := [name for name, flags in parts.items() if _share(record, flags) < SMALLEST_SHARE]:
-        return found, (_too_short(record, short[0], parts[short[0]]),)
+        return found, () if is_cut else (_too_short(record, short[0], parts[short[0]]),)
     try:
         fits = [alone(replace(record.points(flags), time=None)) for flags in parts.values()]
     except FitError as error:

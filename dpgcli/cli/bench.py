@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dpgcli.benchmark.bench import Row
 
 GROUPS = {
-    "ladder": "Ways to the states, in a batch as large as a sweep's",
+    "ladder": "Methods, with a batch of states as large as a sweep's",
     "one finger": "The same, for the states of this finger alone",
     "peer": "What one would do instead, state by state",
     "model": "The lattice against the data given",

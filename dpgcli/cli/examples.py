@@ -47,7 +47,7 @@ EXAMPLES = {
     ),
     "fit hinge": ("dpg fit hinge hinge.csv --spec finger.yaml --output hinge.yaml",),
     "fit finger": (
-        "dpg fit finger finger.yaml tips.csv --output lever.yaml",
+        "dpg fit finger finger.yaml tips.csv --output height.yaml",
         "dpg fit finger finger.yaml tips.csv --free hinge_stiffness_N_mm_per_rad",
     ),
     "fit grid": ("dpg fit grid domes.csv --geometry elastic_modulus_MPa=26 --output grid.yaml",),

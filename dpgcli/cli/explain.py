@@ -175,10 +175,10 @@ def _bar_error(plan: "Plan") -> str:
 def _bound(plan: "Plan") -> str:
     if plan.error_bound == float("inf"):
         return "the tip's numerical error is bounded only after the work, in numerical_error_mm"
-    way = (
+    level = (
         f"{plan.accuracy_level.name}, chosen for the target error: " if plan.accuracy_level else ""
     )
-    return f"{way}the tip's error will be below {plan.error_bound:.1e} mm (the model's left aside)"
+    return f"{level}the tip's numerical error will be below {plan.error_bound:.1e} mm"
 
 
 def _count(number: int, what: str) -> str:

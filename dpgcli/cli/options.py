@@ -24,7 +24,7 @@ Patterns = Annotated[
 ColumnNames = Annotated[
     str,
     typer.Option(
-        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see explain"
+        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see dpg help columns"
     ),
 ]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]

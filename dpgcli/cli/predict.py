@@ -80,8 +80,7 @@ def predict(
     )
     prediction = states.predict(given.scene, request)
     _check_figure(plot, prediction.plan.n_states, overlay=overlay)
-    if sketch:
-        _check_sketch(printed_as, prediction.plan.n_states)
+    _check_sketch(printed_as, prediction.plan.n_states if sketch else 0)
     _check_outputs(given.files, output, plot)
     if prediction.plan.expected_seconds > LONG and not quiet:
         say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
@@ -141,10 +140,12 @@ def _check_figure(plot: Path | None, n_states: int, *, overlay: bool) -> None:
 
 
 def _check_sketch(printed_as: Format | None, n_states: int) -> None:
-    """Before any work: sketches that can be shown; raises UsageError."""
+    """Before any work: sketches of so many states can be shown; raises UsageError."""
     from dpgcli.api.predict import check_drawable
     from dpgcli.errors import UsageError
 
+    if not n_states:
+        return
     check_drawable(n_states, "sketch")
     if printed_as in (Format.CSV, Format.JSON):
         raise UsageError(f"--sketch draws under a table: drop it, or --format {printed_as}")

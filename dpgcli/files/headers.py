@@ -39,7 +39,7 @@ def headed(
     place = 0 if is_first else header_in(rows, wanted, sources)
     line, below = rows[place].line, list(rows[place + 1 :])
     titles = list(rows[place].cells)
-    if all(map(is_number, titles)):
+    if _are_numbers(titles, sources):
         below, titles = list(rows[place:]), [str(n) for n in range(1, len(titles) + 1)]
     units = below.pop(0).cells if below and is_of_units(below[0]) else []
     found = dict(_found(titles, columns))
@@ -54,6 +54,12 @@ def headed(
         {name: titles[column] for name, (column, _) in found.items()},
         frozenset(name for name, (_, is_reversed) in found.items() if is_reversed),
     )
+
+
+def _are_numbers(titles: Sequence[str], sources: Sequence[str]) -> bool:
+    """Whether a row is no header: all its cells are numbers, or those of a place that is chosen."""
+    places = (place for source in sources if (place := _place(titles, source)) is not None)
+    return all(map(is_number, titles)) or any(is_number(titles[place]) for place in places)
 
 
 def _found(

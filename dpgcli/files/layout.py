@@ -147,6 +147,7 @@ def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str
 
     Without either it is the row before the numbers, so that a message can say what there is.
     """
+    sources = [source for source in sources if not is_number(source)]  # those are places
     for place, row in enumerate(rows):
         titles = {part for cell in row.cells for part in (cell, name_and_unit(cell)[0])}
         if sources and all(source in titles for source in sources):

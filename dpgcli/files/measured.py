@@ -215,7 +215,8 @@ def _titled(sheet: Sheet, *quantities: str) -> str:
     for quantity in quantities:
         for title, unit in sheet.units.items():
             if title and factor_of(quantity, unit) is not None:
-                name = next(name for name, kind in {**CURVE, **HINGE}.items() if kind == quantity)
+                names = (name for name, kind in {**CURVE, **HINGE}.items() if kind == quantity)
+                name = min(names, key=len)
                 return Message(Field("column"), f" '{name}={title}'?")
     return ""
 

@@ -58,7 +58,7 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
 def _draw_panel(figure: Any, state: DrawnState, window: Window, grid: Grid, place: int) -> None:
     axes = figure.add_axes(grid.box(place))
     scale = window.size[1] / grid.shape_height  # mm per inch
-    set_window(axes, window, window.left + scale * grid.panel_width)
+    set_window(axes, window, window.left + scale * grid.panel_width, 1.0 / scale)
     is_leftmost, is_lowest = grid.is_outer(place)
     axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
     axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)

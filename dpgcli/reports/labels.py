@@ -68,7 +68,7 @@ class Picture:
         """Axes on a figure of the size of the page."""
         page = np.array([*self.page, *self.page])
         axes = figure.add_axes(np.array([LEFT, self.bottom, *self.size]) / page)
-        set_window(axes, self.window, self.window.right)
+        set_window(axes, self.window, self.window.right, self.scale)
         axes.set_xlabel(f"x ({self.window.unit})")
         axes.set_ylabel(f"y ({self.window.unit})")
         return axes

@@ -29,7 +29,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_tables_a_figure_in_text_and_the_cheapest_way(call: Any) -> None:
     result = call(*BENCH, "--target-error", "1um", "--keep", "every-unit")
     assert result.exit_code == ExitCode.DONE
-    for title in ("Ways to the states", "state by state", "Softer and stiffer bars", "put back"):
+    for title in ("Methods, with a batch", "state by state", "Softer and stiffer bars", "put back"):
         assert title in result.stdout
     assert "largest tip error, mm" in result.stdout
     assert result.stdout.splitlines()[-1].startswith("cheapest below 0.001 mm: ")

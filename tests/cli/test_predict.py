@@ -337,6 +337,10 @@ def test_a_figure_names_its_states(call: Call, folder: Path) -> None:
         (("three_unit.yaml", "--plot", "states.pdf"), [".svg", ".png"]),
         (("three_unit.yaml", "--plot", "states"), [".svg", ".png"]),
         (("twenty_unit.yaml", "--plot", "states.svg"), ["64", "--pattern"]),
+        (("twenty_unit.yaml", "--sketch"), ["--sketch draws at most 64", "--pattern"]),
+        (("three_unit.yaml", "--overlay"), ["--overlay", "--plot"]),
+        (("three_unit.yaml", "--sketch", "--format", "csv"), ["--sketch", "--format csv"]),
+        (("three_unit.yaml", "--sketch", "--format", "json"), ["--sketch", "--format json"]),
     ],
 )
 def test_a_figure_that_cannot_be_drawn_is_refused_at_once(
@@ -346,6 +350,22 @@ def test_a_figure_that_cannot_be_drawn_is_refused_at_once(
     assert (result.exit_code, result.stdout) == (2, "")
     assert [word for word in words if word not in result.stderr] == []
     assert not list(folder.glob("states*"))
+
+
+def test_sketches_stand_under_the_table(call: Call) -> None:
+    result = call("predict", "-q", "three_unit.yaml", "--pattern", "1*1", "--sketch")
+    table, sketches = result.stdout.split("\n\n", 1)
+    assert [line.split()[0] for line in table.splitlines()] == ["pattern", "101", "111"]
+    assert sketches.splitlines()[0].split() == ["101", "111"]
+    assert "\u28ff" in sketches
+
+
+def test_sketches_need_letters_of_braille(run: Any) -> None:
+    result = run("predict", "three_unit.yaml", "--sketch", env={"PYTHONIOENCODING": "ascii"})
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "braille" in result.stderr and "UTF-8" in result.stderr
+    without = run("predict", "three_unit.yaml", env={"PYTHONIOENCODING": "ascii"})
+    assert without.returncode == 0
 
 
 def test_without_matplotlib_it_says_what_to_install(

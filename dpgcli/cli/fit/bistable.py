@@ -59,7 +59,8 @@ Area = Annotated[
 BranchNames = Annotated[
     Branches | None,
     typer.Option(
-        "--branches", help="Ways of the travel, or slow pieces  [default: both, if they are alike]"
+        "--branches",
+        help="Directions of travel, or slow pieces  [default: both, if they are alike]",
     ),
 ]
 Fix = Annotated[

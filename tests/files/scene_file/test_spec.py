@@ -600,3 +600,16 @@ def test_any_setting_is_applied_or_refused(text, key):
     except SpecError as error:
         assert error.problems
         str(error).encode()
+
+
+@pytest.mark.parametrize("pair", ["[5.375]", "5.375", "[5, x]", "[1, 2, 3]", "[.inf, 0]", "up"])
+def test_a_place_in_some_data_is_two_numbers(problems, pair):
+    text = FINGER + f"data:\n  first_station_mm: {pair}\n"
+    (problem,) = problems(text)
+    assert problem.key == "data.first_station_mm"
+    assert problem.expected == "two numbers in mm, such as [5.375, -0.75]"
+
+
+def test_a_key_of_the_data_that_is_not_known(problems):
+    (problem,) = problems(FINGER + "data: {first_station: [1, 2]}\n")
+    assert problem.hint == "did you mean first_station_mm?"
