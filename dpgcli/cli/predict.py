@@ -161,26 +161,13 @@ def _check_sketch(printed_as: Format | None, n_states: int) -> None:
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.files.output import Mark, check_outputs, run_file
+    from dpgcli.files.prediction import check_facts
 
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
-    if output is not None and beside is not None:
-        _check_whose(beside, output)
-
-
-def _check_whose(beside: Path, output: Path) -> None:
-    """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
-    import json
-
-    from dpgcli.errors import UsageError
-
-    try:
-        table = json.loads(beside.read_bytes())["table"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
-        return
-    if table != output.name and (output.parent / str(table)).is_file():
-        raise UsageError(f"{beside} has the facts of {table}: give another name")
+    if output is not None:
+        check_facts(output)
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
