@@ -40,16 +40,30 @@ if TYPE_CHECKING:
 BRAILLE = "\u28ff"
 
 
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
+]
+PrintedAs = Annotated[
+    Format | None,
+    typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
+]
+Overlay = Annotated[
+    bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
+]
+Sketch = Annotated[
+    bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
+]
+
+
 def predict(
     spec: SpecPath,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
-    ] = None,
-    printed_as: Annotated[
-        Format | None,
-        typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
-    ] = None,
+    output: Output = None,
+    printed_as: PrintedAs = None,
     patterns: Patterns = None,
     settings: Settings = None,
     columns: ColumnNames = "default",
@@ -58,16 +72,9 @@ def predict(
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
-    ] = None,
-    overlay: Annotated[
-        bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
-    ] = False,
-    sketch: Annotated[
-        bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
-    ] = False,
+    plot: Plot = None,
+    overlay: Overlay = False,
+    sketch: Sketch = False,
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
