@@ -20,6 +20,7 @@ from dpgcli.cli.options import (
     Quiet,
     Settings,
     SpecPath,
+    TableFile,
     TargetError,
     Tolerance,
     WithUncertainty,
@@ -39,13 +40,15 @@ if TYPE_CHECKING:
 
 BRAILLE = "\u28ff"
 
+Plot = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
+]
+
 
 def predict(
     spec: SpecPath,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
-    ] = None,
+    output: TableFile = None,
     printed_as: Annotated[
         Format | None,
         typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
@@ -58,10 +61,7 @@ def predict(
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
-    ] = None,
+    plot: Plot = None,
     overlay: Annotated[
         bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
     ] = False,
