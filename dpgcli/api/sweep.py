@@ -27,9 +27,10 @@ from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
-from dpgcli.files.table_reader import read_run, read_undamaged
+from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.yaml_file import Document, without_free_keys
 from dpgcli.mechanics.finger import Finger
+from dpgcli.reports.summary import DesignSpace
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
@@ -56,14 +57,15 @@ WAIT = 300.0  # s
 class SweepResult:
     """The tables of a sweep, read when asked for; of a shard there are none before `merge`.
 
-    `n_failed` designs killed their worker, twice. `report` is the page on the space,
-    `fingerprint` that of all the tables depend on.
+    `n_failed` designs killed their worker, twice. `report` is the page on the space, `space` what
+    it was made of; `fingerprint` is that of all the tables depend on.
     """
 
     folder: Path
     fingerprint: str
     n_failed: int
     report: str = ""
+    space: DesignSpace | None = None
 
     @cached_property
     def designs(self) -> Table:
@@ -162,9 +164,12 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
 def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
     if part is not None:
         return SweepResult(study.folder, study.metadata[FINGERPRINT], study.n_failed)
-    designs, text = summarize(study.folder, is_new=is_new)
-    n_failed = int((designs["status"] == "failed").sum())
-    return SweepResult(study.folder, study.metadata[FINGERPRINT], n_failed, text)
+    return _summarized(study.folder, study.metadata[FINGERPRINT], is_new=is_new)
+
+
+def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
+    space, text = summarize(folder, is_new=is_new)
+    return SweepResult(folder, fingerprint, len(space.of_status("failed")), text, space)
 
 
 def study_of(
@@ -299,22 +304,20 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
     if not folders:
         raise UsageError("shards: expected one folder or more")
     paths = [path_of("shards", folder) for folder in folders]
-    return merged(paths, path_of("output", output), silent)
+    return merged(paths, path_of("output", output))
 
 
-def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:
-    """The same; `say` hears of what the report leaves out."""
+def merged(shards: Sequence[Path], folder: Path) -> SweepResult:
+    """The same, of paths."""
     found = [_store(shard) for shard in shards]
     with sole_use(folder):
         drop_half_written(folder)
         check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
-        read_run(folder / RUN)  # what no report can be made beside is refused before the work
-        made = assemble(found, folder)
-        designs, text = summarize(folder, is_new=True, say=say)
+        result = _summarized(folder, assemble(found, folder), is_new=True)
         for store in found:
             if store.folder.parent.parent.samefile(folder):
                 store.drop()
-    return SweepResult(folder, made, int((designs["status"] == "failed").sum()), text)
+    return result
 
 
 def _store(folder: Path) -> PartStore:
