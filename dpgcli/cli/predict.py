@@ -38,6 +38,12 @@ if TYPE_CHECKING:
     from dpgcli.states.predict import Prediction, Summary
 
 BRAILLE = "\u28ff"
+WithOverlay = Annotated[
+    bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
+]
+WithSketch = Annotated[
+    bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
+]
 
 
 def predict(
@@ -62,12 +68,8 @@ def predict(
         Path | None,
         typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
     ] = None,
-    overlay: Annotated[
-        bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
-    ] = False,
-    sketch: Annotated[
-        bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
-    ] = False,
+    overlay: WithOverlay = False,
+    sketch: WithSketch = False,
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
