@@ -18,6 +18,7 @@ from dpgcli.api.inputs import (
     as_texts,
     check_resampling,
     chosen,
+    files_of,
     frame_of,
     scene_input,
 )
@@ -26,7 +27,7 @@ from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted
+from dpgcli.files.calibration.results import finger_method, fitted, judged, quality_of
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
@@ -83,6 +84,7 @@ def fit_finger(
         found,
         {
             **fitted(found, FINGER_UNITS[met], source, only_free=True),
+            "quality": judged(study, quality_of(found, FINGER_UNITS[met])),
             "method": finger_method(study, found, bootstrap, seed),
             "geometry": where,
         },
@@ -90,4 +92,5 @@ def fit_finger(
         partial(finger_summary, study, found),
         (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),
         partial(draw_fitted, study, found, name),
+        files=(*given.files, *files_of(states)),
     )
