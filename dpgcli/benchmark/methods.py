@@ -48,25 +48,25 @@ def package_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod
     """The package's methods for these patterns, (unit, state), of one finger."""
     n_states = inverted.shape[1]
 
-    def way(
+    def method(
         name: str, run: Callable[[], BenchmarkResult], *, certifies: bool = True
     ) -> BenchmarkMethod:
         return BenchmarkMethod(name, "ladder", run, n_states, certifies)
 
     rigid = finger.with_bars(np.inf)
-    yield way("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
+    yield method("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
     if not finger.is_rigid:
         name = "units looked up, poses composed"
-        yield way(name, lambda: _looked_up(finger, inverted), certifies=False)
+        yield method(name, lambda: _looked_up(finger, inverted), certifies=False)
     for level in ACCURACY_LEVELS:
         if level.drops_bars and finger.is_rigid:
             continue
         used, name = (rigid, "chain, rigid bars") if level.drops_bars else (finger, "chain")
         tolerance = level.tolerance
-        yield way(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
+        yield method(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
     if not finger.is_rigid:
         lattice = _solver(finger, inverted, lattice_potential, DEFAULT_TOLERANCE)
-        yield way(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
+        yield method(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
 
 
 def third_party_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod]:

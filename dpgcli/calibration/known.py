@@ -23,7 +23,8 @@ class KnownStates:
     the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
     their domes (N), `seconds` (state,) that each state took. `shapes` are the limiting layer's
     points from base to tip, (2, point) in mm, by state. `unused` names what else the data have,
-    `sha256` is that of their file.
+    `sha256` is that of their file; `first_station` and `tip_offset` (mm) are a `Frame`'s, None
+    where the data do not say them.
     """
 
     patterns: Flags
@@ -35,6 +36,8 @@ class KnownStates:
     shapes: tuple[Array, ...] = ()
     unused: tuple[str, ...] = ()
     sha256: str = ""
+    first_station: tuple[float, float] | None = None
+    tip_offset: tuple[float, float] | None = None
 
     def chosen(self, states: Indices) -> "KnownStates":
         """Some of the states."""
@@ -114,8 +117,9 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     settled = settle(units, chain_potential, patterns, DEFAULT_TOLERANCE)
     is_state = settled.status == Status.STABLE
     chain, values = settled.potential.coordinates, settled.equilibrium.coordinates
-    _, near, far, _ = internal(values, finger.is_rigid)
-    angles = np.where(is_state, -np.cumsum(near + far, axis=0), np.nan)
+    shape = internal(chain.without_walls(values), finger.is_rigid)
+    turned = -np.cumsum(shape.near_angle + shape.far_angle, axis=0)
+    angles = np.where(is_state, turned, np.nan)
     stations = chain.stations(values)
     x, y = (np.where(is_state, nodes, np.nan) for nodes in (stations.base_x, stations.base_y))
     pose = np.stack((x[-1], y[-1], angles[-1]))
@@ -124,7 +128,7 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     line = Frame(frame.first_station, (0.0, frame.tip[1])).tips(poses)
     tip = frame.tips(pose)
     openings = chain.openings(values)
-    pushes = -settled.finger.springs(openings).force
+    pushes = -settled.finger.springs(chain.springs(values).extension).force
     return LatticeStates(
         settled=settled,
         pose=pose,

@@ -1,4 +1,4 @@
-"""`dpg check`: hold a table of designs against requirements."""
+"""`dpg check`: test a table of designs against requirements."""
 
 import os
 from collections.abc import Sequence
@@ -30,7 +30,8 @@ def check(
         ProblemFormat, typer.Option("--format", help="How to list designs that fail")
     ] = ProblemFormat.TEXT,
     summary_file: Annotated[
-        Path | None, typer.Option("--summary-file", help="Append Markdown to this file")
+        Path | None,
+        typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
     ] = None,
 ) -> None:
     """Check that every design of a table meets requirements."""

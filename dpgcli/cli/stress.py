@@ -1,4 +1,4 @@
-"""`dpg stress`: stiff and extreme cases, held against extended precision."""
+"""`dpg stress`: stiff and extreme cases beside extended precision."""
 
 import math
 import sys
@@ -45,11 +45,14 @@ def stress(
         Format, typer.Option("--format", help="A summary, or every case as json or csv")
     ] = Format.TABLE,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write every case to this Parquet file")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write every case to this Parquet file"
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold stiff and extreme cases against extended precision."""
+    """Compare stiff and extreme cases with extended precision."""
     from dpgcli.api.stress import hard_cases
     from dpgcli.files.output import Mark, check_outputs
 

@@ -2,8 +2,8 @@
 
 A part is an Arrow file of a range of designs, with a row for each block of work: the list of its
 states and the list of its designs. Parquet would be a little smaller, and takes three times as
-long. Its name is its range and a SHA-256 of its bytes and of its sweep, by the name of the folder:
-a part that does not match its name, damaged or of another sweep, does not count.
+long. Its name is its range and a SHA-256 of its bytes, of that range and of its sweep, by the name
+of the folder: a part that does not match its name, damaged or of another sweep, does not count.
 """
 
 import hashlib
@@ -30,15 +30,17 @@ from dpgcli.states.columns import Column
 from dpgcli.temporary import temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
+COUNT = re.compile(r"[1-9][0-9]{0,9}")  # as many digits as a name has room for
 LISTS = ("states", "designs")
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
-FINGERPRINT = "dpg.fingerprint"
+FINGERPRINT, N_DESIGNS = "dpg.fingerprint", "dpg.designs"
+BASE = "dpg.base"  # a name only: nothing depends on it
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
-    """The SHA-256 of a sweep's metadata."""
-    rest = {key: text for key, text in said.items() if key != FINGERPRINT}
+    """The SHA-256 of a sweep's metadata, but for the name of its base."""
+    rest = {key: text for key, text in said.items() if key not in (FINGERPRINT, BASE)}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
@@ -98,7 +100,7 @@ class Part(NamedTuple):
     @property
     def is_damaged(self) -> bool:
         """Whether its bytes and its sweep do not match its name."""
-        return not self.path.is_file() or _digest(self.path, self.path.parent) not in self.path.name
+        return not self.path.is_file() or _name(self.path, self.start, self.stop) != self.path.name
 
 
 @dataclass(frozen=True)
@@ -110,13 +112,12 @@ class PartStore:
     @contextmanager
     def part(self, start: int, stop: int) -> Iterator[IO[bytes]]:
         """A file to write the bytes of a part to; stored whole or not at all."""
-        place = self.folder / f"{start:010d}-{stop:010d}"
+        place = self.folder / _range(start, stop)
         try:
             with temporary_file(place) as (scratch, _):
                 with scratch.open("wb") as file:
                     yield file
-                name = f"{place.name}-{_digest(scratch, self.folder)}.part"
-                with whole_file(self.folder / name, Mark.ANY) as temporary:
+                with whole_file(self.folder / _name(scratch, start, stop), Mark.ANY) as temporary:
                     scratch.replace(temporary)
         except OSError as error:
             raise OutputError(f"cannot write {place}: {error.strerror or error}") from error
@@ -156,9 +157,7 @@ class PartStore:
             raise UsageError(f"cannot read {path}: {error.strerror}") from error
         except (ValueError, RecursionError):
             return {}
-        if not isinstance(said, dict) or said.get(FINGERPRINT) != fingerprint(said):
-            return {}
-        return said
+        return said if _is_sweep(said) and said[FINGERPRINT] == fingerprint(said) else {}
 
     def drop(self) -> None:
         """Remove what belongs to the sweep, and the folder if that was all."""
@@ -203,14 +202,24 @@ class PartStore:
         return gaps
 
 
+def _is_sweep(said: Any) -> bool:
+    """Whether this is the metadata of a sweep: texts, the number of its designs among them."""
+    is_text = isinstance(said, dict) and all(isinstance(text, str) for text in said.values())
+    return is_text and FINGERPRINT in said and COUNT.fullmatch(said.get(N_DESIGNS, "")) is not None
+
+
 def _is_description(path: Path) -> bool:
     """Whether a file is the description of a sweep, damaged or not."""
     return path.is_file() and not path.is_symlink() and is_own(path, Mark.PARTS)
 
 
-def _digest(path: Path, sweep: Path) -> str:
-    """The SHA-256 of a part's bytes together with its sweep's name."""
-    digest = hashlib.sha256(sweep.name.encode())
+def _name(path: Path, start: int, stop: int) -> str:
+    """The name of a part with these bytes, of these designs, in the folder that it is in."""
+    digest = hashlib.sha256(f"{path.parent.name} {start} {stop} ".encode())
     with path.open("rb") as file:
         hashlib.file_digest(file, lambda: digest)
-    return digest.hexdigest()[:16]
+    return f"{_range(start, stop)}-{digest.hexdigest()[:16]}.part"
+
+
+def _range(start: int, stop: int) -> str:
+    return f"{start:010d}-{stop:010d}"

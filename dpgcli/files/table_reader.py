@@ -56,7 +56,7 @@ def _all(described: Any) -> list[str]:
 
 
 def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any:
-    """A Parquet file as a pyarrow Table, its bytes held against its seal if `dpg` wrote it.
+    """A Parquet file as a pyarrow Table, its bytes checked by its seal if `dpg` wrote it.
 
     Only the columns that are `chosen` from its schema are read, their `TEXTS` as dictionaries: a
     text that repeats is there once. Raises UsageError for what is damaged, no Parquet file, or
@@ -230,11 +230,6 @@ def _unboxed(column: Any) -> NDArray[Any]:
 READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
 
 
-def read_run(path: Path) -> dict[str, Any] | None:
-    """The facts of a run; None if there is no such file. Raises UsageError for other content."""
-    return _facts(path) if path.is_file() or path.is_dir() else None
-
-
 def _facts(path: Path) -> dict[str, Any]:
     try:
         with opened(path) as stream:
@@ -272,4 +267,4 @@ def _is_measured(row: Any) -> bool:
     if not isinstance(row, dict):
         return False
     time = row.get("relative_time")
-    return isinstance(row.get("way"), str) and isinstance(time, int | float | None)
+    return isinstance(row.get("method"), str) and isinstance(time, int | float | None)

@@ -37,6 +37,16 @@ class Chain:
         return Opening.of(self.finger)
 
     @property
+    def dome(self) -> Opening:
+        """The opening: walls are rigid."""
+        return self.opening
+
+    @property
+    def walls(self) -> tuple[()]:
+        """None: walls are rigid."""
+        return ()
+
+    @property
     def corners(self) -> tuple[OwnCoordinate, OwnCoordinate]:
         """The corner angles a and b, rad."""
         return own(self.finger, "a"), own(self.finger, "b")
@@ -98,7 +108,7 @@ class Chain:
     def of_shape(self, shape: Internal) -> Array:
         """The coordinates (e_1, a_1, b_1, s_1, …) of a shape, (size, batch)."""
         finger = self.finger
-        rows = shape[1:3] if finger.is_rigid else shape
+        rows = shape[1:3] if finger.is_rigid else shape[:4]
         batch = np.broadcast_shapes(*(row.shape for row in rows))[1]
         coordinates = np.empty((finger.n_units, len(rows), batch))
         for place, row in enumerate(rows):
@@ -116,6 +126,10 @@ class Chain:
     def _pose(self, coordinates: Array) -> Pose:
         return pose_of(self._shape(coordinates), self.finger.segment_length)
 
+    def without_walls(self, values: Array) -> Array:
+        """All rows: walls are rigid."""
+        return values
+
     def openings(self, coordinates: Array) -> Array:
         """Extension x of every bistable spring, mm, (unit, batch)."""
         return self._cells(coordinates).extension
@@ -131,8 +145,8 @@ class Chain:
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
         """∂E/∂a and ∂E/∂b: corners are coordinates themselves."""
-        _, near, far, _ = internal(gradient, self.finger.is_rigid)
-        return np.stack((near, far))
+        moments = internal(gradient, self.finger.is_rigid)
+        return np.stack((moments.near_angle, moments.far_angle))
 
     def stations(self, coordinates: Array) -> Stations:
         """T_i = B_i + (H + s_i) (−sin τ_i, cos τ_i), mm, with τ_i the angle of strut i."""
@@ -157,7 +171,7 @@ class Chain:
         pose = self._pose(coordinates)
         tip = np.stack((pose.x[-1], pose.y[-1], pose.strut_angle[-1]))
         jacobian = np.zeros((self.size, 3, coordinates.shape[1]))
-        chord, near, far, _ = internal(jacobian, self.finger.is_rigid)
+        chord, near, far, *_ = internal(jacobian, self.finger.is_rigid)
         for angle in (near, far):  # an opening corner turns all that lies beyond it by −1
             angle[:, 2] = -1.0
         np.subtract(pose.y[-1], pose.y, out=far[:, 0])
@@ -176,7 +190,7 @@ class Chain:
         x0 = np.concatenate((np.zeros((1, batch)), pose.x))
         y0 = np.concatenate((np.zeros((1, batch)), pose.y))
         jacobian = np.zeros((self.size, n, 4, batch))
-        chord, near, far, strut = internal(jacobian, finger.is_rigid)
+        chord, near, far, strut, _ = internal(jacobian, finger.is_rigid)
         for j in range(n):
             for k, angle in ((j, near), (j + 1, far)):  # turning about station k
                 angle[j, j:, 0], angle[j, j:, 1] = (

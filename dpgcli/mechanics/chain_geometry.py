@@ -56,7 +56,7 @@ def cells(shape: Internal, length: Array, height: Array, is_rigid: bool) -> Cell
     >>> round(float(cell.extension[0, 0]), 9)  # 2 H sin 30°
     10.0
     """
-    chord, near, far, strut = shape
+    chord, near, far, strut, _ = shape
     far_strut = height + strut
     near_strut = far_strut
     if not is_rigid:
@@ -107,7 +107,7 @@ def pose_of(shape: Internal, length: Array) -> Pose:
     >>> round(float(pose.x[0, 0]), 9), round(float(pose.y[0, 0]), 9)  # straight down
     (0.0, -13.5)
     """
-    chord, near, far, _ = shape
+    chord, near, far, *_ = shape
     turned = np.cumsum(near + far, axis=0)
     direction = far - turned
     cos, sin = np.cos(direction), np.sin(direction)

@@ -14,17 +14,18 @@ class Internal(NamedTuple):
     """A shape by its bars and corners, each (unit, batch) or broadcasting to it.
 
     Extensions of the chord and of the far strut in mm; corner angles at the near and the
-    far station in rad, positive where the dome side opens.
+    far station in rad, positive where the dome side opens; how far walls have given way, mm.
     """
 
     chord: Array
     near_angle: Array
     far_angle: Array
     strut: Array
+    wall: Array = np.zeros((1, 1))  # never written to
 
 
 class Springs(NamedTuple):
-    """Extension x of every bistable spring (mm), (unit, batch); impossible shapes, (batch,).
+    """Extension of every dome's spring (mm), (unit, batch); impossible shapes, (batch,).
 
     `is_folded` is true if any cell is `impossible`. `lever` is the extension by the opening of the
     near and of the far corner, mm/rad, (2, unit, batch): H in the straight finger, zero if a strut
@@ -91,7 +92,15 @@ class FingerCoordinates(Coordinates, Protocol):
 
     @property
     def opening(self) -> Measure:
-        """Extension x of every bistable spring, mm."""
+        """Opening x of every unit at its dome's axis, mm."""
+
+    @property
+    def dome(self) -> Measure:
+        """Extension of every dome's own spring, mm: the opening, and what its wall yields."""
+
+    @property
+    def walls(self) -> tuple[Measure, ...]:
+        """The coordinates of walls that give way, mm; none of rigid ones."""
 
     @property
     def corners(self) -> tuple[Measure, Measure]:
@@ -106,6 +115,9 @@ class FingerCoordinates(Coordinates, Protocol):
 
     def of_shape(self, shape: Internal) -> Array:
         """The coordinates of a shape, (size, batch)."""
+
+    def without_walls(self, values: Array) -> Array:
+        """Rows of an array (size, …) over the coordinates that are not walls'."""
 
     def openings(self, coordinates: Array) -> Array:
         """Extension x of every bistable spring, mm, (unit, batch)."""

@@ -18,6 +18,7 @@ ARRAYS = (
     "hinge_stiffness",
     "linear_stiffness",
     "dome_travel",
+    "wall_compliance",
 )
 
 KEYS = {  # names with units, as files say them
@@ -28,6 +29,7 @@ KEYS = {  # names with units, as files say them
     "force_linearity": "force_linearity",
     "hinge_stiffness_N_mm_per_rad": "hinge_stiffness",
     "linear_stiffness_N_per_mm": "linear_stiffness",
+    "wall_compliance_mm_per_N": "wall_compliance",
 }
 
 
@@ -43,6 +45,7 @@ class Finger:
     - `bistable_stiffness` k_b: N/mm; `force_linearity` α: 1
     - `hinge_stiffness` k_θ: N mm/rad, of one hinge (two corners in series)
     - `linear_stiffness` k_L: N/mm of every bar, infinite where bars are rigid
+    - `wall_compliance` c_w: mm/N, of the walls that a dome pushes against; 0 where they are rigid
     - `dome_travel` D: mm, of the pole of the inverted dome at rest, where the law is of its own
       travel; 0 where the opening stands for it
 
@@ -60,6 +63,7 @@ class Finger:
     hinge_stiffness: Array
     linear_stiffness: Array
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    wall_compliance: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
     law: DomeLaw = PUBLISHED
 
@@ -86,6 +90,16 @@ class Finger:
     def is_rigid(self) -> bool:
         """Whether all bars are rigid, k_L infinite."""
         return bool(np.isinf(self.linear_stiffness).all())
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether any unit's walls give way."""
+        return bool(self.wall_compliance.any())
+
+    @property
+    def wall_ratio(self) -> Array:
+        """How far a wall gives way per its coordinate, √(c_w k_b), (unit, design); see `walls`."""
+        return np.asarray(np.sqrt(self.wall_compliance * self.bistable_stiffness))
 
     @property
     def is_uniform(self) -> bool:

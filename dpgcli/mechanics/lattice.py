@@ -61,6 +61,16 @@ class Lattice:
         """Extension x of every bistable spring, between T_{i-1} and T_i with rest length L."""
         return self._extension("top", 0, self.finger.segment_length)
 
+    @property
+    def dome(self) -> Extension:
+        """The opening: walls are rigid."""
+        return self.opening
+
+    @property
+    def walls(self) -> tuple[()]:
+        """None: walls are rigid."""
+        return ()
+
     @cached_property
     def corners(self) -> tuple[Corner, Corner]:
         """The corner angles, rad."""
@@ -153,6 +163,10 @@ class Lattice:
         stations = chain.stations(chain.of_shape(shape))
         nodes = np.stack(np.broadcast_arrays(*stations), axis=1)
         return nodes.reshape(-1, nodes.shape[2])
+
+    def without_walls(self, values: Array) -> Array:
+        """All rows: walls are rigid."""
+        return values
 
     def openings(self, coordinates: Array) -> Array:
         """Extension x = |t| − L of every bistable spring, mm, (unit, batch)."""

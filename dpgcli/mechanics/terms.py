@@ -12,6 +12,7 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.walls import Walled
 
 Formulate = Callable[[Finger], FingerPotential]
 
@@ -48,10 +49,10 @@ class Quadratic:
 
 
 def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
-    """The terms of a finger's springs: domes; two corners per hinge, each of 2 k_θ; bars.
+    """The terms of a finger's springs: domes; walls; two corners per hinge, each of 2 k_θ; bars.
 
-    Hinges without stiffness, and rigid bars, are no terms. Two springs of 2 k_θ in series are
-    the hinge's k_θ.
+    Rigid walls, hinges without stiffness, and rigid bars are no terms. Two springs of 2 k_θ in
+    series are the hinge's k_θ.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> [term.kind for term in spring_terms(Chain(uniform_finger(1, **STUDY)))]  # rigid bars
@@ -60,14 +61,16 @@ def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     finger = coordinates.finger
     corner, bar = Quadratic(2.0 * finger.hinge_stiffness), Quadratic(finger.linear_stiffness)
     hinges = coordinates.corners if finger.hinge_stiffness.any() else ()
+    domes, wall = DomeSprings(finger.law, finger.domes), Quadratic(finger.bistable_stiffness)
     return (
-        Term("bistable", coordinates.opening, DomeSprings(finger.law, finger.domes)),
+        Term("bistable", coordinates.dome, domes),
+        *(Term("wall", yielding, wall) for yielding in coordinates.walls),
         *(Term("hinge", angle, corner) for angle in hinges),
         *(Term("bar", extension, bar) for extension in coordinates.bars),
     )
 
 
-def chain_potential(finger: Finger) -> Potential[Chain]:
+def chain_potential(finger: Finger) -> FingerPotential:
     """The energy of an unloaded finger in internal coordinates, the default.
 
     >>> import numpy as np
@@ -76,16 +79,20 @@ def chain_potential(finger: Finger) -> Potential[Chain]:
     >>> potential.kinds, potential.coordinates.size
     (('bistable', 'hinge', 'bar'), 4)
     """
-    chain = Chain(finger)
-    return Potential(chain, spring_terms(chain))
+    return _potential(Chain(finger))
 
 
-def lattice_potential(finger: Finger) -> Potential[Lattice]:
+def lattice_potential(finger: Finger) -> FingerPotential:
     """The energy of an unloaded finger in node coordinates; raises ValueError for rigid bars.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> lattice_potential(uniform_finger(2, **STUDY, linear_stiffness=1e4)).coordinates.size
     8
     """
-    lattice = Lattice(finger)
-    return Potential(lattice, spring_terms(lattice))
+    return _potential(Lattice(finger))
+
+
+def _potential(frame: FingerCoordinates) -> FingerPotential:
+    """The energy in these coordinates, and in those of walls that give way, if there are any."""
+    coordinates = Walled(frame) if frame.finger.has_walls else frame
+    return Potential(coordinates, spring_terms(coordinates))

@@ -116,15 +116,26 @@ def bistable(unit: Unit, x: "mpf") -> Response:
 class Expansion:
     """An energy with its gradient and Hessian, summed up element by element.
 
-    `band[i][k]` is the Hessian's entry (i, i−k).
+    `band[i][k]` is the Hessian's entry (i, i−k). Where walls give way, each unit has a row more,
+    before its own `width`; in rates the walls are rows −1, −2, ….
     """
 
-    def __init__(self, size: int, bandwidth: int) -> None:
+    def __init__(self, size: int, bandwidth: int, width: int = 0) -> None:
         from mpmath import mpf
 
+        self.width = width
         self.energy = mpf(0)
         self.gradient = [mpf(0)] * size
         self.band = [[mpf(0)] * (min(row, bandwidth) + 1) for row in range(size)]
+
+    def row(self, row: int) -> int:
+        """Where a row of a rate stands."""
+        if not self.width:
+            return row
+        if row < 0:
+            return (self.width + 1) * (-1 - row)
+        unit, rest = divmod(row, self.width)
+        return (self.width + 1) * unit + 1 + rest
 
     def add(self, response: Response, rate: Rate) -> None:
         """Add E, F r and K r rᵀ of a spring whose coordinate has the gradient r, `rate`.
@@ -133,19 +144,21 @@ class Expansion:
         """
         self.energy += response.energy
         for row, slope in rate.items():
-            self.gradient[row] += response.force * slope
+            self.gradient[self.row(row)] += response.force * slope
         self.add_square(response.stiffness, rate)
 
     def add_square(self, factor: "mpf", rate: Rate) -> None:
         """Add factor · r rᵀ to the Hessian."""
-        for row, slope in rate.items():
+        placed = {self.row(row): slope for row, slope in rate.items()}
+        for row, slope in placed.items():
             scaled = factor * slope
-            for column, other in rate.items():
+            for column, other in placed.items():
                 if column <= row:
                     self.band[row][row - column] += scaled * other
 
     def add_bend(self, factor: "mpf", first: Rate, second: Rate) -> None:
         """Add factor · (r sᵀ + s rᵀ) to the Hessian."""
+        first, second = ({self.row(row): v for row, v in rate.items()} for rate in (first, second))
         for row in first:
             r, s = factor * first[row], factor * second[row]
             for column in first:
@@ -186,12 +199,17 @@ class ElasticBars:
     def nodes(self, unknowns: list["mpf"]) -> list["mpf"]:
         return unknowns
 
-    def at(self, unknowns: list["mpf"]) -> Expansion:
-        """The energy at nodes, expanded along the curved update `moved`."""
-        expansion = Expansion(len(unknowns), bandwidth=7)
+    def walls(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """None gives way."""
+        return [0] * len(self.units)
+
+    def at(self, unknowns: list["mpf"], walls: Sequence["mpf"] = ()) -> Expansion:
+        """The energy at nodes, expanded along the curved update `moved`; domes behind `walls`."""
+        size = len(unknowns) + len(walls)
+        expansion = Expansion(size, *((8, 4) if walls else (7, 0)))
         shape = list(cells(self.base, unknowns))
         for i, (unit, cell) in enumerate(zip(self.units, shape, strict=True)):
-            _add_springs(expansion, i, unit, cell)
+            _add_springs(expansion, i, unit, cell, walls[i] if walls else 0)
             _add_corners(expansion, i, unit, cell)
         _add_swings(expansion, shape)
         return expansion
@@ -223,18 +241,20 @@ class ElasticBars:
         return np.eye(len(unknowns))
 
 
-def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
+def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell, wall: "mpf") -> None:
     """Bars and dome, each with the Hessian K n nᵀ + (F/ℓ) m mᵀ by its vector ℓ n."""
+    behind: Rate = {-1 - i: 1} if unit.wall else {}  # the dome extends as its wall gives way
+    still: Rate = {}
     laws = (
-        (ENDS.chord, cell.chord, unit.length, partial(linear, unit.bar)),
-        (ENDS.far, cell.far, unit.height, partial(linear, unit.bar)),
-        (ENDS.top, cell.top, unit.length, partial(bistable, unit)),
+        (ENDS.chord, cell.chord, unit.length, partial(linear, unit.bar), still),
+        (ENDS.far, cell.far, unit.height, partial(linear, unit.bar), still),
+        (ENDS.top, cell.top, unit.length - wall, partial(bistable, unit), behind),
     )
-    for ends, vector, rest, law in laws:
+    for ends, vector, rest, law, more in laws:
         length, direction = measured(vector)
         spring = law(length - rest)
         across = _spread(i, (ends, _left(direction)))
-        expansion.add(spring, _spread(i, (ends, direction)))
+        expansion.add(spring, {**_spread(i, (ends, direction)), **more})
         expansion.add_square(spring.force / length, across)
 
 
@@ -260,7 +280,7 @@ def _add_swings(expansion: Expansion, shape: list[Cell]) -> None:
     """
     pull: Vector = (0, 0)
     for i in reversed(range(len(shape))):
-        x, y, *top = expansion.gradient[4 * i : 4 * i + 4]
+        x, y, *top = (expansion.gradient[expansion.row(4 * i + k)] for k in range(4))
         tip = (top[0], top[1])
         pull = (pull[0] + x + tip[0], pull[1] + y + tip[1])
         bars = ((ENDS.chord, shape[i].chord, pull), (ENDS.far, shape[i].far, tip))
@@ -302,21 +322,28 @@ class RigidBars:
             nodes += [x, y, x - unit.height * sin(turned), y + unit.height * cos(turned)]
         return nodes
 
-    def at(self, unknowns: list["mpf"]) -> Expansion:
+    def walls(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """None gives way."""
+        return [0] * len(self.units)
+
+    def at(self, unknowns: list["mpf"], walls: Sequence["mpf"] = ()) -> Expansion:
         """With t = (L + H(sin a + sin b), H(cos b − cos a)), in the frame of the chord."""
         from mpmath import cos, sin
 
-        expansion = Expansion(len(unknowns), bandwidth=1)
+        size = len(unknowns) + len(walls)
+        expansion = Expansion(size, *((2, 2) if walls else (1, 0)))
         for i, unit in enumerate(self.units):
             a, b = unknowns[2 * i : 2 * i + 2]
             rise_near, rise_far = unit.height * sin(a), unit.height * sin(b)
             lean_near, lean_far = unit.height * cos(a), unit.height * cos(b)
             top = (unit.length + rise_near + rise_far, lean_far - lean_near)
             length, n = measured(top)
-            spring = bistable(unit, length - unit.length)
+            spring = bistable(unit, length - unit.length + (walls[i] if walls else 0))
+            behind: Rate = {-1 - i: 1} if unit.wall else {}
             slopes = {2 * i: (lean_near, rise_near), 2 * i + 1: (lean_far, -rise_far)}
             across = {row: _dot(_left(n), slope) for row, slope in slopes.items()}
-            expansion.add(spring, {row: _dot(n, slope) for row, slope in slopes.items()})
+            rate = {row: _dot(n, slope) for row, slope in slopes.items()}
+            expansion.add(spring, {**rate, **behind})
             expansion.add_square(spring.force / length, across)
             bends = {2 * i: (-rise_near, lean_near), 2 * i + 1: (-rise_far, -lean_far)}
             for (row, bend), angle in zip(bends.items(), (a, b), strict=True):
@@ -340,3 +367,70 @@ class RigidBars:
         is_beyond = np.arange(n)[:, None] >= np.arange(2 * n) // 2
         rates = np.stack((away[..., 1], -away[..., 0]), axis=2) * is_beyond[:, None, None]
         return np.asarray(rates.reshape(4 * n, 2 * n))
+
+
+@dataclass(frozen=True)
+class YieldingWalls:
+    """The energy of a finger whose walls give way; before each unit's unknowns stands its w, mm.
+
+    `rest` is where the search begins. A rigid wall among them stays where it is.
+    """
+
+    frame: ElasticBars | RigidBars
+    rest: list["mpf"]
+
+    @property
+    def units(self) -> list[Unit]:
+        return self.frame.units
+
+    @property
+    def scale(self) -> "mpf":
+        return self.frame.scale
+
+    def _apart(self, unknowns: list["mpf"]) -> tuple[list["mpf"], list["mpf"]]:
+        """The frame's unknowns, and the walls'."""
+        step = len(unknowns) // len(self.units)
+        others = [value for k, value in enumerate(unknowns) if k % step]
+        return others, unknowns[::step]
+
+    def _joined(self, others: list["mpf"], walls: list["mpf"]) -> list["mpf"]:
+        width = len(others) // len(walls)
+        parts = ([wall, *others[k * width : (k + 1) * width]] for k, wall in enumerate(walls))
+        return [value for part in parts for value in part]
+
+    def unknowns(self, nodes: list["mpf"]) -> list["mpf"]:
+        return self._joined(self.frame.unknowns(nodes), self.rest)
+
+    def nodes(self, unknowns: list["mpf"]) -> list["mpf"]:
+        return self.frame.nodes(self._apart(unknowns)[0])
+
+    def walls(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """How far each gives way, mm."""
+        return self._apart(unknowns)[1]
+
+    def at(self, unknowns: list["mpf"]) -> Expansion:
+        """The frame's energy and E = w²/(2 c_w)."""
+        others, walls = self._apart(unknowns)
+        expansion = self.frame.at(others, walls)
+        for i, (unit, wall) in enumerate(zip(self.units, walls, strict=True)):
+            expansion.add(linear(1 / unit.wall if unit.wall else 1, wall), {-1 - i: 1})
+        return expansion
+
+    def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        others, walls = self._apart(step)
+        yielded = [abs(w) / unit.stroke for w, unit in zip(walls, self.units, strict=True)]
+        return max(self.frame.strokes_opened(self._apart(unknowns)[0], others), *yielded)
+
+    def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
+        (others, walls), (change, more) = self._apart(unknowns), self._apart(step)
+        yielded = [wall + part for wall, part in zip(walls, more, strict=True)]
+        return self._joined(self.frame.moved(others, change), yielded)
+
+    def node_rates(self, unknowns: list["mpf"]) -> Array:
+        """Those of the frame; no wall moves a node by itself."""
+        others = self._apart(unknowns)[0]
+        rates = self.frame.node_rates(others)
+        width = len(others) // len(self.units)
+        by_unit = rates.reshape(len(rates), -1, width)
+        walls = np.zeros((*by_unit.shape[:2], 1))
+        return np.concatenate((walls, by_unit), axis=2).reshape(len(rates), -1)

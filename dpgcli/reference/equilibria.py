@@ -6,7 +6,7 @@ Newton's method on the energy of `reference.energy`, with a factorization of its
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, log10
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,15 @@ from dpgcli.reference.energy import (
     ElasticBars,
     Expansion,
     RigidBars,
+    YieldingWalls,
     cells,
     corners,
     cross,
     measured,
 )
 from dpgcli.reference.units import (
-    Unit,
     extended_units,
-    inverted_angle,
+    inverted_rest,
     spring_barrier,
 )
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from mpmath import mpf
 
 ExtendedArray = NDArray[np.longdouble]
+Energy: TypeAlias = ElasticBars | RigidBars | YieldingWalls
 
 MOST_ITERATIONS = 100
 MOST_HALVINGS = 40  # of one step
@@ -94,14 +95,18 @@ def extended_states(
     lost = _digits_lost(finger)
     with mpmath.workdps(digits + lost):
         units = extended_units(finger)
-        angle_of = {unit: inverted_angle(unit) for unit in set(units)}
-        angles = [angle_of[unit] for unit in units]
-        bars = RigidBars(units) if finger.is_rigid else ElasticBars(units)
+        rest_of = {unit: inverted_rest(unit) for unit in set(units)}
+        rests = [rest_of[unit] for unit in units]
+        frame = RigidBars(units) if finger.is_rigid else ElasticBars(units)
         tolerance = mpmath.mpf(10) ** -(digits // 2 + 5)
         smallest = tolerance / mpmath.mpf(10) ** lost
         rows = []
         for state, pattern in enumerate(inverted.T):
-            start = _starting_nodes(angles, units, pattern)
+            opened = [(m * int(on), w * int(on)) for (m, w), on in zip(rests, pattern, strict=True)]
+            start = RigidBars(units).nodes([angle for angle, _ in opened for _ in "ab"])
+            bars: Energy = frame
+            if finger.has_walls:
+                bars = YieldingWalls(frame, [wall for _, wall in opened])
             if nodes is not None:
                 start = [mpmath.mpf(value) for value in nodes[:, state].tolist()]
             found = _minimum(bars, start, tolerance, smallest)
@@ -114,12 +119,6 @@ def _digits_lost(finger: Finger) -> int:
     if finger.is_rigid:
         return 0
     return max(0, ceil(log10(finger.linear_stiffness.max() / finger.bistable_stiffness.min())))
-
-
-def _starting_nodes(angles: list["mpf"], units: list[Unit], pattern: Flags) -> list["mpf"]:
-    """The nodes of the pattern with rigid bars."""
-    opened = [angle * int(on) for angle, on in zip(angles, pattern, strict=True)]
-    return RigidBars(units).nodes([angle for angle in opened for _ in "ab"])
 
 
 class Factorization(NamedTuple):
@@ -184,14 +183,14 @@ def _downhill(factorization: Factorization, gradient: list["mpf"]) -> list["mpf"
 class Stationary(NamedTuple):
     """A point where Newton's method converged, with the energy's expansion there."""
 
-    bars: ElasticBars | RigidBars
+    bars: Energy
     unknowns: list["mpf"]
     expansion: Expansion
     factorization: Factorization
 
 
 def _minimum(
-    bars: ElasticBars | RigidBars, start: list["mpf"], tolerance: "mpf", smallest: "mpf"
+    bars: Energy, start: list["mpf"], tolerance: "mpf", smallest: "mpf"
 ) -> Stationary | None:
     """Walk downhill from the nodes `start`; None if that does not converge.
 
@@ -219,7 +218,7 @@ def _minimum(
 
 
 def _further(
-    bars: ElasticBars | RigidBars, here: list["mpf"], expansion: Expansion, step: list["mpf"]
+    bars: Energy, here: list["mpf"], expansion: Expansion, step: list["mpf"]
 ) -> tuple[list["mpf"], Expansion] | None:
     """The unknowns a step further, halved until the energy falls, and its expansion there."""
     from mpmath import eps, fdot
@@ -245,7 +244,9 @@ def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     angles = [angle for cell in shape for angle in corners(cell)]
     units = zip(shape, bars.units, strict=True)
     openings = [measured(cell.top)[0] - unit.length for cell, unit in units]
-    sides = [x > spring_barrier(u) for x, u in zip(openings, bars.units, strict=True)]
+    walls = bars.walls(unknowns)
+    domes = zip(openings, walls, bars.units, strict=True)
+    sides = [x + w > spring_barrier(unit) for x, w, unit in domes]
     is_ahead = [cross(cell.top, strut) > 0 for cell in shape for strut in (cell.near, cell.far)]
     is_upright = max(map(abs, angles)) < np.pi / 2
     return (
@@ -261,7 +262,7 @@ def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     )
 
 
-def _meets_itself(bars: ElasticBars | RigidBars, nodes: list["mpf"]) -> bool:
+def _meets_itself(bars: Energy, nodes: list["mpf"]) -> bool:
     """Whether sides of the outline cross that have no corner in common, by orientation."""
     height = float(bars.units[0].height)
     stations = np.concatenate(([0.0, 0.0, 0.0, height], np.array(nodes, float))).reshape(-1, 4)

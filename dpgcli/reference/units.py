@@ -14,7 +14,7 @@ BISECTIONS = 60
 
 
 class Unit(NamedTuple):
-    """One unit's L, H and d (mm), k_b (N/mm), α, k_θ (N mm/rad) and k_L (N/mm)."""
+    """One unit's L, H and d (mm), k_b (N/mm), α, k_θ (N mm/rad), k_L (N/mm) and c_w (mm/N)."""
 
     length: "mpf"
     height: "mpf"
@@ -23,13 +23,15 @@ class Unit(NamedTuple):
     linearity: "mpf"
     hinge: "mpf"
     bar: "mpf"
+    wall: "mpf" = 0
 
 
 def extended_units(finger: Finger) -> list[Unit]:
     """The units of a finger of one design, their doubles taken as exact."""
     from mpmath import mpf
 
-    arrays = list(finger.arrays().values())[: len(Unit._fields)]
+    parameters = finger.arrays()
+    arrays = [*list(parameters.values())[: len(Unit._fields) - 1], parameters["wall_compliance"]]
     columns = (np.broadcast_to(v, (finger.n_units, 1))[:, 0] for v in arrays)
     return [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
 
@@ -64,6 +66,43 @@ def inverted_angle(unit: Unit) -> "mpf":
     if not moment(least) < 0:
         return opened(1.0)
     return _bisected(moment, least, opened(1.25))
+
+
+def inverted_rest(unit: Unit) -> tuple["mpf", "mpf"]:
+    """The corner angle m (rad) and how far the wall gives way (mm), where an inverted unit rests.
+
+    Between rigid bars. With y the dome's extension, x = y − w = 2H sin m and h' the hinge's pull on
+    the opening, w = c_w h'(x) and F(y) + h'(x) = 0. The left side of the second has one least value
+    beyond half a stroke, and the well beyond that (our derivation).
+    """
+    from mpmath import asin, sqrt
+
+    if not unit.wall:
+        return inverted_angle(unit), unit.wall
+
+    def pull(x: "mpf") -> tuple["mpf", "mpf"]:
+        """h' and h''."""
+        sine = x / (2 * unit.height)
+        m, cosine, k = asin(sine), sqrt(1 - sine**2), unit.hinge / unit.height**2
+        return 2 * k * unit.height * m / cosine, k / cosine**2 * (1 + m * sine / cosine)
+
+    def opening(y: "mpf") -> "mpf":
+        highest = min(y, 1.99 * unit.height)
+        return _bisected(lambda x: x + unit.wall * pull(x)[0] - y, y * 0, highest)
+
+    def force(y: "mpf") -> "mpf":
+        u, softening = y / unit.stroke, 1 - unit.linearity
+        return unit.bistable * y * (1 + softening * (2 * u * u - 3 * u)) + pull(opening(y))[0]
+
+    def stiffness(y: "mpf") -> "mpf":
+        u, hinge = y / unit.stroke, pull(opening(y))[1]
+        own = unit.bistable * (1 + 6 * (1 - unit.linearity) * (u * u - u))
+        return own + hinge / (1 + unit.wall * hinge)
+
+    least = _bisected(stiffness, unit.stroke / 2, unit.stroke)
+    y = unit.stroke if not force(least) < 0 else _bisected(force, least, unit.stroke * 5 / 4)
+    x = opening(y)
+    return asin(x / (2 * unit.height)), y - x
 
 
 def spring_barrier(unit: Unit) -> "mpf":

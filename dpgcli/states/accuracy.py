@@ -1,4 +1,4 @@
-"""Accuracy levels: ways to the same states, from cheap to exact, each with an error bound.
+"""Accuracy levels of the same states, from cheap to exact, each with an error bound.
 
 The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
 units of how far the unit may turn, times the length of the finger (our derivation):
@@ -22,6 +22,7 @@ from dpgcli.arrays import Array, Indices, distinct
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.guess import without_first
 from dpgcli.states.tip import TIP_ROUNDING
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import single_units
@@ -183,10 +184,13 @@ def _corner_stiffness(units: UnitSolutions) -> Array:
     angle = np.broadcast_to(angle, shape).reshape(1, -1)
     bent = finger.with_bars(np.inf)
     rest = np.zeros((1, 1))
+    wall = np.where(units.wells.exists, units.first_order.wall, 0.0).reshape(1, -1)
     least = np.full_like(angle, np.inf)
-    for corner, inverted in ((np.zeros_like(angle), False), (angle, True)):
+    for inverted in (False, True):
+        corner, yielded = angle * inverted, wall * inverted
         potential = chain_potential(bent.with_domes(np.full(angle.shape, inverted)))
-        at = potential.coordinates.of_shape(Internal(rest, corner, corner, rest))
+        at = potential.coordinates.of_shape(Internal(rest, corner, corner, rest, yielded))
         band = potential.evaluate(at).hessian
+        band = without_first(band) if finger.has_walls else band
         least = np.minimum(least, band[0, 0] - np.abs(band[1, 0]))
     return np.where(least > 0.0, least, 0.0).reshape(shape)

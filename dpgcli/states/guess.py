@@ -8,22 +8,24 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.wells import ByUnit, Wells, single_units
+from dpgcli.states.wells import ByUnit, Wells, opening_of, single_units
 
 
 @dataclass(frozen=True)
 class FirstOrder(ByUnit):
     """The inverted unit with bars nearly rigid: everything to first order in 1/k_L.
 
-    `rigid_angle` m; `chord` and `strut` the extensions (mm) that the rigid unit's forces cause,
-    a strut's by one of its two units; `by_chord`, `by_near_strut`, `by_far_strut` the answer of
-    the near corner to those, rad/mm (of the far corner: near and far exchanged). A ground unit
-    carries no force and has all of them zero. Close to the loss of bistability, and without a
-    hinge, the answers grow without bound: they are then scaled down to a tenth of m. `turn` is
-    what both corners may turn by in any pattern (rad), not scaled down. Shapes as in `Wells`.
+    `rigid_angle` m, and `wall` by which its wall gives way (mm); `chord` and `strut` the
+    extensions (mm) that the rigid unit's forces cause, a strut's by one of its two units;
+    `by_chord`, `by_near_strut`, `by_far_strut` the answer of the near corner to those, rad/mm (of
+    the far corner: near and far exchanged). A ground unit carries no force and has all of them
+    zero. Close to the loss of bistability, and without a hinge, the answers grow without bound:
+    they are then scaled down to a tenth of m. `turn` is what both corners may turn by in any
+    pattern (rad), not scaled down. Shapes as in `Wells`.
     """
 
     rigid_angle: Array
+    wall: Array
     chord: Array
     strut: Array
     by_chord: Array
@@ -41,15 +43,21 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     flat, (units, designs) = single_units(finger)
     rigid_angle = np.broadcast_to(wells.angle, (units, designs))
     zero = np.zeros((units, designs))
+    wall = zero
+    if finger.has_walls:
+        wall = np.broadcast_to(wells.extension - opening_of(finger, wells.extension), zero.shape)
     if finger.is_rigid:
-        return FirstOrder(rigid_angle, zero, zero, zero, zero, zero, zero)
+        return FirstOrder(rigid_angle, wall, zero, zero, zero, zero, zero, zero)
     angle = rigid_angle.reshape(1, -1)
     rest = np.zeros_like(angle)
     potential = chain_potential(flat)
-    at_well = potential.evaluate(potential.coordinates.of_shape(Internal(rest, angle, angle, rest)))
+    shape = Internal(rest, angle, angle, rest, wall.reshape(1, -1))
+    at_well = potential.evaluate(potential.coordinates.of_shape(shape))
     stiffness = np.broadcast_to(finger.linear_stiffness, (units, designs))
     # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
     band, gradient = at_well.hessian, at_well.gradient
+    if finger.has_walls:
+        band, gradient = without_first(band), gradient[1:]
     chord, strut = (-gradient[row].reshape(units, designs) / stiffness for row in (0, 3))
     answers = [part.reshape(units, designs) for part in _corner_answers(band)]
     by_chord, by_near_strut, by_far_strut = answers
@@ -62,7 +70,22 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     scale = np.minimum(1.0, 0.2 * rigid_angle / np.maximum(turn, np.finfo(float).tiny))
     scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
     by_chord, by_near_strut, by_far_strut = scaled
-    return FirstOrder(rigid_angle, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+    return FirstOrder(rigid_angle, wall, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+
+
+def without_first(band: Array) -> Array:
+    """The band of a unit's Hessian once its first coordinate, the wall's, follows the others.
+
+    >>> without_first(np.array([[[2.0], [3.0]], [[1.0], [0.0]]]))[0].ravel()  # 3 − 1²/2
+    array([2.5])
+    """
+    first, rest = band[1:, 0], band[:, 1:].copy()
+    size = rest.shape[1]
+    with np.errstate(divide="ignore", invalid="ignore"):  # no second well
+        for depth in range(min(len(rest), size)):
+            n = min(size - depth, len(first) - depth)
+            rest[depth, :n] -= first[depth : depth + n] * first[:n] / band[0, 0]
+    return rest
 
 
 def _corner_answers(band: Array) -> tuple[Array, Array, Array]:
@@ -93,7 +116,7 @@ def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Intern
     if finger.is_rigid:
         rest = np.zeros((1, 1))
         angle = unit.rigid_angle * on
-        return Internal(rest, angle, angle, rest)
+        return Internal(rest, angle, angle, rest, unit.wall * on)
     strut = unit.strut * on
     strut[:-1] += (unit.strut * on)[1:]
     near_strut = np.zeros_like(strut)
@@ -101,7 +124,7 @@ def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Intern
     common = unit.rigid_angle + unit.by_chord * unit.chord
     near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut)
     far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut)
-    return Internal(unit.chord * on, near, far, strut)
+    return Internal(unit.chord * on, near, far, strut, unit.wall * on)
 
 
 def stroke_guess(finger: Finger, inverted: Flags, strokes: float) -> Internal:

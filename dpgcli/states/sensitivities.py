@@ -12,14 +12,13 @@ from typing import cast
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.equilibrium.banded import backward, forward
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 
-COMPLEX_STEP = 1e-100
 Direction = Mapping[str, Array]
 
 
@@ -66,8 +65,8 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
         change = backward(equilibrium.factorization, change)
         stepped = here + 1j * COMPLEX_STEP * change
         stations = moved.coordinates.stations(stepped)
-        _, near, far, _ = internal(change, moved.coordinates.finger.is_rigid)
-        turns = -np.cumsum(near + far, axis=0)
+        shape = internal(moved.coordinates.without_walls(change), settled.finger.is_rigid)
+        turns = -np.cumsum(shape.near_angle + shape.far_angle, axis=0)
     x, y = (nodes[-1].imag / COMPLEX_STEP for nodes in (stations.base_x, stations.base_y))
     return np.stack((x, y, turns[-1])), turns
 

@@ -22,6 +22,7 @@ SEARCHED = 512  # extensions at which the slope of a tabulated law is looked at
 WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
 IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
 INFLECTION_BISECTIONS = 24
+NEWTON_STEPS = 12  # for an opening: quadratic from a start that is off by the wall's share
 BISECTIONS = 48  # of one 512th of the range: down to rounding
 
 
@@ -78,7 +79,7 @@ def inverted_wells(finger: Finger) -> Wells:
     >>> print(inverted_wells(unit).extension.round(6))  # mm
     [[3.245015]]
     """
-    if finger.law.curve is not None:
+    if finger.law.curve is not None or finger.has_walls:
         return _searched_wells(finger)
     half_height = finger.stroke / (2.0 * finger.segment_height)
     hinge = finger.hinge_stiffness / (finger.bistable_stiffness * finger.segment_height**2)
@@ -141,7 +142,9 @@ def _searched_wells(finger: Finger) -> Wells:
     whole = domes.stroke + domes.contact
     own = finger.law.rests(domes).well + domes.contact  # a travel; the unit's is shorter
     furthest = WIDEST * np.where(np.isnan(own), whole, own)
-    widest = np.minimum(furthest - domes.contact, (1.0 - 1e-9) * lever)
+    widest = furthest - domes.contact
+    if not finger.has_walls:  # walls take the rest
+        widest = np.minimum(widest, (1.0 - 1e-9) * lever)
     lowest = finger.law.touching(domes).lowest
     within_reach = ~(lowest >= widest)  # of a unit whose bars are rigid
     lowest = np.where(within_reach & np.isfinite(lowest), lowest, 0.0)
@@ -170,7 +173,7 @@ def _searched_wells(finger: Finger) -> Wells:
         exists,
         extension,
         barrier,
-        np.arcsin(extension / lever),
+        np.arcsin(opening_of(finger, extension) / lever),
         turned,
         _largest(slope, grid <= barrier),
         _largest(-slope, (grid >= barrier) & (grid <= extension)),
@@ -182,20 +185,45 @@ def _largest(values: Array, at: Flags) -> Array:
     return np.where(at.any(axis=0), np.where(at, values, -np.inf).max(axis=0), np.inf)
 
 
+def opening_of(finger: Finger, extension: Array) -> Array:
+    """The opening x of a unit with rigid bars whose dome's spring extends by y, mm.
+
+    Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. The right
+    side is convex, so that Newton's method from above reaches the root monotonically.
+    """
+    if not finger.has_walls:
+        return extension
+    opening = np.minimum(extension, (1.0 - 1e-9) * 2.0 * finger.segment_height)
+    for _ in range(NEWTON_STEPS):
+        pull, stiffness = _hinge(finger, opening)
+        excess = opening - extension + finger.wall_compliance * pull
+        step = excess / (1.0 + finger.wall_compliance * stiffness)
+        opening = opening - np.maximum(step, 0.0)  # not at all where bars end it
+    return np.asarray(opening)
+
+
+def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array]:
+    """The hinge's pull on the opening, N, and its stiffness, N/mm: with x = 2H sin m."""
+    sine = opening / (2.0 * finger.segment_height)
+    half_turn, cosine = np.arcsin(sine), np.sqrt(1.0 - sine * sine)
+    stiffness = finger.hinge_stiffness / finger.segment_height**2
+    pull = 2.0 * stiffness * finger.segment_height * half_turn / cosine
+    return pull, stiffness / cosine**2 * (1.0 + half_turn * sine / cosine)
+
+
 def _rigid_slope(finger: Finger, extension: Array) -> Array:
-    """de/dx of a unit with rigid bars, N: the spring's force and the hinge's."""
-    half_turn = np.arcsin(extension / (2.0 * finger.segment_height))
+    """de/dy of a unit with rigid bars, N: the spring's force and the hinge's."""
+    half_turn = np.arcsin(opening_of(finger, extension) / (2.0 * finger.segment_height))
     hinge = 2.0 * finger.hinge_stiffness * half_turn
     return finger.springs(extension).force + hinge / (finger.segment_height * np.cos(half_turn))
 
 
 def _rigid_stiffness(finger: Finger, extension: Array) -> Array:
-    """d²e/dx² of a unit with rigid bars, N/mm: with x = 2H sin m, dm/dx = 1/(2H cos m)."""
-    sine = extension / (2.0 * finger.segment_height)
-    squared = 1.0 - sine * sine  # of the cosine
-    hinge = finger.hinge_stiffness / (finger.segment_height**2 * squared)
-    curved = 1.0 + np.arcsin(sine) * sine / np.sqrt(squared)
-    return finger.springs(extension).stiffness + hinge * curved
+    """d²e/dy² of a unit with rigid bars, N/mm; hinge and wall are springs in series."""
+    _, hinge = _hinge(finger, opening_of(finger, extension))
+    if finger.has_walls:
+        hinge = hinge / (1.0 + finger.wall_compliance * hinge)
+    return finger.springs(extension).stiffness + hinge
 
 
 def _bisected(finger: Finger, grid: Array, places: Indices, *, rises: bool) -> Array:
@@ -262,11 +290,16 @@ def barriers(finger: Finger, wells: Wells) -> Array:
 
 
 def _rigid_energy(finger: Finger, extension: Array) -> Array:
-    """Spring and hinge of a unit with rigid bars, E(x) + ½ k_θ φ² with x = 2H sin(φ/2)."""
+    """Spring, wall and hinge of a unit with rigid bars, E(y) + w²/(2 c_w) + ½ k_θ φ²."""
     spring = finger.springs(extension)
-    sine = extension / (2.0 * finger.segment_height)
+    opening = opening_of(finger, extension)
+    sine = opening / (2.0 * finger.segment_height)
     turn = 2.0 * np.arcsin(np.minimum(sine, 1.0))  # beyond the lever there is no well to ask for
-    return spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
+    energy = spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
+    if finger.has_walls:  # w = c_w h'
+        pull, _ = _hinge(finger, opening)
+        energy = energy + 0.5 * finger.wall_compliance * pull * pull
+    return np.asarray(energy)
 
 
 def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:

@@ -10,8 +10,10 @@ the run gives up.
 import atexit
 import os
 import signal
+import sys
 import tempfile
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
@@ -22,7 +24,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -31,7 +33,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import Field, WorkplaceError
 from dpgcli.signals import STOP_SIGNALS
-from dpgcli.temporary import temporary_folder
+from dpgcli.temporary import temporary_folder, working_folder_is_gone
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -247,22 +249,47 @@ def process_pool(n_workers: int) -> Executor:
 
     method = "forkserver" if _has_fork_server() else "spawn"
     start_fork_server()
-    return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
+    with _refusals_said(", for semaphores (/dev/shm on Linux)"):
+        return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
 
 
 def start_fork_server(*modules: str) -> None:
     """Start the process that workers are forked from; it imports these modules once for all.
 
     Called early, it does so while this process is still busy with imports of its own. On Windows
-    there is none, and every worker imports for itself.
+    there is none, and every worker imports for itself. Raises WorkplaceError where it cannot be.
     """
     if not _has_fork_server():
         return
+    with _refusals_said():
+        _own_temporary_folder()
+        if modules:
+            from multiprocessing import forkserver
+
+            forkserver.set_forkserver_preload(list(modules))
+        with _safe_path():
+            _ensure_fork_server()
+
+
+@contextmanager
+def _refusals_said(purpose: str = "") -> Iterator[None]:
+    """Raise WorkplaceError for what the system refuses to a pool: semaphores, sockets, a place.
+
+    One process alone needs none of it.
+    """
+    try:
+        yield
+    except (OSError, ImportError, NotImplementedError) as error:
+        why = f"{getattr(error, 'strerror', None) or error}{purpose}"
+        if working_folder_is_gone():
+            why = "the working folder was deleted; change to one that is there"
+        said = f"workers cannot be started: {why}. Without workers: "
+        raise WorkplaceError(said, Field("jobs"), " 1") from error
+
+
+def _ensure_fork_server() -> None:
     from multiprocessing import forkserver, resource_tracker
 
-    _own_temporary_folder()
-    if modules:
-        forkserver.set_forkserver_preload(list(modules))
     # what a terminal sends to all its processes is for this one to answer: the others inherit
     # that it is blocked; the tracker comes first, since starting it unblocks Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGHUP])
@@ -274,6 +301,30 @@ def start_fork_server(*modules: str) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Have new interpreters import nothing from the working folder, such as somebody's random.py.
+
+    What the program that starts them may import, they get from it later.
+    """
+    safe = {"PYTHONSAFEPATH": "1"}  # the option -P
+    with suppress(OSError):  # a working folder that was deleted
+        here = os.path.realpath(os.curdir)
+        places = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        kept = [place for place in places if os.path.realpath(place) != here]
+        safe["PYTHONPATH"] = os.pathsep.join(kept)
+    before = {name: os.environ.get(name) for name in safe}
+    os.environ.update(safe)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
 def _has_fork_server() -> bool:
     from multiprocessing import get_all_start_methods
 
@@ -282,19 +333,13 @@ def _has_fork_server() -> bool:
 
 @cache
 def _own_temporary_folder() -> None:
-    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
-
-    Raises WorkplaceError where there can be no temporary files.
-    """
+    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left."""
     from multiprocessing import current_process
 
-    try:
-        place = tempfile.gettempdir()
-        place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
-        held = ExitStack()
-        folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
-    except OSError as error:
-        raise WorkplaceError(f"no folder for temporary files: {error}") from error
+    place = tempfile.gettempdir()
+    place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
+    held = ExitStack()
+    folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
     atexit.register(held.close)
     vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
 
@@ -307,7 +352,7 @@ class _Pool(ProcessPoolExecutor):
 
         Raises WorkplaceError where the system allows no more processes.
         """
-        with _held_signals():
+        with _held_signals(), _safe_path():
             try:
                 future = super().submit(fn, *args, **kwargs)
             except (ConnectionError, FileNotFoundError, EOFError) as error:
@@ -351,6 +396,8 @@ def _held_signals() -> Iterator[None]:
 
 
 def _start_worker() -> None:
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, as in the program itself
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -1,5 +1,6 @@
 """Parts of a sweep: whole or not there, whatever happens to who writes them."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dpgcli.files.parts import PartStore, write_part
+from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint, write_part
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.states.columns import Column, Group, Kind
 
@@ -71,3 +72,32 @@ def test_a_part_is_an_arrow_file_whose_blocks_come_back_one_by_one(tmp_path: Pat
         ]
         for batch, block in zip(found, blocks, strict=True):
             assert batch.equals(record_batch(columns, block[which]), check_metadata=True)
+
+
+def test_a_part_of_other_designs_is_none(tmp_path: Path) -> None:
+    """Its range is what says which designs are there, and which are missing."""
+    store = PartStore(tmp_path)
+    with store.part(0, 4) as file:
+        file.write(b"whole")
+    (part,) = store.parts()
+    assert not part.is_damaged
+    part.path.rename(part.path.with_name(part.path.name.replace("0000000000-", "0000000001-")))
+    assert [part.start for part in store.damaged()] == [1]
+
+
+@pytest.mark.parametrize(
+    "said", [{}, {"dpg.designs": "0"}, {"dpg.designs": 3}, {"dpg.designs": "3", "dpg.x": 1}, [1]]
+)
+def test_a_description_by_hand_is_none(tmp_path: Path, said: Any) -> None:
+    """Also one whose fingerprint is right."""
+    if isinstance(said, dict):
+        said = {**said, FINGERPRINT: fingerprint(said)}
+    (tmp_path / SAID).write_text(json.dumps(said))
+    assert PartStore(tmp_path).said() == {}
+
+
+def test_a_description_with_its_designs_is_one(tmp_path: Path) -> None:
+    said = {"dpg.designs": "3"}
+    said |= {FINGERPRINT: fingerprint(said)}
+    (tmp_path / SAID).write_text(json.dumps(said))
+    assert PartStore(tmp_path).said() == said

@@ -19,6 +19,7 @@ FORMULATIONS: dict[str, tuple[Formulate, float]] = {
     "rigid": (chain_potential, np.inf),
     "lattice": (lattice_potential, 1e4),
 }
+WALLS = {"no walls": 0.0, "walls": 0.05, "soft walls": 3.0}  # mm/N
 OPENING_ANGLE = np.deg2rad(17.36175941)  # of an inverted unit with rigid bars
 Case = tuple[FingerPotential, Array, Array]
 
@@ -42,6 +43,8 @@ LAWS: dict[str, DomeLaw] = {
     params=[
         *((name, n, "published") for name in FORMULATIONS for n in (1, 2, 4)),
         *((name, 2, law) for name in FORMULATIONS for law in list(LAWS)[1:]),
+        *((name, n, law, "walls") for name in FORMULATIONS for n in (1, 3) for law in LAWS),
+        *((name, 2, "published", "soft walls") for name in FORMULATIONS),
     ],
     ids=str,
 )
@@ -51,16 +54,20 @@ def case(
     random_shape: Callable[..., Internal],
 ) -> Case:
     """A graded finger's formulation, a shape far from equilibrium, the scale of each row."""
-    name, n_units, law = request.param
+    name, n_units, law, *walls = request.param
     formulation, stiffness = FORMULATIONS[name]
     finger = graded_finger(n_units, 11, linear_stiffness=stiffness)
     finger = replace(finger, law=LAWS[law])
+    if walls:  # the last unit's are rigid
+        compliance = WALLS[walls[0]] * (np.arange(n_units)[::-1, None] + (n_units == 1))
+        finger = finger.changed(wall_compliance=compliance)
     potential = formulation(finger)
     shape = random_shape(n_units, 12)
     if isinstance(finger.law, PushOnly):  # where domes and neighbors touch
         corner = np.arcsin(0.75 * finger.stroke / (2.0 * finger.segment_height))
-        chord, near, far, strut = (0.05 * part for part in shape)
+        chord, near, far, strut = (0.05 * part for part in shape[:4])
         shape = Internal(chord, corner + near, corner + far, strut)
+    shape = shape._replace(wall=0.05 * finger.stroke)
     coordinates = potential.coordinates.of_shape(shape)
     lever = np.broadcast_to(potential.coordinates.force_unit, coordinates.shape)[:, 0]
     return potential, coordinates, 1.0 / lever  # 1 mm, or as much of an angle

@@ -128,7 +128,7 @@ def test_energies_survive_a_mirror(
 ) -> None:
     """Read from its tip, a finger is its own mirror image: near and far corners trade places."""
     finger = graded_finger(n_units, seed)
-    chord, near, far, strut = random_shape(n_units, seed + 1)
+    chord, near, far, strut, _ = random_shape(n_units, seed + 1)
     strut[-1] = 0.0  # as that of the clamped station
     mirrored_strut = np.concatenate((strut[:-1][::-1], strut[-1:]))
     mirrored_shape = Internal(chord[::-1], far[::-1], near[::-1], mirrored_strut)

@@ -262,7 +262,7 @@ def test_tip_angle_counts_full_turns(n_units: int, linear_stiffness: float) -> N
 @pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
 def test_the_unit_of_length_does_not_matter(linear_stiffness: float) -> None:
     finger, inverted, scale = graded_finger(2, linear_stiffness), units_of("11", "01"), 2.0**10
-    powers = dict(zip(ARRAYS, (-1, -1, -1, 1, 0, -1, 1, -1), strict=True))
+    powers = dict(zip(ARRAYS, (-1, -1, -1, 1, 0, -1, 1, -1, -1), strict=True))
     scaled = {name: values * scale ** powers[name] for name, values in finger.arrays().items()}
     one, other = extended_states(finger, inverted), extended_states(Finger(2, **scaled), inverted)
     rows = np.array([[scale], [scale], [1.0]])

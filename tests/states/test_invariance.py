@@ -32,6 +32,7 @@ def in_other_units(finger: Finger, length: float, force: float) -> Finger:
         "hinge_stiffness": force * length,
         "linear_stiffness": force / length,
         "dome_travel": length,
+        "wall_compliance": length / force,
     }
     return Finger(
         finger.n_units, **{name: v * factors[name] for name, v in finger.arrays().items()}

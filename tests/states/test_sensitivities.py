@@ -33,7 +33,7 @@ def solved(finger: Finger) -> Settled:
 def outputs(finger: Finger) -> dict[str, Array]:
     """Poses and angles of states solved anew."""
     batch = solved(finger)
-    _, near, far, _ = internal(batch.equilibrium.coordinates, finger.is_rigid)
+    _, near, far, *_ = internal(batch.equilibrium.coordinates, finger.is_rigid)
     return {
         "pose": tip(batch, with_compliance=False).pose,
         "strut_angles": -np.cumsum(near + far, axis=0),

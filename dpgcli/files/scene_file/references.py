@@ -8,7 +8,7 @@ from dpgcli.design.calibrations import PUBLISHED
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
-from dpgcli.files.content import quoted_if
+from dpgcli.files.content import beside, quoted_if
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
@@ -91,7 +91,7 @@ class _Reader:
         return said
 
     def named(self, path: KeyPath, name: str) -> Calibration | None:
-        file = self.folder / name
+        file = beside(self.folder, name)
         try:
             is_file = file.is_file()
         except OSError:  # a name too long, a folder that is closed

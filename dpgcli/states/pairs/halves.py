@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
-from dpgcli.equilibrium.potential import Evaluation, Potential
-from dpgcli.mechanics.chain import Chain
+from dpgcli.equilibrium.potential import Evaluation
+from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 from dpgcli.states.crossing import Outline, outline
@@ -110,8 +110,9 @@ class Split:
     def strut_force(self) -> float:
         """The forces in play at the shared strut in the ground state, the smallest, N."""
         ground = np.zeros((self.n_units, 1), bool)
-        chain = Chain(self.units.finger.with_domes(ground))
-        return float(chain.gradient_scale[4 * self.n_inner - 1, 0])
+        chain = chain_potential(self.units.finger.with_domes(ground)).coordinates
+        strut = self.n_inner * chain.size // self.n_units - 1
+        return float(chain.gradient_scale[strut, 0])
 
     @property
     def n_solves(self) -> int:
@@ -153,7 +154,7 @@ class Split:
 
     def _outer(self, settled: Settled) -> Half:
         finger = settled.finger
-        chain = Chain(finger.section(self.context, finger.n_units))
+        chain = chain_potential(finger.section(self.context, finger.n_units)).coordinates
         coordinates = settled.equilibrium.coordinates
         pose, jacobian = chain.tip(coordinates[-chain.size :])
         energies, joint, clamped = settled.equilibrium.energies, None, None
@@ -168,7 +169,7 @@ class Split:
         half = self._half(settled, own, pose, energies, 0.0, joint, clamped)
         return self._with_outline(half, chain, coordinates[-chain.size :])
 
-    def _with_outline(self, half: Half, chain: Chain, own: Array) -> Half:
+    def _with_outline(self, half: Half, chain: FingerCoordinates, own: Array) -> Half:
         """The half with its outline, as if its first strut were upright, if that is needed."""
         if self.units.shortest_loop is None:
             return half
@@ -200,7 +201,7 @@ class Split:
 
 
 def _inner_joint(
-    potential: Potential[Chain], own: Array, at_own: Evaluation, jacobian: Array, beyond: float
+    potential: FingerPotential, own: Array, at_own: Evaluation, jacobian: Array, beyond: float
 ) -> Joint:
     """The strut is the last unknown: its pivot is the stiffness left once the rest follows."""
     factorization = factorize(at_own.hessian, potential.column_depths)
@@ -213,7 +214,7 @@ def _inner_joint(
 
 @in_lanes
 def _outer_joint(
-    settled: Settled, context: Potential[Chain], at_context: Evaluation, jacobian: Array
+    settled: Settled, context: FingerPotential, at_context: Evaluation, jacobian: Array
 ) -> Joint:
     """The outer half's joint: a unit force on the strut moves both; the context's part is known.
 
