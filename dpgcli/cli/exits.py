@@ -163,6 +163,9 @@ def _code_of(app: Callable[..., object]) -> int:
         return ExitCode.USAGE
     if isinstance(code, ExitCode):
         return code
+    if code == ExitCode.INTERRUPTED:  # by typer, which does not say so
+        say(f"dpg: interrupted; {NOTHING_HALF}")
+        return ExitCode.INTERRUPTED
     return ExitCode.USAGE if code else ExitCode.DONE  # of typer, which knows none of ours
 
 
