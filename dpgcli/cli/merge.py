@@ -7,7 +7,7 @@ import typer
 
 from dpgcli.cli.exits import check_failed
 from dpgcli.cli.options import MaxFailed, Quiet
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 
 def merge(
@@ -25,6 +25,6 @@ def merge(
 
     found = merged(shards, output, say)
     if not quiet:
-        print(found.report, end="")
+        put(found.report, end="")
         say(f"{output}: {len(shards)} shards joined")
     check_failed(found.n_failed, max_failed)

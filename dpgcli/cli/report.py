@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 
 def report(
@@ -28,6 +28,6 @@ def report(
     check_outputs((folder / "designs.parquet", folder / "run.json"), (output, Mark.REPORT))
     _, text = page(folder, kind, say)
     if output is None:
-        print(text, end="")
+        put(text, end="")
     else:
         write_page(output, text)

@@ -25,7 +25,7 @@ from dpgcli.cli.options import (
     seconds,
 )
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import ProblemFormat
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def _judge(
 
     designs, text = summarize(study.folder, is_new=is_new, say=say)
     if is_new and not quiet:
-        print(text, end="")
+        put(text, end="")
         if study.target_error is not None:
             say(_chosen(designs))
     verdicts: Sequence[RequirementVerdict] = check_requirements(designs, rules) if rules else ()
