@@ -11,6 +11,7 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Codes = NDArray[np.uint64]
 Columns = dict[str, NDArray[Any]]  # of a table, by name
+COMPLEX_STEP = 1e-100  # Im f(x + ih)/h is the derivative: h² is below any rounding
 
 
 def total(parts: Array) -> Array:

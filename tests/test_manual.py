@@ -96,8 +96,12 @@ class Block:
     text: str
 
 
+def text_of(page: str) -> str:
+    return PAGES[page].read_text(encoding="utf-8")
+
+
 def blocks(page: str) -> list[Block]:
-    found = FENCED.findall(PAGES[page].read_text(encoding="utf-8"))
+    found = FENCED.findall(text_of(page))
     return [Block(language, tuple(words.split()), text) for language, words, text in found]
 
 
@@ -189,12 +193,12 @@ def test_a_page_that_shows_another_number_is_wrong(printed: str, is_the_same: bo
 
 
 def test_the_readme_fits_on_two_screens() -> None:
-    assert len(PAGES["README"].read_text(encoding="utf-8").splitlines()) <= 150
+    assert len(text_of("README").splitlines()) <= 150
 
 
 def examples() -> list[str]:
     """Those in the README's table of commands."""
-    text = PAGES["README"].read_text(encoding="utf-8")
+    text = text_of("README")
     return re.findall(r"^\| `dpg [^|]*\|[^|]*\| `(dpg [^`]*)` \|$", text, re.MULTILINE)
 
 
@@ -215,12 +219,12 @@ def test_the_examples_of_commands_run() -> None:
 
 def test_words_of_our_own_are_only_in_the_glossary() -> None:
     ours = re.compile(r"\brungs?\b|\blevers?\b|\b(held|hold|holds) \w* ?against\b")
-    assert not ours.findall(MANUAL.replace(PAGES["glossary"].read_text(encoding="utf-8"), ""))
+    assert not ours.findall(MANUAL.replace(text_of("glossary"), ""))
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
-    text = FENCED.sub("", PAGES[page].read_text(encoding="utf-8"))
+    text = FENCED.sub("", text_of(page))
     for target in re.findall(r"\]\(([^)]+)\)", text):
         name, _, heading = target.partition("#")
         path = PAGES[page].parent / name if name else PAGES[page]
@@ -237,7 +241,7 @@ def headings(path: Path) -> set[str]:
 
 def test_the_picture_is_what_the_command_draws(tmp_path: Path) -> None:
     """To a pixel: other versions of Matplotlib may write the same in other words."""
-    (named,) = re.findall(r"!\[[^]]+\]\((\S+\.svg)\)", PAGES["README"].read_text(encoding="utf-8"))
+    (named,) = re.findall(r"!\[[^]]+\]\((\S+\.svg)\)", text_of("README"))
     spec = ROOT / "configs" / "three_unit.yaml"
     plot = str(tmp_path / "states.svg")
     dpg.predict(spec).draw(plot)
@@ -291,18 +295,32 @@ def test_every_command_and_option_is_named(name: str) -> None:
     assert not {option for option in options if option not in MANUAL}
 
 
-def test_every_key_of_the_spec_is_named() -> None:
+def test_every_key_of_the_spec_is_on_its_page() -> None:
     definitions = json_schema()["$defs"].values()
     keys = {key for part in definitions for key in part.get("properties", {})}
-    assert not {key for key in keys if key not in MANUAL}
+    assert not {key for key in keys if f"{key}" not in text_of("spec")}
+    assert not {origin for origin in Origin if f"`{origin}`" not in text_of("spec")}
 
 
-def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
+def named_in(page: str) -> set[str]:
+    """What a page has in backticks."""
+    return set(re.findall(r"`([^`\n]+)`", text_of(page)))
+
+
+def test_every_column_group_and_status_is_on_its_page() -> None:
     columns = declared(3, ("bistable", "hinge", "bar"), True)
-    named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
-    named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
-    assert not {name for name in named if f"`{name}" not in MANUAL}
-    named = {c.name for c in (*METRICS, *LEVEL_COLUMNS)} | {*DesignStatus, *ABLATIONS}
-    named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
-    assert not {name for name in named if f"`{name}" not in MANUAL}
-    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", MANUAL, re.M)}
+    names = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
+    names |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status)}
+    assert not names - named_in("columns")
+    assert not {c.name for c in (*METRICS, *LEVEL_COLUMNS)} - named_in("sweeps")
+    assert not {*DesignStatus} - named_in("sweeps")
+
+
+def test_every_verdict_family_and_ablation_is_on_its_page() -> None:
+    assert not {*Verdict, PATTERNS.name, *(f.name for f in FAMILIES)} - named_in("stress")
+    assert not {*ABLATIONS} - named_in("accuracy")
+
+
+def test_every_exit_code_is_on_its_page() -> None:
+    page = text_of("files")
+    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", page, re.M)}

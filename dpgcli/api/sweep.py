@@ -1,6 +1,5 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,15 +20,17 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
+from dpgcli.cores import cores
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
-from dpgcli.files.table_reader import read_run, read_undamaged
+from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.yaml_file import Document, without_free_keys
 from dpgcli.mechanics.finger import Finger
+from dpgcli.reports.summary import DesignSpace
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
@@ -50,21 +51,21 @@ from dpgcli.temporary import temporary_folder
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
-ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 
 @dataclass(frozen=True)
 class SweepResult:
     """The tables of a sweep, read when asked for; of a shard there are none before `merge`.
 
-    `n_failed` designs killed their worker, twice. `report` is the page on the space,
-    `fingerprint` that of all the tables depend on.
+    `n_failed` designs killed their worker, twice. `report` is the page on the space, `space` what
+    it was made of; `fingerprint` is that of all the tables depend on.
     """
 
     folder: Path
     fingerprint: str
     n_failed: int
     report: str = ""
+    space: DesignSpace | None = None
 
     @cached_property
     def designs(self) -> Table:
@@ -163,9 +164,12 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
 def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
     if part is not None:
         return SweepResult(study.folder, study.metadata[FINGERPRINT], study.n_failed)
-    designs, text = summarize(study.folder, is_new=is_new)
-    n_failed = int((designs["status"] == "failed").sum())
-    return SweepResult(study.folder, study.metadata[FINGERPRINT], n_failed, text)
+    return _summarized(study.folder, study.metadata[FINGERPRINT], is_new=is_new)
+
+
+def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
+    space, text = summarize(folder, is_new=is_new)
+    return SweepResult(folder, fingerprint, len(space.of_status("failed")), text, space)
 
 
 def study_of(
@@ -253,8 +257,8 @@ class Place:
             raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
-        if self.scheduler is not None and re.fullmatch(ADDRESS, self.scheduler) is None:
-            raise UsageError(scheduler, f" {self.scheduler}: expected tcp://host:port")
+        if self.scheduler is not None:
+            cluster.check_address(self.scheduler)
         if self.scheduler is None and self.wait is not None:
             raise UsageError(Field("wait"), " is for the workers of ", dask, " dask")
 
@@ -267,7 +271,7 @@ class Place:
         """The workers, found or about to be started; `say` hears of those that are waited for."""
         if self.scheduler is not None:
             return self._cluster(self.scheduler, say)
-        n_workers = self.jobs or os.cpu_count() or 1
+        n_workers = self.jobs or cores().usable
         if self.executor == "serial" or n_workers == 1:
             return executors.serial()
         return executors.processes(n_workers)
@@ -300,22 +304,20 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
     if not folders:
         raise UsageError("shards: expected one folder or more")
     paths = [path_of("shards", folder) for folder in folders]
-    return merged(paths, path_of("output", output), silent)
+    return merged(paths, path_of("output", output))
 
 
-def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:
-    """The same; `say` hears of what the report leaves out."""
+def merged(shards: Sequence[Path], folder: Path) -> SweepResult:
+    """The same, of paths."""
     found = [_store(shard) for shard in shards]
     with sole_use(folder):
         drop_half_written(folder)
         check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
-        read_run(folder / RUN)  # what no report can be made beside is refused before the work
-        made = assemble(found, folder)
-        designs, text = summarize(folder, is_new=True, say=say)
+        result = _summarized(folder, assemble(found, folder), is_new=True)
         for store in found:
             if store.folder.parent.parent.samefile(folder):
                 store.drop()
-    return SweepResult(folder, made, int((designs["status"] == "failed").sum()), text)
+    return result
 
 
 def _store(folder: Path) -> PartStore:

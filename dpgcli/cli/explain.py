@@ -1,5 +1,6 @@
 """`dpg explain`: what a scene needs and leaves out, before any work."""
 
+from collections.abc import Iterator
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -83,6 +84,8 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "bar_flexibility_mm": plan.bar_flexibility,
         "accuracy_level": plan.accuracy_level and plan.accuracy_level.name,
         "error_bound_mm": spelled(plan.error_bound),
+        "model_error": plan.scene.model_error.text,
+        "uncertainty": _uncertainty_facts(plan),
         "columns": [column.name for column in plan.columns],
         "left_out": [
             {"what": o.what, "why": with_options(o.why), "keep": o.keep} for o in plan.omissions
@@ -101,6 +104,25 @@ def facts(plan: "Plan") -> dict[str, Any]:
             for s in plan.scene.sources
         ],
     }
+
+
+def _uncertainty_facts(plan: "Plan") -> dict[str, Any] | None:
+    known = plan.scene.uncertainty
+    if known is None:
+        return None
+    sizes = {step.cause: step.size for step in known.steps if step.size}
+    return {"covers": known.covers, "tolerances": sizes, "model_error": known.model_error or None}
+
+
+def _uncertainty(plan: "Plan") -> Iterator[str]:
+    """What is known of the model's error, and what values may be off by."""
+    known = plan.scene.uncertainty
+    yield f"{'the model itself':<30} {plan.scene.model_error.text}"
+    for step in known.steps if known else ():
+        if step.size:
+            yield f"{step.cause:<30} ± {step.size}, the same error in all units"
+    if known is not None:
+        yield f"{'counted in by --uncertainty':<30} {known.covers}"
 
 
 def _lines(name: str, plan: "Plan") -> list[str]:
@@ -130,6 +152,9 @@ def _lines(name: str, plan: "Plan") -> list[str]:
             for o in plan.omissions
         ),
         "  [names] are what dpg bench --keep puts back, to show what it costs and changes",
+        "",
+        "Uncertainty",
+        *(f"  {line}" for line in _uncertainty(plan)),
         "",
         "Error and cost",
         f"  {_bar_error(plan)}",

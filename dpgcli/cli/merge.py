@@ -7,7 +7,8 @@ import typer
 
 from dpgcli.cli.exits import check_failed
 from dpgcli.cli.options import MaxFailed, Quiet
-from dpgcli.cli.streams import put, say
+from dpgcli.cli.streams import say
+from dpgcli.cli.sweep import print_in_short
 
 
 def merge(
@@ -23,8 +24,8 @@ def merge(
     """Join shards into the tables of the whole sweep."""
     from dpgcli.api.sweep import merged
 
-    found = merged(shards, output, say)
-    if not quiet:
-        put(found.report, end="")
+    found = merged(shards, output)
+    if not quiet and found.space is not None:
+        print_in_short(output, found.space)
         say(f"{output}: {len(shards)} shards joined")
     check_failed(found.n_failed, max_failed)

@@ -29,7 +29,8 @@ ColumnNames = Annotated[
 ]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]
 WithUncertainty = Annotated[
-    bool, typer.Option("--uncertainty", help="Add what errors of fitted values do to the tips")
+    bool,
+    typer.Option("--uncertainty", help="Add what errors of fits, tolerances and model do"),
 ]
 Tolerance = Annotated[
     float | None,

@@ -28,10 +28,19 @@ PRINCIPAL = (
     "tip_y_uncertainty_mm",
     "tip_angle_uncertainty_rad",
     "aperture_mm",
+    "aperture_uncertainty_mm",
     "fingers_overlap",
     "numerical_error_mm",
 )
-DROPPED_FIRST = ("numerical_error_mm",)
+IN_SUMMARY = "uncertainty_covers"  # the same in all rows
+TABLE_WIDTH = 100  # characters, where there is no terminal
+DROPPED_FIRST = (
+    "numerical_error_mm",
+    "tip_angle_uncertainty_rad",
+    "energy_mJ",
+    "tip_angle_deg",
+    "fingers_overlap",
+)
 TOO_SMALL = 1e-3  # for fixed decimals: such as the tips of a finger of micrometers
 ROUNDED = {
     "residual_N": ".1e",
@@ -102,9 +111,9 @@ def table_printer(*, principal: bool) -> Printer:
         shown = {
             column.name: _shown(column, [row[place] for row in first])
             for place, column in enumerate(columns)
-            if not principal
-            or column.name in PRINCIPAL
+            if column.name in PRINCIPAL
             or (strays and column.name == "reached_pattern")
+            or not (principal or column.name == IN_SUMMARY)
         }
         right = (Kind.NUMBER, Kind.FLAG)
         left = {column.name for column in columns if column.kind not in right}
@@ -140,11 +149,10 @@ def _rows(
 def print_grid(
     texts: dict[str, list[str]], *, left: Container[str], may_drop: bool = False
 ) -> None:
-    """Aligned columns; on a terminal with folded heads, and without some if it is narrow."""
+    """Aligned columns; on a terminal with folded heads, without some where there is no room."""
     interactive = sys.stdout.isatty()
-    heads = {name: name.replace("_", "_\n") if interactive else name for name in texts}
-    if interactive and may_drop:
-        _drop_to_fit(heads, texts)
+    names, is_folded = _fitted(texts, interactive) if may_drop else (list(texts), interactive)
+    heads = {name: _head(name, is_folded) for name in names}
     n_folds = max(head.count("\n") for head in heads.values())
     columns = []
     for name, head in heads.items():
@@ -155,6 +163,26 @@ def print_grid(
     if interactive:
         lines.insert(n_folds + 1, "─" * _width(lines[0]))
     put("\n".join(line.rstrip() for line in lines))
+    if dropped := [name for name in texts if name not in names]:
+        say(f"no room for {', '.join(dropped)}: see --columns, --format")
+
+
+def _fitted(texts: dict[str, list[str]], interactive: bool) -> tuple[list[str], bool]:
+    """What a table has room for, and whether its heads are folded for that."""
+    room = shutil.get_terminal_size().columns if interactive else TABLE_WIDTH
+    ways = [(True, n) for n in range(len(DROPPED_FIRST) + 1)]
+    if not interactive:
+        ways = [(False, 0), (False, 1), *ways]
+    for is_folded, n_dropped in ways:
+        names = [name for name in texts if name not in DROPPED_FIRST[:n_dropped]]
+        cells = ([*_head(name, is_folded).split("\n"), *texts[name]] for name in names)
+        if sum(max(map(_width, column)) + 2 for column in cells) - 2 <= room:
+            break
+    return names, is_folded
+
+
+def _head(name: str, is_folded: bool) -> str:
+    return name.replace("_", "_\n") if is_folded else name
 
 
 def _aligned(cells: list[str], *, left: bool) -> list[str]:
@@ -172,21 +200,6 @@ def _width(text: str) -> int:
     from rich.cells import cell_len
 
     return cell_len(text)
-
-
-def _drop_to_fit(heads: dict[str, str], texts: dict[str, list[str]]) -> None:
-    """Leave out what a narrow terminal has no room for, and say so."""
-    widths = {
-        name: max(map(len, [*head.split("\n"), *texts[name]])) for name, head in heads.items()
-    }
-    room = shutil.get_terminal_size().columns
-    dropped = []
-    for name in DROPPED_FIRST:
-        if name in heads and sum(widths[n] + 2 for n in heads) - 1 > room:
-            del heads[name]
-            dropped.append(name)
-    if dropped:
-        say(f"no room for {', '.join(dropped)}")
 
 
 def _shown(column: Column, values: list[Any]) -> list[str]:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.streams import put, say
+from dpgcli.cli.streams import put
 
 
 def report(
@@ -25,8 +25,8 @@ def report(
     kind = ".md" if output is None else output.suffix.lower()
     if kind not in PAGES:
         raise UsageError(f"--output {output}: expected a name that ends in {' or '.join(PAGES)}")
-    check_outputs((folder / "designs.parquet", folder / "run.json"), (output, Mark.REPORT))
-    _, text = page(folder, kind, say)
+    check_outputs((folder / "designs.parquet",), (output, Mark.REPORT))
+    _, text = page(folder, kind)
     if output is None:
         put(text, end="")
     else:

@@ -27,10 +27,12 @@ from dpgcli.cli.options import (
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import ProblemFormat
+from dpgcli.cores import cores
 
 if TYPE_CHECKING:
     from dpgcli.api.sweep import Place
     from dpgcli.arrays import Columns
+    from dpgcli.reports.summary import DesignSpace
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict
@@ -50,7 +52,9 @@ Output = Annotated[  # as it is typed, for Make
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
+    typer.Option(
+        "-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: usable cores]"
+    ),
 ]
 Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
 Scheduler = Annotated[
@@ -167,7 +171,8 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
 
 def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
-    if executor is not ExecutorName.PROCESSES or jobs == 1 or folder.exists():
+    n_workers = jobs or cores().usable
+    if executor is not ExecutorName.PROCESSES or n_workers == 1 or folder.exists():
         return
     from dpgcli.sweeps.executors import start_fork_server
 
@@ -207,16 +212,31 @@ def _judge(
     from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements
 
-    designs, text = summarize(study.folder, is_new=is_new, say=say)
+    space, text = summarize(study.folder, is_new=is_new)
+    designs = space.designs
     if is_new and not quiet:
-        put(text, end="")
+        print_in_short(study.folder, space)
         if study.target_error is not None:
             say(_chosen(designs))
     verdicts: Sequence[RequirementVerdict] = check_requirements(designs, rules) if rules else ()
     print_verdicts(verdicts, ProblemFormat.TEXT)
     summary = text + ("\n" + verdicts_markdown(verdicts) if rules else "")
     is_written = summary_file is None or append_summary(summary_file, summary)
-    return int((designs["status"] == "failed").sum()), code_of(verdicts, is_written=is_written)
+    return len(space.of_status("failed")), code_of(verdicts, is_written=is_written)
+
+
+def print_in_short(folder: Path, space: "DesignSpace") -> None:
+    """Where the tables are, how many designs, the best and the worst of them."""
+    from dpgcli.cli.printing import print_grid
+    from dpgcli.reports.summary import in_short
+    from dpgcli.studies.sweep import REPORT
+
+    counts, table = in_short(space)
+    put(f"{folder}: {counts}; more in {folder / REPORT}")
+    if table.rows:
+        places = enumerate(table.head)
+        texts = {name: [row[place] for row in table.rows] for place, name in places}
+        print_grid(texts, left=table.head)
 
 
 def _chosen(designs: "Columns") -> str:

@@ -7,6 +7,7 @@ takes stays far from overflow; the linear stiffness, a stiff limit, may reach 1e
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,27 @@ SUFFIXES = {  # units in the names of keys
     "_deg": "°",
 }
 Sizes = Mapping[str, Array]
+LEAVE_ONE_OUT = "leave_one_out"  # instead of a model error: that of the calibration
+
+
+class Tolerance(NamedTuple):
+    """A standard uncertainty: in the unit of its key, or relative to its value."""
+
+    size: float
+    is_relative: bool
+
+    def of(self, values: Array) -> Array:
+        """The uncertainty of each value.
+
+        >>> Tolerance(0.1, True).of(np.array([26.0])), Tolerance(0.1, False).of(np.array([6.5]))
+        (array([2.6]), array([0.1]))
+        """
+        return self.size * np.real(values) if self.is_relative else np.full(values.shape, self.size)
+
+    def text(self, key: str) -> str:
+        """In words, for the key it is of."""
+        unit, size = ("%", 100.0 * self.size) if self.is_relative else (unit_of(key), self.size)
+        return f"{size:.6g} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -52,6 +74,7 @@ class Design:
 
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
+    `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
     """
 
     units: int
@@ -62,6 +85,8 @@ class Design:
     law: str | None = None
     gripper: Sizes = field(default_factory=dict)
     n_designs: int = 1
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
+    model_error: float | str | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -214,6 +239,15 @@ def agree(given: Array, derived: Array) -> Flags:
     first, second = np.real(given), np.real(derived)
     largest = np.maximum(np.abs(first), np.abs(second))
     return np.asarray(np.abs(first - second) <= AGREEMENT * largest)
+
+
+def without_unit(key: str) -> str:
+    """A key's name without its unit.
+
+    >>> without_unit("elastic_modulus_MPa"), without_unit("force_linearity")
+    ('elastic_modulus', 'force_linearity')
+    """
+    return next((key.removesuffix(suffix) for suffix in SUFFIXES if key.endswith(suffix)), key)
 
 
 def unit_of(key: str) -> str:

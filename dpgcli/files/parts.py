@@ -34,11 +34,12 @@ LISTS = ("states", "designs")
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT, N_DESIGNS = "dpg.fingerprint", "dpg.designs"
+BASE = "dpg.base"  # a name only: nothing depends on it
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
-    """The SHA-256 of a sweep's metadata."""
-    rest = {key: text for key, text in said.items() if key != FINGERPRINT}
+    """The SHA-256 of a sweep's metadata, but for the name of its base."""
+    rest = {key: text for key, text in said.items() if key not in (FINGERPRINT, BASE)}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 

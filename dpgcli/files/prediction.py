@@ -5,6 +5,7 @@ import json
 import platform
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
@@ -34,6 +35,8 @@ def write_prediction(
             "finger_solves": summary.n_finger_solves,
             "worst_residual_N": summary.residual,
             "worst_numerical_error_mm": summary.tip_error,
+            "model_error": prediction.plan.scene.model_error.text,
+            **_uncertainty(prediction),
             "seconds": summary.seconds,
             "cpu_seconds": summary.cpu_seconds,
             "machine": platform.machine(),
@@ -42,6 +45,15 @@ def write_prediction(
             "command": list(command),
         },
     )
+
+
+def _uncertainty(prediction: Prediction) -> dict[str, Any]:
+    """What uncertainties cover, and what the largest one is made of, if they are asked for."""
+    worst, known = prediction.summary.breakdown, prediction.plan.scene.uncertainty
+    if worst is None or known is None:
+        return {}
+    said = {"covers": known.covers, "largest_tip_mm": worst.total, "pattern": worst.pattern}
+    return {"uncertainty": {**said, "tip_by_cause_mm": dict(worst.shares)}}
 
 
 def check_facts(table: Path) -> None:
@@ -79,5 +91,7 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
         "dpg.sources": json.dumps(
             [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),
+        "dpg.model_error": plan.scene.model_error.text,
+        **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
         "dpg.versions": versions(),
     }

@@ -230,11 +230,6 @@ def _unboxed(column: Any) -> NDArray[Any]:
 READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
 
 
-def read_run(path: Path) -> dict[str, Any] | None:
-    """The facts of a run; None if there is no such file. Raises UsageError for other content."""
-    return _facts(path) if path.is_file() or path.is_dir() else None
-
-
 def _facts(path: Path) -> dict[str, Any]:
     try:
         with opened(path) as stream:

@@ -128,7 +128,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
                 f"tips {what}: {np.nanmax(relative):.3g} % of the deflection at worst, "
                 f"{np.nanmean(relative):.3g} % in the mean"
             )
-    left_out = 100.0 * study.left_out()
+    left_out = 100.0 * study.left_out
     if np.isfinite(left_out).any():
         yield (
             f"each state from the others alone: {np.nanmax(left_out):.3g} % at worst, "

@@ -1,4 +1,4 @@
-"""Figures of a design space: its main metrics over the first two swept values."""
+"""Figures of a design space: its metrics that vary, over the first two swept values."""
 
 from collections.abc import Sequence
 from html import escape
@@ -8,16 +8,9 @@ import numpy as np
 import pandas as pd
 
 from dpgcli.reports.drawing import own_figure, svg_text, titled
-from dpgcli.reports.summary import DesignSpace, is_alike
+from dpgcli.reports.summary import METRICS, STIFFEST, DesignSpace, bars_alone, is_alike
 
-DRAWN = (
-    "workspace_area_mm2",
-    "n_distinct_tips",
-    "reach_max_mm",
-    "stiffness_min_N_per_mm",
-    "min_barrier_mJ",
-    "aperture_max_mm",
-)
+COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
 FARTHEST = 1e100  # on an axis; rigid bars have an infinite stiffness
@@ -27,8 +20,9 @@ NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
 
 def figures(space: DesignSpace) -> str:
-    """Every main metric over the first two swept values, as one inline SVG."""
-    metrics = [name for name in DRAWN if name in space.designs and _varies(space, name)]
+    """Every metric that varies over the first two swept values, as one inline SVG."""
+    every_one = (*COUNTED, *METRICS)
+    metrics = [name for name in every_one if name in space.designs and _varies(space, name)]
     if not metrics or not space.swept:
         return "<p>No metric varies.</p>"
     designs = pd.DataFrame(space.designs)
@@ -46,6 +40,7 @@ def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> 
     with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
             axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
+            axes.set_title(titled(_title(space, metric)))
             _draw(axes, space, designs, metric)
         over = " and ".join(map(space.label, space.swept[:2]))
         what = ", ".join(map(space.label, metrics))
@@ -55,14 +50,27 @@ def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> 
 
 def _varies(space: DesignSpace, metric: str) -> bool:
     known = space.known(metric, space.usable)
+    if metric == STIFFEST:
+        known = known[~bars_alone(space, known)]
     return len(known) > 0 and not is_alike(space.designs[metric][known])
+
+
+def _title(space: DesignSpace, metric: str) -> str:
+    """What a map shows of designs that share a place; nothing where none do."""
+    if not (hidden := space.swept[2:]):
+        return ""
+    which = "largest" if METRICS.get(metric, True) else "nearest zero"
+    return f"{space.label(metric)}, {which} over {', '.join(map(space.label, hidden))}"
 
 
 def _caption(space: DesignSpace, every: int) -> str:
     is_line = len(space.swept) == 1
     text = "Designs without a state are left out." if is_line else "Gray: designs without a state."
-    if len(space.swept) > 2:
-        text += " Of designs that share a place, the largest value."
+    if hidden := space.swept[2:]:
+        rows = np.arange(len(space))
+        named = ", ".join(f"{space.label(name)} {space.span(name, rows)}" for name in hidden)
+        text += f" A place stands for all designs there, of every {named}: each map shows the best"
+        text += " value of these, as its title says."
     return text + (f" One design in {every:,} is drawn." if every > 1 else "")
 
 
@@ -70,7 +78,8 @@ def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> 
     """A line over one swept value; over two a map if they form a grid, else points."""
     designs = _ranked(designs, dict(zip(space.swept, (axes.xaxis, axes.yaxis), strict=False)))
     usable = designs[designs["n_stable"] > 0]
-    usable = usable.sort_values(metric, kind="stable")  # the largest is drawn last
+    merit = usable[metric] if METRICS.get(metric, True) else -usable[metric].abs()
+    usable = usable.loc[merit.sort_values(kind="stable").index]  # the best is drawn last
     first, *others = space.swept
     if not others:
         line = usable.sort_values(first, kind="stable")
@@ -83,7 +92,8 @@ def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> 
     is_large = len(designs) > MOST_VECTORS
     if _is_grid(space, designs):
         cells = designs.assign(**{metric: usable[metric]})
-        table = cells.groupby([second, first])[metric].max().unstack()
+        best = cells.loc[[*cells.index.difference(usable.index), *usable.index]]
+        table = best.groupby([second, first])[metric].last().unstack()
         drawn = axes.pcolormesh(
             table.columns, table.index, table.to_numpy(float), cmap="viridis", rasterized=is_large
         )

@@ -1,20 +1,21 @@
 """The summary of a design space: sections of text and tables, which `page` renders.
 
-Same table and facts, same sections: what differs between runs comes from the facts alone.
+Same table, same sections: what differs between runs is in run.json alone.
 """
 
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
+from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.design.scene import Origin
+from dpgcli.reports.base import bar_stiffness, base_lines
 from dpgcli.sweeps.gate import swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero
@@ -28,6 +29,8 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "aperture_max_mm": True,
     "aperture_min_mm": False,
 }
+SHORT_HEAD = ("metric", "best", "of design (best)", "worst", "of design (worst)")
+STIFFEST = "stiffness_max_N_per_mm"
 ERRORS = ("max_residual_N", "max_numerical_error_mm")
 STATUSES = ("stable", "partly_stable", "invalid", "excluded", "failed")
 BOUNDARY_STATUSES = ("stable", "partly_stable", "invalid")
@@ -37,7 +40,7 @@ WITHOUT_REASON = {
 }
 RELATIVE_EQUALITY = 1e-9  # relative
 MOST_ROWS = 30
-LONGEST_LIST = 500  # characters
+BARS_ALONE = 0.01  # relative: how close to k_L/n a stiffness shows nothing but the bars
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -57,10 +60,11 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """A table of designs with the units of its columns, and its numbers as text."""
+    """A table of designs with the units of its columns, its metadata, and its numbers as text."""
 
     designs: Columns
     units: Mapping[str, str]
+    metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.designs["design"])
@@ -118,19 +122,18 @@ class DesignSpace:
         return f"{words} ({unit})" if unit else words
 
 
-def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Section]:
-    """All sections about a space; `facts` are those of the run that made it."""
-    counted = Section("Design space", [_extent(space)])
+def sections(space: DesignSpace) -> list[Section]:
+    """All sections about a space, the best designs first."""
+    counted = Section("Design space", [_extent(space), *base_lines(space.metadata)])
     if not len(space):
-        return [counted, *_times(facts)]
+        return [counted]
     return [
         counted,
-        Section("Designs by status and calibration", [_counts(space)]),
         Section("Best and worst designs", _extremes(space)),
+        Section("Designs by status and calibration", [_counts(space)]),
         Section("What failed and why", _failures(space)),
         Section("Where bistability ends", _bistability(space)),
         Section("Largest numerical error", _errors(space)),
-        *_times(facts),
     ]
 
 
@@ -160,17 +163,25 @@ def _counts(space: DesignSpace) -> Table:
     return Table(head, rows)
 
 
-def _extremes(space: DesignSpace) -> list[str | Table]:
+class Extreme(NamedTuple):
+    """The best or the worst of a metric: which of both, the row, and how many more are alike."""
+
+    metric: str
+    word: str
+    row: int
+    n_more: int
+
+
+def extremes(space: DesignSpace) -> list[Extreme]:
+    """Best and worst designs by metric."""
     metrics = {name: order for name, order in METRICS.items() if name in space.designs}
-    rows = [row for name, order in metrics.items() for row in _extreme_rows(space, name, order)]
-    small = [name for name, is_largest_best in metrics.items() if not is_largest_best]
-    text = "The largest value counts as best"
-    text += f", of {' and '.join(small)} the one nearest zero." if small else "."
-    return [text, Table(["metric", "", "value", "design", *space.swept], rows)]
+    return [found for name, order in metrics.items() for found in _extremes_of(space, name, order)]
 
 
-def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[list[str]]:
+def _extremes_of(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[Extreme]:
     rows = space.known(name, space.usable)
+    if name == STIFFEST:
+        rows = rows[~bars_alone(space, rows)]
     if not len(rows):
         return
     values = space.designs[name][rows]
@@ -180,9 +191,58 @@ def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Itera
         ends = {"all alike": merit.max()}
     for word, end in ends.items():
         first, *others = rows[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
-        more = f" and {len(others):,} more" if others else ""
-        value = space.shown(name, space.designs[name][first])
-        yield [name, word, value, space.number(first) + more, *space.point(first)]
+        yield Extreme(name, word, int(first), len(others))
+
+
+def bars_alone(space: DesignSpace, rows: Indices) -> Flags:
+    """Rows whose largest stiffness is that of the straight finger's bars in series, k_L/n.
+
+    It says what was assumed of the bars, and nothing of the design.
+    """
+    bars = space.designs.get(LINEAR_STIFFNESS)
+    stiffness = bar_stiffness(space.metadata) if bars is None else bars[rows]
+    in_series = stiffness / space.designs["n_units"][rows]
+    return np.isclose(space.designs[STIFFEST][rows], in_series, rtol=BARS_ALONE, atol=0)
+
+
+def in_short(space: DesignSpace) -> tuple[str, Table]:
+    """How many designs there are of each status, and the best and the worst of each metric."""
+    counts = {status: len(space.of_status(status)) for status in STATUSES}
+    listed = ", ".join(f"{n:,} {status}" for status, n in counts.items() if n)
+    rows: dict[str, list[str]] = {}
+    for name, _, row, n_more in extremes(space):
+        more = f" and {n_more:,} more" if n_more else ""
+        cells = (space.shown(name, space.designs[name][row]), space.number(row) + more)
+        rows.setdefault(name, [name]).extend(cells)
+    filled = [[*cells, "all alike", ""][: len(SHORT_HEAD)] for cells in rows.values()]
+    return f"{len(space):,} designs: {listed or 'none'}", Table(SHORT_HEAD, filled)
+
+
+def _extremes(space: DesignSpace) -> list[str | Table]:
+    rows = []
+    for name, word, row, n_more in extremes(space):
+        more = f" and {n_more:,} more" if n_more else ""
+        value = space.shown(name, space.designs[name][row])
+        rows.append([name, word, value, space.number(row) + more, *space.point(row)])
+    small = [name for name, largest in METRICS.items() if not largest and name in space.designs]
+    text = "The largest value counts as best"
+    text += f", of {' and '.join(small)} the one nearest zero." if small else "."
+    return [
+        text,
+        *_left_out(space),
+        Table(["metric", "", "value", "design", *space.swept], rows),
+    ]
+
+
+def _left_out(space: DesignSpace) -> Iterator[str]:
+    """What is not ranked, since it only shows an assumption."""
+    rows = space.known(STIFFEST, space.usable) if STIFFEST in space.designs else np.zeros(0, int)
+    if len(rows) and (n_alone := int(bars_alone(space, rows).sum())):
+        which = "any design" if n_alone == len(rows) else f"{n_alone:,} designs"
+        yield (
+            f"{STIFFEST} is not ranked for {which}: it is that of the straight finger's bars, "
+            "k_L/n, whose stiffness is assumed unless it was measured."
+        )
 
 
 def is_alike(values: Any) -> bool:
@@ -270,21 +330,6 @@ def _errors(space: DesignSpace) -> list[str | Table]:
             value = space.shown(name, values[row])
             rows.append([name, value, space.number(row), *space.point(row)])
     return [Table(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]
-
-
-def _times(facts: Mapping[str, Any] | None) -> list[Section]:
-    rows = [[key.replace("_", " "), _fact(key, value)] for key, value in (facts or {}).items()]
-    return [Section("The run", [Table(["", "value"], rows)])] if rows else []
-
-
-def _fact(key: str, value: Any) -> str:
-    if isinstance(value, list):
-        text = shlex.join(map(str, value)) or "none"
-        return text if len(text) < LONGEST_LIST else f"{text[:LONGEST_LIST]} …"
-    if isinstance(value, dict):
-        return ", ".join(f"{name}: {_fact(name, part)}" for name, part in value.items())
-    unit = " s" if key.endswith("seconds") else "/s" if key.endswith("_per_second") else ""
-    return (f"{value:.5g}" if isinstance(value, float) else str(value)) + unit
 
 
 def shortened(table: Table, n_rows: int) -> list[str | Table]:

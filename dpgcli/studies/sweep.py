@@ -11,7 +11,7 @@ from time import perf_counter
 
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
-from dpgcli.files.parts import FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
+from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
@@ -98,7 +98,7 @@ class Study:
             "dpg.versions": versions(),
             "dpg.code": HERE.code,
         }
-        return {**said, FINGERPRINT: fingerprint(said)}
+        return {**said, BASE: self.sweep.base_path.name, FINGERPRINT: fingerprint(said)}
 
     @property
     def _exactness(self) -> dict[str, str]:

@@ -118,7 +118,7 @@ def test_the_schema_accepts_every_example(call: Call, path: Path) -> None:
     "spec",
     [
         {},
-        {"finger": {"units": 3}},
+        {"finger": {"linear_stiffness_N_per_mm": 1e4}},
         {"finger": {"units": 0, "linear_stiffness_N_per_mm": 1e4}},
         {"finger": {"units": 3, "linear_stiffness_N_per_mm": "1e4"}},
         {"finger": {"units": 3, "linear_stiffness_N_per_mm": 1e4, "bogus": 1}},

@@ -2,7 +2,6 @@
 
 import datetime
 import io
-import json
 import tracemalloc
 from decimal import Decimal
 from pathlib import Path
@@ -16,7 +15,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
-from dpgcli.files.table_reader import read_designs, read_record, read_run
+from dpgcli.files.table_reader import read_designs, read_record
 
 N = 4
 COLUMNS: dict[str, Any] = {
@@ -175,12 +174,5 @@ def test_a_column_twice(tmp_path: Path) -> None:
 def test_facts_that_are_nested_deeply(tmp_path: Path, level: str, depth: int) -> None:
     end = "]" if level == "[" else "}"
     (tmp_path / "run.json").write_text('{"rows": ' + level * depth + "1" + end * depth + "}")
-    for reader in (read_run, read_record):
-        with pytest.raises(UsageError, match=r"run\.json"):
-            reader(tmp_path / "run.json")
-
-
-def test_facts_are_a_few_levels_deep(tmp_path: Path) -> None:
-    facts = {"states": {"stable": 8}, "command": ["dpg"]}
-    (tmp_path / "run.json").write_text(json.dumps(facts))
-    assert read_run(tmp_path / "run.json") == facts
+    with pytest.raises(UsageError, match=r"run\.json"):
+        read_record(tmp_path / "run.json")

@@ -27,7 +27,7 @@ from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted
+from dpgcli.files.calibration.results import finger_method, fitted, judged, quality_of
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
@@ -84,6 +84,7 @@ def fit_finger(
         found,
         {
             **fitted(found, FINGER_UNITS[met], source, only_free=True),
+            "quality": judged(study, quality_of(found, FINGER_UNITS[met])),
             "method": finger_method(study, found, bootstrap, seed),
             "geometry": where,
         },

@@ -35,6 +35,15 @@ def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) ->
     }
 
 
+def judged(study: FingerFit, quality: Quality) -> Quality:
+    """The quality of a finger's fit, with the errors of states predicted from the others."""
+    known = study.left_out[np.isfinite(study.left_out)]
+    if not len(known):
+        return quality
+    errors = {"left_out_rms": float(np.sqrt((known**2).mean())), "left_out_largest": known.max()}
+    return quality.model_copy(update={key: float(error) for key, error in errors.items()})
+
+
 def method_of(what: str, fit: Fit, resamples: int, seed: int) -> str:
     """The method of a fit in one line."""
     text = f"least squares on the {what}, {fit.loss} loss"

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.design import dimensions
@@ -16,6 +16,7 @@ from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
+from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
     BarStiffness,
     Geometry,
@@ -26,7 +27,6 @@ from dpgcli.files.sections import (
     UnitLattice,
 )
 
-BARS: list[JsonValue] = [{"required": ["linear_stiffness_N_per_mm"]}, {"required": ["calibration"]}]
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
 
 
@@ -40,14 +40,13 @@ class UnitOverride(Section):
 class FingerSpec(Section):
     """One finger."""
 
-    model_config = ConfigDict(json_schema_extra={"anyOf": BARS})
-
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."
     )
     linear_stiffness_N_per_mm: BarStiffness | None = Field(
         default=None,
-        description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid.",
+        description="Stiffness k_L of every bar, in N/mm: 1e4 unless given or calibrated; "
+        ".inf makes the bars rigid.",
     )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,
@@ -106,6 +105,14 @@ class Spec(Section):
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+    uncertainty: Tolerances | None = Field(
+        default=None, description="Standard uncertainties of values, as tolerances of the mold."
+    )
+    model_error: ModelErrorSpec = Field(
+        default=None,
+        description="Standard uncertainty of the model itself: a percentage of the deflection, or "
+        "leave_one_out, that of the calibration.",
+    )
     data: DataSpec | None = Field(default=None, description="The frame of data about the finger.")
 
     @cached_property
@@ -118,6 +125,7 @@ class Spec(Section):
         """The spec as a batch of one design."""
         finger = self.finger
         bars = finger.linear_stiffness_N_per_mm
+        said = self.model_error
         return Design(
             finger.units,
             _section(finger),
@@ -126,6 +134,8 @@ class Spec(Section):
             finger.calibrations,
             finger.law,
             _sizes(self.gripper),
+            tolerances={} if self.uncertainty is None else self.uncertainty.by_key,
+            model_error=said if (share := share_of(said)) is None else share,
         )
 
 
