@@ -22,7 +22,7 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
 from dpgcli.cli.progress import under_way
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.benchmark.bench import Row
@@ -132,7 +132,7 @@ def bench(
 def _tell(printed_as: Format, line: str) -> None:
     """A finding: with the tables for people, beside the data for programs."""
     if printed_as is Format.TABLE:
-        print(line)
+        put(line)
     else:
         say(line)
 
@@ -153,14 +153,14 @@ def _print_tables(rows: "Sequence[Row]") -> None:
         own = [row for row in rows if row["group"] == group]
         if own:
             names = SHOWN.get(group, SHOWN["ladder"])
-            print(f"{title}\n")
+            put(f"{title}\n")
             print_grid(
                 {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
                 left=("method",),
             )
-            print()
-    print("\n".join(text_figure(rows)))
+            put("")
+    put("\n".join(text_figure(rows)))
 
 
 def _cell(row: "Row", name: str) -> str:

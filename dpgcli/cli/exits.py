@@ -148,7 +148,7 @@ def _code_of(app: Callable[..., object]) -> int:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
         if type(error).__name__ == "NoArgsIsHelpError":
-            print(error, file=sys.stderr)
+            say(str(error))
         else:
             say(f"dpg: {refusal(error)}")
         return ExitCode.USAGE
@@ -205,5 +205,5 @@ def _ignore_further_signals() -> None:
 
 
 def _internal_error() -> NoReturn:
-    traceback.print_exc()
+    say(traceback.format_exc().rstrip())
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")
