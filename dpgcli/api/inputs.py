@@ -13,6 +13,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias, TypeVar
 
+from dpgcli.calibration.choices import MOST_RESAMPLES
 from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
@@ -45,6 +46,7 @@ Place: TypeAlias = Sequence[float] | None
 """Two numbers in mm; None where somebody else says them."""
 
 ORIGINS = ("as given", "from the data's header", "from the spec")
+NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
 FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
@@ -104,7 +106,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
         name, own = str(spec), (path_of("spec", spec),)
         document = read_scene(spec, setting_texts(settings))
     found = checked(document)
-    return SceneInput(name, scene_of(found), found, document, (*own, *document.files))
+    return SceneInput(name, scene_of(found), found, document, files_of(*own, *document.files))
 
 
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
@@ -173,7 +175,7 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def path_of(field: str, path: str | os.PathLike[str]) -> Path:
-    """The path of a file or folder. Raises UsageError for what is none.
+    """The path of a file or folder. Raises UsageError for what is none, or no system can name.
 
     >>> path_of("spec", None)
     Traceback (most recent call last):
@@ -181,9 +183,18 @@ def path_of(field: str, path: str | os.PathLike[str]) -> Path:
     dpgcli.errors.UsageError: spec None: expected a path
     """
     try:
-        return Path(path)
-    except TypeError:
-        raise UsageError(Field(field), f" {path!r}: expected a path") from None
+        found = Path(path)
+        is_name = b"\0" not in os.fsencode(found)
+    except (TypeError, UnicodeEncodeError):  # half of a pair in UTF-16
+        is_name = False
+    if not is_name:
+        raise UsageError(Field(field), f" {path!r}: expected a path")
+    return found
+
+
+def files_of(*sources: object) -> tuple[Path, ...]:
+    """Those of the sources that are files, wherever the program works by the time of writing."""
+    return tuple(Path(s).absolute() for s in sources if isinstance(s, str | os.PathLike))
 
 
 def check_numbers(**values: float | None) -> None:
@@ -274,12 +285,22 @@ def figure_path(path: str | Path) -> Path:
     return figure
 
 
+def table_path(path: str | Path) -> Path:
+    """The path of a Parquet file. Raises UsageError for a suffix that says something else."""
+    table = path_of("path", path)
+    if table.suffix.lower() in NO_TABLE:
+        raise UsageError(f"path {path}: writes Parquet, give a name that ends in .parquet")
+    return table
+
+
 def check_resampling(bootstrap: int, seed: int) -> None:
-    """Raise UsageError for numbers of samples, or seeds, below zero."""
+    """Raise UsageError for a number of samples, or a seed, that is none; or of too many samples."""
     check_whole(bootstrap=bootstrap, seed=seed)
     for field, value in (("bootstrap", bootstrap), ("seed", seed)):
         if value < 0:
             raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
+    if bootstrap > MOST_RESAMPLES:
+        raise UsageError(Field("bootstrap"), f" {bootstrap}: expected at most {MOST_RESAMPLES:,}")
 
 
 def check_installed(what: str, package: str) -> None:

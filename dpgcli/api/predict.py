@@ -15,6 +15,7 @@ from dpgcli.api.inputs import (
     figure_path,
     path_of,
     scene_input,
+    table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
@@ -69,13 +70,15 @@ class PredictResult:
     def save(self, path: str | Path) -> None:
         """Write the states to a Parquet file, the bytes of `dpg predict --output`.
 
-        What differs between runs goes into a `.run.json` beside it. Raises OutputError.
+        What differs between runs goes into a `.run.json` beside it. Raises OutputError, and
+        UsageError for a file that the states come from, or a name of another format.
         """
         from dpgcli.files.output import Mark, check_outputs, run_file
-        from dpgcli.files.prediction import write_prediction
+        from dpgcli.files.prediction import check_facts, write_prediction
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE), (run_file(table), Mark.FACTS))
+        check_facts(table_path(table))
         write_prediction(self.prediction, table, self.given.json, self.blocks)
 
     def draw(self, path: str | Path, *, overlay: bool = False) -> None:

@@ -10,8 +10,8 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_installed,
-    path_of,
     scene_input,
+    table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, NothingSelectedError, UsageError
@@ -46,7 +46,7 @@ class StressResult:
 
     def save(self, path: str | Path) -> None:
         """Write every case to a Parquet file."""
-        write_stress(path_of("path", path), self.outcomes, self.spec_json)
+        write_stress(table_path(path), self.outcomes, self.spec_json)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
+from dpgcli.cores import cores
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.frames import frame_of
@@ -51,7 +51,6 @@ from dpgcli.temporary import temporary_folder
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
-ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 
 @dataclass(frozen=True)
@@ -258,8 +257,8 @@ class Place:
             raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
-        if self.scheduler is not None and re.fullmatch(ADDRESS, self.scheduler) is None:
-            raise UsageError(scheduler, f" {self.scheduler}: expected tcp://host:port")
+        if self.scheduler is not None:
+            cluster.check_address(self.scheduler)
         if self.scheduler is None and self.wait is not None:
             raise UsageError(Field("wait"), " is for the workers of ", dask, " dask")
 
@@ -272,7 +271,7 @@ class Place:
         """The workers, found or about to be started; `say` hears of those that are waited for."""
         if self.scheduler is not None:
             return self._cluster(self.scheduler, say)
-        n_workers = self.jobs or os.cpu_count() or 1
+        n_workers = self.jobs or cores().usable
         if self.executor == "serial" or n_workers == 1:
             return executors.serial()
         return executors.processes(n_workers)

@@ -8,6 +8,7 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
     "stroke_mm",
 )
 
+MOST_RESAMPLES = 100_000  # of a bootstrap: minutes
 FITTED_BY_DEFAULT = "segment_height_mm"  # what is fitted to known states if nothing is named
 
 

@@ -1,8 +1,7 @@
 """`dpg bench`: error against run time, on the user's own finger."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +20,7 @@ from dpgcli.cli.options import (
     target_in_mm,
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def bench(
     outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_outputs([*sources, *given.files], *outputs)
     frame = frame_of(first_station, tip_offset)
-    with _watching(quiet) as watch:
+    with under_way("bench", quiet=quiet) as say_that:
         found = bench(
             given,
             repeats=repeats,
@@ -118,7 +118,7 @@ def bench(
             first_station=frame[0],
             tip_offset=frame[1],
             compare=compare,
-            watch=watch,
+            watch=lambda row: say_that(f"measured: {row['group']}: {row['way']}"),
         )
     command = ("dpg", *sys.argv[1:])
     if output is not None:
@@ -130,20 +130,6 @@ def bench(
     _print(printed_as, found.rows)
     for line in found.findings:
         _tell(printed_as, line)
-
-
-@contextmanager
-def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
-    """Name each row on a terminal as it is measured."""
-    interactive = sys.stderr.isatty() and not quiet
-
-    def show(row: "Row") -> None:
-        if interactive:
-            print(f"\r{row['group']}: {row['method']}"[:70].ljust(71), end="\r", file=sys.stderr)
-
-    yield show
-    if interactive:
-        print(" " * 71, end="\r", file=sys.stderr)
 
 
 def _tell(printed_as: Format, line: str) -> None:

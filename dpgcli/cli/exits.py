@@ -1,5 +1,6 @@
 """How a command ends: exit codes, and what becomes of each kind of error."""
 
+import errno
 import functools
 import gc
 import signal
@@ -27,11 +28,14 @@ from dpgcli.errors import (
     WorkplaceError,
 )
 from dpgcli.signals import STOP_SIGNALS
+from dpgcli.temporary import working_folder_is_gone
 
 P = ParamSpec("P")
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
+# open files, disk, processes, memory
+EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
 MOST_PROBLEMS = 10  # that are shown
 
 
@@ -75,7 +79,8 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
             fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
-        except Exception:
+        except Exception as error:
+            _fail_if_refused(error)
             _internal_error()
 
     return run
@@ -95,6 +100,14 @@ def fail(code: ExitCode, message: str) -> NoReturn:
     for line in with_options(message).split("\n") if message else ():
         say(f"dpg: {line}")
     raise typer.Exit(code)
+
+
+def _fail_if_refused(error: Exception) -> None:
+    """End where it is no bug: the working folder was deleted, or the system has run out of it."""
+    if isinstance(error, OSError) and working_folder_is_gone():
+        fail(ExitCode.USAGE, "the working folder was deleted: change to one that is there")
+    if isinstance(error, OSError) and error.errno in EXHAUSTED:
+        fail(ExitCode.USAGE, f"the system refuses: {error}")
 
 
 def check_failed(n_failed: int, max_failed: int) -> None:

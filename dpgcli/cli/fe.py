@@ -11,6 +11,7 @@ import typer
 
 from dpgcli.cli.commands import add_command
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
@@ -177,7 +178,8 @@ def _carry_out(
             return
         start = time.monotonic()
         try:
-            finding = studies.run(model, folder, limits)
+            with under_way(f"ccx on {deck}", quiet=quiet):
+                finding = studies.run(model, folder, limits)
         finally:
             put(str(deck))
         put(str(curve))

@@ -40,16 +40,30 @@ if TYPE_CHECKING:
 BRAILLE = "\u28ff"
 
 
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
+]
+PrintedAs = Annotated[
+    Format | None,
+    typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
+]
+Overlay = Annotated[
+    bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
+]
+Sketch = Annotated[
+    bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
+]
+
+
 def predict(
     spec: SpecPath,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
-    ] = None,
-    printed_as: Annotated[
-        Format | None,
-        typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
-    ] = None,
+    output: Output = None,
+    printed_as: PrintedAs = None,
     patterns: Patterns = None,
     settings: Settings = None,
     columns: ColumnNames = "default",
@@ -58,16 +72,9 @@ def predict(
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
-    ] = None,
-    overlay: Annotated[
-        bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
-    ] = False,
-    sketch: Annotated[
-        bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
-    ] = False,
+    plot: Plot = None,
+    overlay: Overlay = False,
+    sketch: Sketch = False,
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
@@ -161,26 +168,13 @@ def _check_sketch(printed_as: Format | None, n_states: int) -> None:
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.files.output import Mark, check_outputs, run_file
+    from dpgcli.files.prediction import check_facts
 
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
-    if output is not None and beside is not None:
-        _check_whose(beside, output)
-
-
-def _check_whose(beside: Path, output: Path) -> None:
-    """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
-    import json
-
-    from dpgcli.errors import UsageError
-
-    try:
-        table = json.loads(beside.read_bytes())["table"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
-        return
-    if table != output.name and (output.parent / str(table)).is_file():
-        raise UsageError(f"{beside} has the facts of {table}: give another name")
+    if output is not None:
+        check_facts(output)
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:

@@ -27,6 +27,7 @@ from dpgcli.cli.options import (
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import ProblemFormat
+from dpgcli.cores import cores
 
 if TYPE_CHECKING:
     from dpgcli.api.sweep import Place
@@ -51,7 +52,9 @@ Output = Annotated[  # as it is typed, for Make
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
+    typer.Option(
+        "-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: usable cores]"
+    ),
 ]
 Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
 Scheduler = Annotated[
@@ -168,7 +171,8 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
 
 def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
-    if executor is not ExecutorName.PROCESSES or jobs == 1 or folder.exists():
+    n_workers = jobs or cores().usable
+    if executor is not ExecutorName.PROCESSES or n_workers == 1 or folder.exists():
         return
     from dpgcli.sweeps.executors import start_fork_server
 

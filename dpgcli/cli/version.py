@@ -35,7 +35,7 @@ def _surroundings() -> Iterator[str]:
     quota = "no quota" if found.quota is None else f"a quota of {found.quota:g}"
     yield (
         f"cores: {found.present} in all, {found.allowed} by affinity, {quota}: "
-        f"dpg sweep starts {found.usable} workers"
+        f"dpg sweep starts {found.usable} worker{'s' * (found.usable != 1)}"
     )
     yield f"temporary files: {_temporary_folder()}"
     for extra, packages in _extras().items():

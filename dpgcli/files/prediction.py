@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.arrays import Columns
+from dpgcli.errors import UsageError
 from dpgcli.files.output import run_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
@@ -53,6 +54,17 @@ def _uncertainty(prediction: Prediction) -> dict[str, Any]:
         return {}
     said = {"covers": known.covers, "largest_tip_mm": worst.total, "pattern": worst.pattern}
     return {"uncertainty": {**said, "tip_by_cause_mm": dict(worst.shares)}}
+
+
+def check_facts(table: Path) -> None:
+    """Raise UsageError where those of another table would go: t and t.parquet share one name."""
+    beside = run_file(table)
+    try:
+        other = json.loads(beside.read_bytes())["table"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
+        return
+    if other != table.name and (table.parent / str(other)).is_file():
+        raise UsageError(f"{beside} has the facts of {other}: give another name")
 
 
 def write_states(

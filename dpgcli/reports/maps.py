@@ -13,6 +13,8 @@ from dpgcli.reports.summary import METRICS, STIFFEST, DesignSpace, bars_alone, i
 COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
+FARTHEST = 1e100  # on an axis; rigid bars have an infinite stiffness
+MOST_TICKS = 8  # with a text each
 NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 
@@ -74,6 +76,7 @@ def _caption(space: DesignSpace, every: int) -> str:
 
 def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> None:
     """A line over one swept value; over two a map if they form a grid, else points."""
+    designs = _ranked(designs, dict(zip(space.swept, (axes.xaxis, axes.yaxis), strict=False)))
     usable = designs[designs["n_stable"] > 0]
     merit = usable[metric] if METRICS.get(metric, True) else -usable[metric].abs()
     usable = usable.loc[merit.sort_values(kind="stable").index]  # the best is drawn last
@@ -81,7 +84,7 @@ def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> 
     if not others:
         line = usable.sort_values(first, kind="stable")
         axes.plot(line[first], line[metric], "o-", color="#31688e", ms=3, lw=1)
-        axes.set_ylabel(space.label(metric))
+        axes.set_ylabel(titled(space.label(metric)))
         axes.grid(visible=True, alpha=0.25)
         return
     second = others[0]
@@ -101,7 +104,18 @@ def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> 
         drawn = axes.scatter(
             usable[first], usable[second], 14, usable[metric], cmap="viridis", rasterized=is_large
         )
-    axes.figure.colorbar(drawn, label=space.label(metric))
+    axes.figure.colorbar(drawn, label=titled(space.label(metric)))
+
+
+def _ranked(designs: pd.DataFrame, axes: dict[str, Any]) -> pd.DataFrame:
+    """Designs for axes of these columns: where a value is too far away, all stand a step apart."""
+    for name, axis in axes.items():
+        known = np.unique(designs[name].dropna())
+        if len(known) and max(-known[0], known[-1]) > FARTHEST:
+            designs = designs.assign(**{name: designs[name].rank(method="dense") - 1.0})
+            places = np.unique(np.linspace(0, len(known) - 1, MOST_TICKS).astype(int))
+            axis.set_ticks(places, [f"{value:.5g}" for value in known[places]])
+    return designs
 
 
 def _is_grid(space: DesignSpace, designs: pd.DataFrame) -> bool:

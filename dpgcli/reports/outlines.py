@@ -64,6 +64,7 @@ class Profile:
         )
         axis = float(finger.segment_height[0, 0])
         layer = LAYER * axis if scene.layer_thickness is None else float(scene.layer_thickness)
+        layer = min(layer, axis)  # a thicker one would hide the chambers
         known = scene.chambers or Chambers(*np.full((3, 1), np.nan))
         gap = _known(known.gap, GAP * length)
         dome = _known(known.dome_height, gap + stroke)

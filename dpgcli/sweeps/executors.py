@@ -33,7 +33,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import Field, WorkplaceError
 from dpgcli.signals import STOP_SIGNALS
-from dpgcli.temporary import temporary_folder
+from dpgcli.temporary import temporary_folder, working_folder_is_gone
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -249,24 +249,42 @@ def process_pool(n_workers: int) -> Executor:
 
     method = "forkserver" if _has_fork_server() else "spawn"
     start_fork_server()
-    return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
+    with _refusals_said(", for semaphores (/dev/shm on Linux)"):
+        return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
 
 
 def start_fork_server(*modules: str) -> None:
     """Start the process that workers are forked from; it imports these modules once for all.
 
     Called early, it does so while this process is still busy with imports of its own. On Windows
-    there is none, and every worker imports for itself.
+    there is none, and every worker imports for itself. Raises WorkplaceError where it cannot be.
     """
     if not _has_fork_server():
         return
-    _own_temporary_folder()
-    if modules:
-        from multiprocessing import forkserver
+    with _refusals_said():
+        _own_temporary_folder()
+        if modules:
+            from multiprocessing import forkserver
 
-        forkserver.set_forkserver_preload(list(modules))
-    with _safe_path():
-        _ensure_fork_server()
+            forkserver.set_forkserver_preload(list(modules))
+        with _safe_path():
+            _ensure_fork_server()
+
+
+@contextmanager
+def _refusals_said(purpose: str = "") -> Iterator[None]:
+    """Raise WorkplaceError for what the system refuses to a pool: semaphores, sockets, a place.
+
+    One process alone needs none of it.
+    """
+    try:
+        yield
+    except (OSError, ImportError, NotImplementedError) as error:
+        why = f"{getattr(error, 'strerror', None) or error}{purpose}"
+        if working_folder_is_gone():
+            why = "the working folder was deleted; change to one that is there"
+        said = f"workers cannot be started: {why}. Without workers: "
+        raise WorkplaceError(said, Field("jobs"), " 1") from error
 
 
 def _ensure_fork_server() -> None:
@@ -315,19 +333,13 @@ def _has_fork_server() -> bool:
 
 @cache
 def _own_temporary_folder() -> None:
-    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
-
-    Raises WorkplaceError where there can be no temporary files.
-    """
+    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left."""
     from multiprocessing import current_process
 
-    try:
-        place = tempfile.gettempdir()
-        place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
-        held = ExitStack()
-        folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
-    except OSError as error:
-        raise WorkplaceError(f"no folder for temporary files: {error}") from error
+    place = tempfile.gettempdir()
+    place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
+    held = ExitStack()
+    folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
     atexit.register(held.close)
     vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
 

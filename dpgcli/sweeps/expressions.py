@@ -202,7 +202,10 @@ def _dotted(node: ast.expr) -> str:
 
 
 def _as_number(value: Any) -> Any:
-    """Truths count as 0 and 1, and whole numbers do not overflow."""
+    """Truths count as 0 and 1, and whole numbers do not overflow.
+
+    Of a truth NumPy would find functions in half precision.
+    """
     return np.multiply(value, 1.0)
 
 
@@ -213,8 +216,9 @@ def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
     if name := _dotted(node):
         return values[name]
     parts = [_value(part, values, undefined) for part in _parts(node)]
-    if isinstance(node, ast.BinOp):
+    if isinstance(node, ast.BinOp | ast.Call):
         parts = list(map(_as_number, parts))
+    if isinstance(node, ast.BinOp):
         return _defined(_ARITHMETIC[type(node.op)](*parts), parts, undefined)
     if isinstance(node, ast.UnaryOp):
         operand = parts[0] if isinstance(node.op, ast.Not) else _as_number(parts[0])

@@ -94,10 +94,8 @@ def start(folder: Path) -> Iterator[Start]:
     started: list[subprocess.Popen[bytes]] = []
 
     def launch(*arguments: str, **options: Any) -> "subprocess.Popen[bytes]":
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        process = subprocess.Popen(
-            [*PROGRAM, *arguments], cwd=folder, env=surroundings(), **{**pipes, **options}
-        )
+        usual = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": surroundings()}
+        process = subprocess.Popen([*PROGRAM, *arguments], cwd=folder, **{**usual, **options})
         started.append(process)
         return process
 

@@ -212,3 +212,11 @@ def test_a_data_frame_is_read_as_it_is() -> None:
     assert sheet.cells("a") == ["0,5", "1,5"]
     with pytest.raises(SpecError, match="write a decimal point"):
         sheet.numbers(["a"])
+
+
+def test_the_titles_that_are_shown_are_those_above_the_longest_table(read: Read) -> None:
+    rows = "".join(f"{n};{n / 10};{n}\n" for n in range(9))
+    text = f"Name;Max\nA;4\nB;5\n\nTime;Ext (mm);Load (N)\ns;mm;N\n{rows}"
+    assert "found Time, Ext (mm), Load (N) (--column" in problems(read, text, Choice())[0].replace(
+        "(column", "(--column"
+    )

@@ -105,6 +105,14 @@ def test_a_lattice_alone_has_the_proportions_of_the_study() -> None:
     assert "proportions of the study" in notes(spec("eight_unit"))[0]
 
 
+def test_sizes_that_do_not_fit_still_give_a_shape() -> None:
+    """A layer thicker than the fingers, gaps longer than their units: the lattice allows both."""
+    scene = spec("eight_unit", geometry__limiting_layer_thickness_mm=80)
+    assert polygon(shape_of(scene, "0" * 8).chambers[0]).area > 1.0
+    scene = spec("eight_unit", geometry__unit_separation_mm=50)
+    assert polygon(shape_of(scene, "0" * 8).chambers[0]).area > 1.0
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3])
 def test_pictures_scale_with_their_finger(
     reference_finger: Callable[..., Finger], scale: float

@@ -240,3 +240,18 @@ def test_python_s_names_of_syntax_are_never_shown() -> None:
         with pytest.raises(ExpressionError, match=r"not an expression|only numbers") as refused:
             expression(text)
         assert not re.search("Op|Subscript|IfExp|Lambda|List|Is|In|Joined", str(refused.value))
+
+
+@pytest.mark.parametrize(
+    "text", ["100 * exp(a > 1)", "exp(flag) * 100", "sqrt(a > 1) + exp(1) * 100 - 1"]
+)
+def test_functions_of_truths_are_of_full_precision(text: str) -> None:
+    values = {"a": np.array([2.5, 3.0]), "flag": np.array([True, True])}
+    found = expression(text)(values)
+    assert found.dtype == np.float64
+    assert found == pytest.approx(100 * math.e, rel=1e-15)
+
+
+def test_a_threshold_on_a_function_of_a_truth() -> None:
+    """In half precision e is 2.719: the other verdict."""
+    assert bool(expression("100 * exp(height_mm > 1) <= 271.83")({"height_mm": 6.5}))

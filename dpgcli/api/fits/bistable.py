@@ -21,6 +21,7 @@ from dpgcli.api.inputs import (
     check_positive,
     check_resampling,
     chosen,
+    files_of,
     table_choice,
 )
 from dpgcli.calibration import bistable
@@ -97,7 +98,7 @@ def fit_bistable(
     )
     check_loss(choice.loss, loss_scale)
     found = bistable.fit_bistable(measured.curve, choice)
-    return _result(found, choice, where, measured, name_of(curve))
+    return _result(found, choice, where, measured, name_of(curve), files_of(curve, spec))
 
 
 def _result(
@@ -106,6 +107,7 @@ def _result(
     where: Geometry | None,
     measured: Measured,
     name: str,
+    files: tuple[Path, ...],
 ) -> FitResult[BistableFit]:
     source = DataFile(file=name, sha256=measured.sha256, rows=found.fit.n_points)
     return fit_result(
@@ -120,6 +122,7 @@ def _result(
         partial(bistable_summary, found, choice),
         warned((*measured.notes, *found.warnings), where, measured.ignored),
         partial(draw_fit, bistable_figure(found, choice, name)),
+        files=files,
     )
 
 

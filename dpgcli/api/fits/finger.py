@@ -18,6 +18,7 @@ from dpgcli.api.inputs import (
     as_texts,
     check_resampling,
     chosen,
+    files_of,
     frame_of,
     scene_input,
 )
@@ -91,4 +92,5 @@ def fit_finger(
         partial(finger_summary, study, found),
         (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),
         partial(draw_fitted, study, found, name),
+        files=(*given.files, *files_of(states)),
     )

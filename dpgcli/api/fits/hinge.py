@@ -13,7 +13,7 @@ from dpgcli.api.fits.result import (
     geometry_from,
     warned,
 )
-from dpgcli.api.inputs import Texts, check_resampling, chosen, table_choice
+from dpgcli.api.inputs import Texts, check_resampling, chosen, files_of, table_choice
 from dpgcli.calibration import hinge
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.hinge import HingeFit
@@ -73,4 +73,5 @@ def fit_hinge(
         partial(hinge_summary, found),
         warned((*data.doubts, *found.fit.warnings), at, data.ignored),
         partial(draw_fit, hinge_figure(found, data, name_of(curve))),
+        files=files_of(curve, spec),
     )

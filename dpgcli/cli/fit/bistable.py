@@ -22,9 +22,10 @@ from dpgcli.cli.fit.options import (
     Skip,
     Units,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, fitting, put_out
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
+from dpgcli.cli.progress import under_way
 
 if TYPE_CHECKING:
     from dpgcli.files.csv_file import Choice
@@ -103,24 +104,25 @@ def bistable(
         _ask(curve, geometry, spec, table_choice(column or (), skip, units or ()))
     opening, fixed = Opening.of(travel_to_opening), _fixed(fix or [])
     check_files((curve, spec), output, plot)
-    fit = fit_bistable(
-        curve,
-        travel_to_opening=opening,
-        quantity=quantity,
-        area=area,
-        branches=branches,
-        fix=fixed,
-        free=free,
-        geometry=geometry,
-        spec=spec,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-        column=column or (),
-        skip=skip,
-        units=units or (),
-    )
+    with under_way(fitting(bootstrap), quiet=quiet):
+        fit = fit_bistable(
+            curve,
+            travel_to_opening=opening,
+            quantity=quantity,
+            area=area,
+            branches=branches,
+            fix=fixed,
+            free=free,
+            geometry=geometry,
+            spec=spec,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+            column=column or (),
+            skip=skip,
+            units=units or (),
+        )
     put_out(fit, output, plot, printed_as, quiet)
 
 

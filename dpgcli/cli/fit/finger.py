@@ -16,9 +16,10 @@ from dpgcli.cli.fit.options import (
     Printed,
     Seed,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, fitting, put_out
 from dpgcli.cli.options import FirstStation, Quiet, Settings, SpecPath, TipOffset, frame_of
 from dpgcli.cli.printing import Format
+from dpgcli.cli.progress import under_way
 
 
 def finger(
@@ -53,17 +54,18 @@ def finger(
     given = scene_input(spec, settings or ())
     check_files((data, *given.files), output, plot)
     frame = frame_of(first_station, tip_offset)
-    fit = fit_finger(
-        given,
-        data,
-        free=tuple(free or (FITTED_BY_DEFAULT,)),
-        target=target,
-        first_station=frame[0],
-        tip_offset=frame[1],
-        geometry=geometry,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-    )
+    with under_way(fitting(bootstrap), quiet=quiet):
+        fit = fit_finger(
+            given,
+            data,
+            free=tuple(free or (FITTED_BY_DEFAULT,)),
+            target=target,
+            first_station=frame[0],
+            tip_offset=frame[1],
+            geometry=geometry,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+        )
     put_out(fit, output, plot, printed_as, quiet)

@@ -20,9 +20,10 @@ from dpgcli.cli.fit.options import (
     Skip,
     Units,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, fitting, put_out
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
+from dpgcli.cli.progress import under_way
 
 
 def hinge(
@@ -51,17 +52,18 @@ def hinge(
     from dpgcli.api.fits.hinge import fit_hinge
 
     check_files((curve, spec), output, plot)
-    fit = fit_hinge(
-        curve,
-        where=where,
-        geometry=geometry,
-        spec=spec,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-        column=column or (),
-        skip=skip,
-        units=units or (),
-    )
+    with under_way(fitting(bootstrap), quiet=quiet):
+        fit = fit_hinge(
+            curve,
+            where=where,
+            geometry=geometry,
+            spec=spec,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+            column=column or (),
+            skip=skip,
+            units=units or (),
+        )
     put_out(fit, output, plot, printed_as, quiet)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.calibration.choices import Loss
+from dpgcli.calibration.choices import MOST_RESAMPLES, Loss
 from dpgcli.cli.printing import Format
 
 Output = Annotated[
@@ -22,7 +22,11 @@ Plot = Annotated[
 Bootstrap = Annotated[
     int,
     typer.Option(
-        "--bootstrap", metavar="N", min=0, max=100_000, help="95 % intervals from N resampled fits"
+        "--bootstrap",
+        metavar="N",
+        min=0,
+        max=MOST_RESAMPLES,
+        help="95 % intervals from N resampled fits",
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]

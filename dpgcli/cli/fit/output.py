@@ -27,6 +27,15 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
     check_outputs(read, (output, Mark.CALIBRATION), (plot, Mark.FIGURE))
 
 
+def fitting(bootstrap: int) -> str:
+    """What goes on while one waits for a fit.
+
+    >>> fitting(0), fitting(1000)
+    ('fit', 'fit, and 1,000 of resampled points')
+    """
+    return f"fit, and {bootstrap:,} of resampled points" if bootstrap else "fit"
+
+
 def put_out(
     fit: "FitResult[Any]",
     output: Path | None,
