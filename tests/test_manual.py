@@ -121,6 +121,7 @@ def scratch_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     programs = Path(sys.executable).parent
     monkeypatch.setenv("PATH", os.pathsep.join((str(programs), os.environ["PATH"])))
     monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.delenv("COLUMNS", raising=False)
 
 
 @pytest.mark.parametrize(("page", "with_slow"), [*stories()])
