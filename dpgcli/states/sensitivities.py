@@ -7,7 +7,7 @@ every value is covered by the one formula that states are solved with.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -16,6 +16,7 @@ from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.equilibrium.banded import backward, forward
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import Softened
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 
@@ -74,5 +75,9 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
 def _moved(settled: Settled, direction: Direction) -> Finger:
     """The finger an imaginary step along a direction."""
     finger = settled.finger
-    rates = direction.items()
-    return finger.changed(**{n: getattr(finger, n) + 1j * COMPLEX_STEP * rate for n, rate in rates})
+    steps = {name: 1j * COMPLEX_STEP * rate for name, rate in direction.items()}
+    rigid = finger.wall_compliance == 0.0
+    if "wall_compliance" in steps and (softened := rigid * steps["wall_compliance"]).any():
+        finger = replace(finger, law=Softened(finger.law, softened))
+        steps["wall_compliance"] = ~rigid * steps["wall_compliance"]
+    return finger.changed(**{name: getattr(finger, name) + step for name, step in steps.items()})
