@@ -168,12 +168,13 @@ def _check_sketch(printed_as: Format | None, n_states: int) -> None:
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.files.output import Mark, check_outputs, run_file
-    from dpgcli.files.prediction import check_facts
 
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
     if output is not None:
+        from dpgcli.files.prediction import check_facts  # which loads pyarrow
+
         check_facts(output)
 
 
