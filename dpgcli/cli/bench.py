@@ -12,6 +12,7 @@ from dpgcli.cli.options import (
     Quiet,
     Settings,
     SpecPath,
+    TableFile,
     TargetError,
     TipOffset,
     check_plot,
@@ -21,7 +22,7 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
 from dpgcli.cli.progress import under_way
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.benchmark.bench import Row
@@ -60,10 +61,6 @@ Against = Annotated[
     typer.Option("--against", metavar="FILE", help="CSV of known tips, for the model's own error"),
 ]
 PrintedAs = Annotated[Format, typer.Option("--format", help="How to print rows")]
-Output = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
-]
 Plot = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Draw error over time: a .svg or .png file"),
@@ -88,7 +85,7 @@ def bench(
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     printed_as: PrintedAs = Format.TABLE,
-    output: Output = None,
+    output: TableFile = None,
     plot: Plot = None,
     record: Record = None,
     compare: Compare = None,
@@ -118,7 +115,7 @@ def bench(
             first_station=frame[0],
             tip_offset=frame[1],
             compare=compare,
-            watch=lambda row: say_that(f"measured: {row['group']}: {row['way']}"),
+            watch=lambda row: say_that(f"measured: {row['group']}: {row['method']}"),
         )
     command = ("dpg", *sys.argv[1:])
     if output is not None:
@@ -135,7 +132,7 @@ def bench(
 def _tell(printed_as: Format, line: str) -> None:
     """A finding: with the tables for people, beside the data for programs."""
     if printed_as is Format.TABLE:
-        print(line)
+        put(line)
     else:
         say(line)
 
@@ -156,14 +153,14 @@ def _print_tables(rows: "Sequence[Row]") -> None:
         own = [row for row in rows if row["group"] == group]
         if own:
             names = SHOWN.get(group, SHOWN["ladder"])
-            print(f"{title}\n")
+            put(f"{title}\n")
             print_grid(
                 {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
                 left=("method",),
             )
-            print()
-    print("\n".join(text_figure(rows)))
+            put("")
+    put("\n".join(text_figure(rows)))
 
 
 def _cell(row: "Row", name: str) -> str:

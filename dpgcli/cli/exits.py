@@ -34,9 +34,9 @@ P = ParamSpec("P")
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
+MOST_ROWS = 10  # of data whose problems are shown
 # open files, disk, processes, memory
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
-MOST_PROBLEMS = 10  # that are shown
 
 
 class ExitCode(IntEnum):
@@ -87,11 +87,17 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
 
 def say_problems(error: SpecError) -> None:
-    """Say the first problems, each of which starts with its place, and how many there are."""
-    for problem in map(problem_with_options, error.problems[:MOST_PROBLEMS]):
-        say(str(problem))
+    """Say the problems, each of which starts with its place, and how many there are.
+
+    What is wrong in one row of data may be wrong in thousands: of these the first are enough.
+    """
+    rows = [p for p in error.problems if p.line is not None and p.column is None]
+    hidden = {id(problem) for problem in rows[MOST_ROWS:]}
+    for problem in error.problems:
+        if id(problem) not in hidden:
+            say(str(problem_with_options(problem)))
     count = len(error.problems)
-    rest = f", the first {MOST_PROBLEMS} of them above" if count > MOST_PROBLEMS else ""
+    rest = f"; of those in rows of data the first {MOST_ROWS} are shown" if hidden else ""
     say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
 
 
@@ -142,7 +148,7 @@ def _code_of(app: Callable[..., object]) -> int:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
         if type(error).__name__ == "NoArgsIsHelpError":
-            print(error, file=sys.stderr)
+            say(str(error))
         else:
             say(f"dpg: {refusal(error)}")
         return ExitCode.USAGE
@@ -199,5 +205,5 @@ def _ignore_further_signals() -> None:
 
 
 def _internal_error() -> NoReturn:
-    traceback.print_exc()
+    say(traceback.format_exc().rstrip())
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")

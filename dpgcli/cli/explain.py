@@ -20,7 +20,7 @@ from dpgcli.cli.options import (
     request_of,
 )
 from dpgcli.cli.spelling import with_options
-from dpgcli.cli.streams import put
+from dpgcli.cli.streams import put, put_json
 
 if TYPE_CHECKING:
     from dpgcli.design.scene import Source
@@ -61,7 +61,7 @@ def explain(
     if printed_as is PlanFormat.JSON:
         import json
 
-        print(json.dumps(facts(made), indent=2))
+        put_json(json.dumps(facts(made), indent=2) + "\n")
     else:
         put("\n".join(_lines(str(spec), made)))
 

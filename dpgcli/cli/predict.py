@@ -173,7 +173,7 @@ def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | No
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
     if output is not None:
-        from dpgcli.files.prediction import check_facts  # which loads pyarrow
+        from dpgcli.files.prediction import check_facts
 
         check_facts(output)
 

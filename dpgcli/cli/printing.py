@@ -9,6 +9,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from dpgcli.cli.streams import put, put_json, say, unobeyed
 from dpgcli.states.columns import Column, Kind
 from dpgcli.text import printable
 
@@ -67,11 +68,15 @@ Printer = Callable[[tuple[Column, ...], Iterable["Columns"]], Iterator["Columns"
 
 
 def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
-    """Print and pass on; numbers in full, NaN where a pattern has no state."""
+    """Print and pass on; numbers in full, NaN where a pattern has no state.
+
+    Texts of others are spelled as in a table: a cell may begin a line.
+    """
     writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow([column.name for column in columns])
+    writer.writerow([unobeyed(column.name) for column in columns])
     for block in blocks:
-        writer.writerows(_rows(columns, block))
+        for row in _rows(columns, block):
+            writer.writerow([unobeyed(cell) if isinstance(cell, str) else cell for cell in row])
         yield block
 
 
@@ -83,7 +88,7 @@ def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iter
         for row in _rows(columns, block):
             finite = (None if isinstance(v, float) and not math.isfinite(v) else v for v in row)
             text = json.dumps(dict(zip(names, finite, strict=True)))
-            sys.stdout.write(f"{separator}  {text}")
+            put_json(f"{separator}  {text}")
             separator = ",\n"
         yield block
     sys.stdout.write("\n]\n")
@@ -114,10 +119,7 @@ def table_printer(*, principal: bool) -> Printer:
         left = {column.name for column in columns if column.kind not in right}
         print_grid(shown, left=left, may_drop=principal)
         if n_rows > len(first):
-            print(
-                f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output",
-                file=sys.stderr,
-            )
+            say(f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output")
 
     return print_table
 
@@ -160,9 +162,9 @@ def print_grid(
     lines = ["  ".join(row) for row in zip(*columns, strict=True)]
     if interactive:
         lines.insert(n_folds + 1, "─" * _width(lines[0]))
-    print("\n".join(line.rstrip() for line in lines))
+    put("\n".join(line.rstrip() for line in lines))
     if dropped := [name for name in texts if name not in names]:
-        print(f"no room for {', '.join(dropped)}: see --columns, --format", file=sys.stderr)
+        say(f"no room for {', '.join(dropped)}: see --columns, --format")
 
 
 def _fitted(texts: dict[str, list[str]], interactive: bool) -> tuple[list[str], bool]:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from dpgcli.cli.streams import put
+
 
 def report(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a finished sweep")],
@@ -26,6 +28,6 @@ def report(
     check_outputs((folder / "designs.parquet",), (output, Mark.REPORT))
     _, text = page(folder, kind)
     if output is None:
-        print(text, end="")
+        put(text, end="")
     else:
         write_page(output, text)

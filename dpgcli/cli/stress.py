@@ -16,7 +16,7 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Quiet, Settings, check_table_name
 from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.api.stress import HardCases, StressResult
@@ -124,9 +124,9 @@ def _print_table(title: str, records: list[dict[str, str]]) -> None:
     left = ("subject", "family", "case", "formulation", "pattern", "verdict", "status", "units")
     if records:
         texts = {name: [record[name] for record in records] for name in records[0]}
-        print(f"{title}\n")
+        put(f"{title}\n")
         print_grid(texts, left=(*left, "reached_pattern"))
-        print()
+        put("")
 
 
 def _family(summary: "FamilySummary") -> dict[str, str]:

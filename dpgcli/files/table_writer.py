@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dpgcli import __version__
+from dpgcli.code import versions_of_libraries
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.seal import KEY, UNSEALED, seal
@@ -76,7 +77,8 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 def versions() -> str:
     """Versions of what makes the numbers and the files, as JSON."""
-    return json.dumps({"dpg": __version__, "numpy": np.__version__, "pyarrow": pa.__version__})
+    libraries = versions_of_libraries()
+    return json.dumps({"dpg": __version__, **libraries, "pyarrow": pa.__version__})
 
 
 def write_run(path: Path, facts: dict[str, Any]) -> None:

@@ -50,7 +50,7 @@ def test_metadata_says_what_it_was_made_from(tmp_path: Path) -> None:
     spec = json.loads(facts["dpg.spec"])
     assert spec["finger"]["units"] == 3
     assert facts["dpg.spec_sha256"] == hashlib.sha256(facts["dpg.spec"].encode()).hexdigest()
-    assert set(json.loads(facts["dpg.versions"])) == {"dpg", "numpy", "pyarrow"}
+    assert set(json.loads(facts["dpg.versions"])) == {"dpg", "numpy", "scipy", "shapely", "pyarrow"}
     assert json.loads(facts["dpg.patterns"]) == ["1*"]
     assert float(facts["dpg.tolerance"]) == 1e-11
     assert facts["dpg.formulation"] == "chain"
