@@ -45,7 +45,7 @@ from dpgcli.studies.sweep import (
     outputs,
     stores,
 )
-from dpgcli.sweeps import cluster, executors
+from dpgcli.sweeps import cluster, executors, pool
 from dpgcli.sweeps.executors import Backend
 from dpgcli.temporary import temporary_folder
 
@@ -274,7 +274,7 @@ class Place:
         n_workers = self.jobs or cores().usable
         if self.executor == "serial" or n_workers == 1:
             return executors.serial()
-        return executors.processes(n_workers)
+        return pool.processes(n_workers)
 
     def _cluster(self, scheduler: str, say: Say) -> Backend:
         try:

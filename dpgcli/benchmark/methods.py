@@ -94,16 +94,19 @@ def _looked_up(finger: Finger, inverted: Flags) -> BenchmarkResult:
     pose, _ = chain.tip(coordinates)
     openings = chain.openings(coordinates)
     energy = _energy(finger, shape, openings)
-    in_wells = (openings > units.wells.barrier) == inverted
+    in_wells = (openings + shape.wall > units.wells.barrier) == inverted
     is_there = (in_wells & (units.wells.exists | ~inverted)).all(axis=0)
     return BenchmarkResult(np.where(is_there, pose, np.nan), np.where(is_there, energy, np.nan))
 
 
 def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
     """Energy of a shape, mJ, (state,)."""
-    domes = finger.springs(openings)
+    domes = finger.springs(openings + shape.wall)
     corners = finger.hinge_stiffness * (shape.near_angle**2 + shape.far_angle**2)
     energy = total(domes.energy + corners)
+    if finger.has_walls:
+        yielding = np.where(finger.wall_compliance > 0.0, finger.wall_compliance, 1.0)
+        energy = energy + total(0.5 * shape.wall**2 / yielding)
     if finger.is_rigid:
         return energy
     bars = 0.5 * finger.linear_stiffness * (shape.chord**2 + shape.strut**2)

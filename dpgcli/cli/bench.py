@@ -12,6 +12,7 @@ from dpgcli.cli.options import (
     Quiet,
     Settings,
     SpecPath,
+    TableFile,
     TargetError,
     TipOffset,
     check_plot,
@@ -60,10 +61,6 @@ Against = Annotated[
     typer.Option("--against", metavar="FILE", help="CSV of known tips, for the model's own error"),
 ]
 PrintedAs = Annotated[Format, typer.Option("--format", help="How to print rows")]
-Output = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
-]
 Plot = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Draw error over time: a .svg or .png file"),
@@ -88,7 +85,7 @@ def bench(
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     printed_as: PrintedAs = Format.TABLE,
-    output: Output = None,
+    output: TableFile = None,
     plot: Plot = None,
     record: Record = None,
     compare: Compare = None,
@@ -118,7 +115,7 @@ def bench(
             first_station=frame[0],
             tip_offset=frame[1],
             compare=compare,
-            watch=lambda row: say_that(f"measured: {row['group']}: {row['way']}"),
+            watch=lambda row: say_that(f"measured: {row['group']}: {row['method']}"),
         )
     command = ("dpg", *sys.argv[1:])
     if output is not None:

@@ -34,9 +34,9 @@ P = ParamSpec("P")
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
+MOST_ROWS = 10  # of data whose problems are shown
 # open files, disk, processes, memory
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
-MOST_PROBLEMS = 10  # that are shown
 
 
 class ExitCode(IntEnum):
@@ -87,11 +87,17 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
 
 
 def say_problems(error: SpecError) -> None:
-    """Say the first problems, each of which starts with its place, and how many there are."""
-    for problem in map(problem_with_options, error.problems[:MOST_PROBLEMS]):
-        say(str(problem))
+    """Say the problems, each of which starts with its place, and how many there are.
+
+    What is wrong in one row of data may be wrong in thousands: of these the first are enough.
+    """
+    rows = [p for p in error.problems if p.line is not None and p.column is None]
+    hidden = {id(problem) for problem in rows[MOST_ROWS:]}
+    for problem in error.problems:
+        if id(problem) not in hidden:
+            say(str(problem_with_options(problem)))
     count = len(error.problems)
-    rest = f", the first {MOST_PROBLEMS} of them above" if count > MOST_PROBLEMS else ""
+    rest = f"; of those in rows of data the first {MOST_ROWS} are shown" if hidden else ""
     say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
 
 
@@ -157,6 +163,9 @@ def _code_of(app: Callable[..., object]) -> int:
         return ExitCode.USAGE
     if isinstance(code, ExitCode):
         return code
+    if code == ExitCode.INTERRUPTED:  # by typer, which does not say so
+        say(f"dpg: interrupted; {NOTHING_HALF}")
+        return ExitCode.INTERRUPTED
     return ExitCode.USAGE if code else ExitCode.DONE  # of typer, which knows none of ours
 
 

@@ -80,6 +80,10 @@ FormulationOption = Annotated[
     FormulationName,
     typer.Option("--formulation", help="Internal coordinates, or the study's node coordinates"),
 ]
+TableFile = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
+]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No summary, no report, no progress")]
 
 

@@ -19,7 +19,7 @@ LINE = 70  # characters on a terminal
 
 @contextmanager
 def under_way(what: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Say what goes on and for how long, after a second and then now and then.
+    """Say what goes on and for how long, on a terminal after a second, elsewhere twice a minute.
 
     For work that counts nothing; what is yielded takes other words for it.
     """
@@ -27,14 +27,13 @@ def under_way(what: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
     is_terminal = sys.stderr.isatty()
 
     def say_so() -> None:
-        period = FIRST_SHOWN
+        period = FIRST_SHOWN if is_terminal else ELAPSED_PERIOD
         while not is_over.wait(period):
             line = f"{words[-1]}, {monotonic() - began:.0f} s"
             if is_terminal:
                 print(f"\r{line[:LINE]:{LINE}}", end="\r", file=sys.stderr, flush=True)
             else:
                 print(line, file=sys.stderr, flush=True)
-            period = FIRST_SHOWN if is_terminal else ELAPSED_PERIOD
 
     teller = Thread(target=say_so, daemon=True)
     if not quiet:

@@ -174,7 +174,7 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
     n_workers = jobs or cores().usable
     if executor is not ExecutorName.PROCESSES or n_workers == 1 or folder.exists():
         return
-    from dpgcli.sweeps.executors import start_fork_server
+    from dpgcli.sweeps.pool import start_fork_server
 
     start_fork_server("dpgcli.studies.work", "filelock", "shapely")
 

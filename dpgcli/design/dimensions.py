@@ -19,6 +19,7 @@ from dpgcli.text import KeyPath, dotted
 
 UNITS = "finger.units"
 LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
+WALL_COMPLIANCE = "wall_compliance_mm_per_N"
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
 MAX_UNITS = 64
 AGREEMENT = 1e-6  # of a value given twice
@@ -27,11 +28,13 @@ BOUNDS = {  # where they are not those of a length
     "units": (1.0, float(MAX_UNITS)),
     "force_linearity": (0.0, 1.0),
     "hinge_stiffness_N_mm_per_rad": (0.0, LARGEST),
+    WALL_COMPLIANCE: (0.0, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
 }
 SUFFIXES = {  # units in the names of keys
     "_N_mm_per_rad": "N mm/rad",
     "_N_per_mm": "N/mm",
+    "_mm_per_N": "mm/N",
     "_mm": "mm",
     "_MPa": "MPa",
     "_deg": "°",
@@ -107,10 +110,10 @@ class Design:
             return replace(self, gripper={**self.gripper, key: column})
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
-        section = parents[-1]
-        if parents[1] != "overrides":
+        section = parents.pop() if key != WALL_COMPLIANCE else "lattice"
+        if len(parents) == 1:
             return replace(self, finger=_changed(self.finger, section, key, column))
-        units = parents[2]
+        units = parents[-1]
         own = _changed(self.overrides.get(units, GivenValues()), section, key, column)
         return replace(self, overrides={**self.overrides, units: own})
 
@@ -145,9 +148,10 @@ class UnitGroup:
     def path(self, section: str, key: str) -> KeyPath:
         """Where the spec sets, or would set, a value of these units."""
         own = self.own_geometry if section == "geometry" else self.own_lattice
+        at = (key,) if key == WALL_COMPLIANCE else (section, key)
         if self.override is not None and key in own:
-            return ("finger", "overrides", self.override, section, key)
-        return ("finger", section, key)
+            return ("finger", "overrides", self.override, *at)
+        return ("finger", *at)
 
 
 def groups_of(design: Design) -> list[UnitGroup]:

@@ -11,6 +11,7 @@ from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import (
     LEAVE_ONE_OUT,
     LINEAR_STIFFNESS,
+    WALL_COMPLIANCE,
     Design,
     GivenValues,
     UnitGroup,
@@ -113,12 +114,14 @@ class Resolution:
         """What is known of the model's own error, for a single design."""
         values = [value for pairs in self.values.values() for _, value in pairs]
         lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
+        if WALL_COMPLIANCE in self.values:  # nothing is known of a lever beside walls
+            lever = None
         return known_model_error(self.design, lever, values)
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
 
-        Their bars are all rigid or none are; sources, uncertainty and chambers are left out.
+        Bars and walls are rigid in all or in none; sources, uncertainty and chambers are left out.
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
@@ -127,11 +130,13 @@ class Resolution:
         return Scene(finger, (), self._gripper(designs), thickness)
 
     def alike(self, designs: Indices) -> list[Indices]:
-        """Some of the designs, none of them wrong, apart by whether their bars are rigid."""
+        """Some of the designs, none of them wrong, apart by whether bars or all walls are rigid."""
         if not len(designs):
             return []
-        is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
-        return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+        kind = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0]).astype(int)
+        if "wall_compliance" in self.lattice:
+            kind += 2 * (_picked(self.lattice["wall_compliance"], designs) > 0.0).any(axis=0)
+        return [part for part in (designs[kind == k] for k in (1, 0, 3, 2)) if len(part)]
 
     def _chambers(self) -> Chambers:
         """Sizes of the chambers of the first design."""
@@ -209,6 +214,9 @@ def resolve(design: Design) -> Resolution:
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
     values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
+    walls = [(group, _walls(group)) for group in groups]
+    if any(value.numbers.any() for _, value in walls):
+        values[WALL_COMPLIANCE] = walls
     resolution = Resolution(design, domes, values, problems)
     for issue in tolerance_issues(design, [*values]):
         problems.everywhere(issue)
@@ -240,16 +248,30 @@ def _bars(design: Design, base: UnitGroup) -> Value:
     """The stiffness of the bars: given, fitted, or assumed."""
     if design.linear_stiffness is not None:
         return all_by(design.linear_stiffness, Origin.GIVEN, "as given")
-    for place, calibration in enumerate(base.calibrations):
-        if isinstance(calibration, Calibration) and LINEAR_STIFFNESS in calibration.values:
-            fitted = calibration.values[LINEAR_STIFFNESS]
+    rule = "the study calls the bars nearly rigid and names no number"
+    assumed = all_by(np.array([NEARLY_RIGID]), Origin.ASSUMED, rule)
+    return _fitted(LINEAR_STIFFNESS, base) or assumed
+
+
+def _walls(group: UnitGroup) -> Value:
+    """How far walls give way: given, fitted, or not at all."""
+    if WALL_COMPLIANCE in group.lattice:
+        return all_by(group.lattice[WALL_COMPLIANCE], Origin.GIVEN, "as given")
+    rigid = all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
+    return _fitted(WALL_COMPLIANCE, group) or rigid
+
+
+def _fitted(key: str, group: UnitGroup) -> Value | None:
+    """The value of the first calibration that has one."""
+    for place, calibration in enumerate(group.calibrations):
+        if isinstance(calibration, Calibration) and key in calibration.values:
+            fitted = calibration.values[key]
             value = all_by(np.array([fitted.value]), Origin.CALIBRATED, f"from {calibration.file}")
             error = fitted.standard_error
             return replace(
                 value, standard_error=None if error is None else np.array([error]), file=place
             )
-    rule = "the study calls the bars nearly rigid and names no number"
-    return all_by(np.array([NEARLY_RIGID]), Origin.ASSUMED, rule)
+    return None
 
 
 def _by_unit(n_units: int, pairs: Sequence[tuple[UnitGroup, Array]]) -> Array:

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -169,9 +170,16 @@ class PartStore:
             self.folder.parent.rmdir()
 
     def parts(self) -> list[Part]:
-        """Parts in order of their designs."""
+        """Parts in order of their designs, but for those that lie within another one.
+
+        A worker that is killed between storing its part and saying so leaves one of a chunk that
+        may be halved afterwards.
+        """
         matches = ((NAME.fullmatch(path.name), path) for path in self.folder.glob("*.part"))
-        return sorted(Part(int(m[1]), int(m[2]), path) for m, path in matches if m)
+        found = [Part(int(m[1]), int(m[2]), path) for m, path in matches if m]
+        found.sort(key=lambda part: (part.start, -part.stop, part.path))
+        reached = accumulate((part.stop for part in found), max, initial=0)
+        return [part for part, before in zip(found, reached, strict=False) if part.stop > before]
 
     def damaged(self) -> list[Part]:
         """Parts that do not match their name: damaged, or of another sweep."""

@@ -95,7 +95,8 @@ def figure_to(
                 text = svg_text(figure, title, description, {"Creator": AUTHOR})
                 temporary.write_text(text, encoding="utf-8", newline="\n")
             else:
-                said = {"Software": AUTHOR, "Title": title, "Description": description}
+                texts = {"Title": _shown(title), "Description": _shown(description)}
+                said = {"Software": AUTHOR, **texts}
                 figure.savefig(temporary, format="png", dpi=150, metadata=said)
 
 
@@ -109,7 +110,12 @@ def svg_text(figure: Any, title: str, description: str, metadata: dict[str, str 
 
 
 def _xml(text: str) -> str:
-    return escape("\n".join(map(printable, text.split("\n"))))
+    return escape(_shown(text))
+
+
+def _shown(text: str) -> str:
+    """Lines without control characters, and without what is no text in names of files."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def titled(text: str) -> str:

@@ -185,7 +185,12 @@ _STIFFNESS = (
     _compliance(4, "y_angle_rad_per_N", "rad/N", "tip angle by a force along y"),
     _compliance(5, "angle_rad_per_N_mm", "rad/(N mm)", "tip angle by a moment at the tip"),
 )
-_ENERGY_KINDS = {"bistable": "bistable springs", "hinge": "hinges", "bar": "bars"}
+_ENERGY_KINDS = {
+    "bistable": "bistable springs",
+    "wall": "walls",
+    "hinge": "hinges",
+    "bar": "bars",
+}
 
 
 def _energy(kind: str) -> Quantity:

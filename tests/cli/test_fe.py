@@ -426,14 +426,3 @@ def test_a_real_hinge_on_a_finer_mesh(call: Any, folder: Path) -> None:
     assert call(*HINGE[:-1], "medium", "--run", "-q").exit_code == ExitCode.DONE
     curve = rows(folder / "deck" / "hinge.csv")
     assert 5.0 / curve["rotation_rad"][-1] == pytest.approx(27.7, rel=0.01)
-
-
-def test_a_run_of_ccx_says_that_it_goes_on(folder: Path, start: Any) -> None:
-    program = folder / "bin" / "ccx"
-    program.parent.mkdir()
-    program.write_text("#!/bin/sh\nsleep 60\n")
-    program.chmod(0o755)
-    path = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
-    words = ("fe", "hinge", "three_unit.yaml", "-o", "deck", "--run")
-    running = start(*words, env={**os.environ, "PATH": path})
-    assert running.stderr.readline().startswith(f"ccx on {Path('deck/hinge.inp')}, ".encode())

@@ -41,7 +41,8 @@ def loaded(tmp_path: Path) -> Loaded:
 
 @pytest.mark.parametrize("option", ["--help", "--version"])
 def test_the_start_loads_nothing_heavy(loaded: Loaded, option: str) -> None:
-    assert loaded(option) & AT_START == set()
+    # the version waits for --verbose, which typer checks by pydantic
+    assert loaded(option) & AT_START <= ({"pydantic"} if option == "--version" else set())
 
 
 @pytest.mark.parametrize("arguments", [(), ("columns",)])

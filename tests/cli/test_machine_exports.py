@@ -152,7 +152,7 @@ def test_of_thousands_of_mistakes_ten_are_shown(fit: Any) -> None:
     content = table(time, travel, force).replace(b".", b":")
     lines = asked(fit(content, *NAMED)).splitlines()
     assert len(lines) == 11
-    assert lines[-1] == "dpg: 602 problems, the first 10 of them above"
+    assert lines[-1] == "dpg: 602 problems; of those in rows of data the first 10 are shown"
     assert lines[0].startswith("dome.csv:2: travel_mm: expected a number")
 
 

@@ -38,6 +38,16 @@ def test_a_part_that_is_there_is_made_again(tmp_path: Path) -> None:
     assert part.read_bytes() == b"whole"
 
 
+def test_a_part_within_another_is_not_needed(tmp_path: Path) -> None:
+    """As of a chunk that was halved though a worker had stored it before it was killed."""
+    store = PartStore(tmp_path)
+    for start, stop in ((8, 12), (0, 4), (0, 8), (4, 8), (10, 14)):
+        with store.part(start, stop) as file:
+            file.write(b"whole")
+    assert [(part.start, part.stop) for part in store.parts()] == [(0, 8), (8, 12), (10, 14)]
+    assert store.missing([(0, 16)]) == [(14, 16)]
+
+
 def test_a_part_is_an_arrow_file_whose_blocks_come_back_one_by_one(tmp_path: Path) -> None:
     """As few at a time in memory as when they were made, with units and descriptions."""
     states = (

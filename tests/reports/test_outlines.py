@@ -69,6 +69,7 @@ def test_a_dome_lies_in_its_chamber_until_it_is_inverted() -> None:
     out, beyond = polygon(inverted.chambers[1]), polygon(inverted.chambers[2])
     assert out.area > 210.0
     assert out.distance(beyond) < 0.05
+    assert out.intersection(beyond).area < 2.0  # it stands against it, not in it
     assert second.distance(third) == pytest.approx(3.0)
     assert inverted.are_inverted.tolist() == [False, True, False, False]
 

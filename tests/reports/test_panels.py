@@ -34,6 +34,13 @@ def test_shapes_are_drawn_at_one_scale_in_both_directions(
     assert grid.shape_width > 0.15
 
 
+def test_titles_of_several_lines_have_room_above_their_panels() -> None:
+    grid = Grid.of(64, 64, Window(0.0, 600.0, 0.0, 100.0))
+    assert grid.n_title_lines > 2
+    above = grid.box(0)[1] - (grid.box(grid.n_columns)[1] + grid.box(grid.n_columns)[3])
+    assert above * grid.page[1] > 0.11 * grid.n_title_lines
+
+
 def test_outer_panels_are_those_without_a_neighbor() -> None:
     grid = Grid(n_panels=5, n_digits=3, n_columns=3, shape_width=1.0, shape_height=1.0)
     assert [grid.is_outer(place) for place in range(5)] == [

@@ -14,8 +14,9 @@ from dpgcli.code import versions_of_libraries
 from dpgcli.errors import UsageError, WorkplaceError
 from dpgcli.files import table_writer
 from dpgcli.studies import sweep as studies
-from dpgcli.sweeps.executors import Backend, processes, serial
+from dpgcli.sweeps.executors import Backend, serial
 from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, check_workers, code_of
+from dpgcli.sweeps.pool import processes
 
 PACKAGE = Path(dpgcli.__file__).parent
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7, 7.5]}"

@@ -19,16 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.errors import WorkplaceError
-from dpgcli.sweeps.executors import (
-    Backend,
-    Chunk,
-    Runner,
-    _own_temporary_folder,
-    chunked,
-    process_pool,
-    processes,
-    serial,
-)
+from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked, serial
+from dpgcli.sweeps.pool import _own_temporary_folder, process_pool, processes
 
 
 @pytest.fixture

@@ -22,10 +22,9 @@ from dpgcli.cli.fit.options import (
     Skip,
     Units,
 )
-from dpgcli.cli.fit.output import check_files, fitting, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
-from dpgcli.cli.progress import under_way
 
 if TYPE_CHECKING:
     from dpgcli.files.csv_file import Choice
@@ -104,7 +103,7 @@ def bistable(
         _ask(curve, geometry, spec, table_choice(column or (), skip, units or ()))
     opening, fixed = Opening.of(travel_to_opening), _fixed(fix or [])
     check_files((curve, spec), output, plot)
-    with under_way(fitting(bootstrap), quiet=quiet):
+    with resampling(bootstrap, quiet=quiet):
         fit = fit_bistable(
             curve,
             travel_to_opening=opening,

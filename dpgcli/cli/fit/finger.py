@@ -16,10 +16,9 @@ from dpgcli.cli.fit.options import (
     Printed,
     Seed,
 )
-from dpgcli.cli.fit.output import check_files, fitting, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import FirstStation, Quiet, Settings, SpecPath, TipOffset, frame_of
 from dpgcli.cli.printing import Format
-from dpgcli.cli.progress import under_way
 
 
 def finger(
@@ -54,7 +53,7 @@ def finger(
     given = scene_input(spec, settings or ())
     check_files((data, *given.files), output, plot)
     frame = frame_of(first_station, tip_offset)
-    with under_way(fitting(bootstrap), quiet=quiet):
+    with resampling(bootstrap, quiet=quiet):
         fit = fit_finger(
             given,
             data,

@@ -20,10 +20,9 @@ from dpgcli.cli.fit.options import (
     Skip,
     Units,
 )
-from dpgcli.cli.fit.output import check_files, fitting, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
-from dpgcli.cli.progress import under_way
 
 
 def hinge(
@@ -52,7 +51,7 @@ def hinge(
     from dpgcli.api.fits.hinge import fit_hinge
 
     check_files((curve, spec), output, plot)
-    with under_way(fitting(bootstrap), quiet=quiet):
+    with resampling(bootstrap, quiet=quiet):
         fit = fit_hinge(
             curve,
             where=where,

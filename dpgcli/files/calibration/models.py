@@ -66,6 +66,7 @@ class Values(Section):
     segment_height_mm: FittedPositive | None = None
     segment_length_mm: FittedPositive | None = None
     linear_stiffness_N_per_mm: FittedBars | None = None
+    wall_compliance_mm_per_N: FittedNotNegative | None = None
 
 
 Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]

@@ -13,7 +13,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
-from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
+from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
@@ -21,6 +21,7 @@ from dpgcli.files.sections import (
     BarStiffness,
     Geometry,
     Lattice,
+    NotNegative,
     Positive,
     Section,
     UnitGeometry,
@@ -30,9 +31,15 @@ from dpgcli.files.sections import (
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
 
 
+WallCompliance = NotNegative | None
+
+
 class UnitOverride(Section):
     """Values of some units that differ from the finger's."""
 
+    wall_compliance_mm_per_N: WallCompliance = Field(
+        default=None, description="How far walls of these units give way, in mm/N."
+    )
     geometry: UnitGeometry | None = Field(default=None, description="Dimensions of these units.")
     lattice: UnitLattice | None = Field(default=None, description="Lattice values of these units.")
 
@@ -47,6 +54,11 @@ class FingerSpec(Section):
         default=None,
         description="Stiffness k_L of every bar, in N/mm: 1e4 unless given or calibrated; "
         ".inf makes the bars rigid.",
+    )
+    wall_compliance_mm_per_N: WallCompliance = Field(
+        default=None,
+        description="How far the wall that a dome pushes against gives way, c_w in mm/N: 0, rigid "
+        "walls, unless given or calibrated.",
     )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,
@@ -142,7 +154,10 @@ class Spec(Section):
 def _section(part: UnitOverride | FingerSpec | None) -> dimensions.GivenValues:
     if part is None:
         return dimensions.GivenValues()
-    return dimensions.GivenValues(_sizes(part.geometry), _sizes(part.lattice))
+    lattice = _sizes(part.lattice)
+    if part.wall_compliance_mm_per_N is not None:
+        lattice[WALL_COMPLIANCE] = np.array([part.wall_compliance_mm_per_N], float)
+    return dimensions.GivenValues(_sizes(part.geometry), lattice)
 
 
 def _sizes(section: Section | None) -> dict[str, NDArray[np.float64]]:

@@ -67,6 +67,7 @@ HINTS = {
     "units": "a whole number without quotes or decimal point",
     "stroke_mm": "stroke is dome height minus unit separation",
     "linear_stiffness_N_per_mm": "1.0e+4 is assumed where it is left out; .inf is rigid",
+    "wall_compliance_mm_per_N": "0 is a rigid wall; those of the study's finger have about 0.8",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
     "segment_height_mm": "half the chamber width + half the limiting layer",

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.design.calibrations import PUBLISHED
-from dpgcli.design.dimensions import LINEAR_STIFFNESS
+from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
 from dpgcli.files.content import beside, quoted_if
@@ -58,8 +58,9 @@ def recalibrated(document: Document, calibration: Calibration) -> Document:
         return {**section, "lattice": {k: v for k, v in kept if not known.has(k)}}
 
     changes = {**without(finger), "calibration": [calibration, *before]}
-    if known.has(LINEAR_STIFFNESS):
-        changes.pop(LINEAR_STIFFNESS, None)
+    for key in (LINEAR_STIFFNESS, WALL_COMPLIANCE):
+        if known.has(key):
+            changes.pop(key, None)
     overrides = finger.get("overrides") or {}
     changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}
     return replace(document, data={**document.data, "finger": changes})

@@ -75,6 +75,7 @@ class Tolerances(Section):
     force_linearity: Tolerated = None
     hinge_stiffness_N_mm_per_rad: Tolerated = None
     linear_stiffness_N_per_mm: Tolerated = None
+    wall_compliance_mm_per_N: Tolerated = None
     base_spacing_mm: Tolerated = None
     mounting_angle_deg: Tolerated = None
 
