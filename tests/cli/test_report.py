@@ -1,7 +1,6 @@
 """`dpg report`: a finished sweep as Markdown and as a page."""
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
