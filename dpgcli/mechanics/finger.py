@@ -2,10 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Response, take_lanes
@@ -68,7 +66,7 @@ class Finger:
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
     wall_compliance: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
-    branch: Indices = field(default_factory=lambda: np.zeros((1, 1), np.int64))
+    branch: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: DomeLaw = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -85,7 +83,7 @@ class Finger:
         """Every array by name, in the order of the fields."""
         return {name: getattr(self, name) for name in ARRAYS}
 
-    def states_of_domes(self) -> dict[str, NDArray[Any]]:
+    def states_of_domes(self) -> dict[str, Array]:
         """What is given beside the energy, by name."""
         return {"acting": self.acting, "branch": self.branch}
 
@@ -149,7 +147,7 @@ class Finger:
         """Energy, force and stiffness of the bistable springs at extensions (unit, batch)."""
         return self.law.response(extension, self.domes)
 
-    def changed(self, **arrays: NDArray[Any]) -> "Finger":
+    def changed(self, **arrays: Array) -> "Finger":
         """The finger with other arrays, by the names of its fields.
 
         Raises ValueError for shapes that do not fit.

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags
 from dpgcli.equilibrium.contracts import Response
 from dpgcli.mechanics.curve import Curve
 
@@ -56,15 +56,15 @@ class Dome(NamedTuple):
 
     `stiffness` k_b at rest (N/mm), `linearity` α (1), `stroke` d (mm) and `contact` c (mm), the
     travel of the dome's pole at which it touches its neighbor in the straight finger; 0 where
-    the opening stands for the travel. `branch` counts the stretches of a curve with ripples on which
-    a dome pushes, from the last (0) back; only a dome that never pulls is on one alone.
+    the opening stands for the travel. `branch` counts the stretches of a curve with ripples on
+    which a dome pushes, from the last (0) back; only a dome that never pulls is on one alone.
     """
 
     stiffness: Array
     linearity: Array
     stroke: Array
     contact: Array
-    branch: Indices = np.zeros((1, 1), np.int64)
+    branch: Array = np.zeros((1, 1))
 
 
 class Rests(NamedTuple):
@@ -91,9 +91,9 @@ class Attached:
         """1."""
         return np.ones((1, 1))
 
-    def branch_at(self, extension: Array, dome: Dome) -> Indices:
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
         """0: the dome acts on all of its curve."""
-        return np.zeros((1, 1), np.int64)
+        return np.zeros((1, 1))
 
     def touching(self, dome: Dome) -> Touching:
         """Everywhere."""
@@ -125,7 +125,7 @@ class DomeLaw(Protocol):
     def acting(self, inverted: Flags) -> Array:
         """1 for acting domes, 0 for others, (unit, batch); (1, 1) if all act in any state."""
 
-    def branch_at(self, extension: Array, dome: Dome) -> Indices:
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
         """The branch of its curve that an inverted dome is on at an extension (mm); see `Dome`."""
 
     def touching(self, dome: Dome) -> Touching:
@@ -197,9 +197,9 @@ class PushOnly:
     """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
 
     Outside them dome and neighbor do not touch, the energy is constant there. A curve with ripples
-    has several stretches between a top and the next well, and the dome is on one of them: it does
-    not follow its neighbor over a top, nor is it taken back over one without having left its state.
-    Only inverted domes act: which those are is a state of contact, given beside the energy.
+    has several branches, from a top to the next well, and the dome is on one of them: what goes
+    over a top has left its state. Only inverted domes act: which those are, and on which branch,
+    are states of contact, given beside the energy.
     """
 
     def __init__(self, law: Published | Tabulated) -> None:
@@ -241,21 +241,19 @@ class PushOnly:
         """
         return inverted.astype(float)
 
-    def branch_at(self, extension: Array, dome: Dome) -> Indices:
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
         """The last one whose top lies before the extension, or the first."""
         if self.curve is None:
-            return np.zeros((1, 1), np.int64)
+            return np.zeros((1, 1))
         tops = (self._opening(top, dome) for top, _ in self.curve.branches[:-1])
-        behind = sum(
-            (np.asarray(extension <= top, np.int64) for top in tops), np.zeros((1, 1), int)
-        )
-        return np.asarray(behind)
+        behind = (np.asarray(extension <= top, float) for top in tops)
+        return np.asarray(sum(behind, np.zeros((1, 1))))
 
     def touching(self, dome: Dome) -> Touching:
         """From the top of its barrier to its well, or of its branch; nowhere if it has none."""
         if self.curve is None or len(self.curve.branches) == 1:
             return Touching(*self.pulling.rests(dome))
-        ends = np.array(self.curve.branches)[dome.branch]
+        ends = np.array(self.curve.branches)[dome.branch.astype(int)]
         return Touching(self._opening(ends[..., 0], dome), self._opening(ends[..., 1], dome))
 
     @staticmethod

@@ -27,14 +27,25 @@ def rigid_unit(finger: Finger, extension: Array) -> Response:
     [[3.381735]]
     """
     spring, opening = finger.springs(extension), opening_of(finger, extension)
-    opening = np.minimum(opening, SHORT_OF_LEVER * 2.0 * finger.segment_height)
-    turn = 2.0 * np.arcsin(opening / (2.0 * finger.segment_height))
-    energy = spring.energy + laws.quadratic(turn, finger.hinge_stiffness).energy
-    pull, stiffness = _hinge(finger, opening)
-    if finger.has_walls:  # w = c_w h'
+    turn, pull, stiffness = _hinge(finger, opening)
+    energy = spring.energy + laws.quadratic(2.0 * turn, finger.hinge_stiffness).energy
+    if finger.has_walls:
         energy = energy + 0.5 * finger.wall_compliance * pull * pull
-        stiffness = stiffness / (1.0 + finger.wall_compliance * stiffness)
-    return Response(energy, spring.force + pull, spring.stiffness + stiffness)
+    stiffness = spring.stiffness + _with_wall(finger, stiffness)
+    return Response(energy, spring.force + pull, stiffness)
+
+
+def rigid_stiffness(finger: Finger, extension: Array) -> Array:
+    """The stiffness alone, N/mm, of `rigid_unit`."""
+    *_, stiffness = _hinge(finger, opening_of(finger, extension))
+    return finger.springs(extension).stiffness + _with_wall(finger, stiffness)
+
+
+def _with_wall(finger: Finger, stiffness: Array) -> Array:
+    """The hinge's stiffness in series with the wall's, N/mm."""
+    if not finger.has_walls:
+        return stiffness
+    return np.asarray(stiffness / (1.0 + finger.wall_compliance * stiffness))
 
 
 def opening_of(finger: Finger, extension: Array) -> Array:
@@ -47,20 +58,21 @@ def opening_of(finger: Finger, extension: Array) -> Array:
         return extension
     opening = np.minimum(extension, SHORT_OF_LEVER * 2.0 * finger.segment_height)
     for _ in range(NEWTON_STEPS):
-        pull, stiffness = _hinge(finger, opening)
+        _, pull, stiffness = _hinge(finger, opening)
         excess = opening - extension + finger.wall_compliance * pull
         step = excess / (1.0 + finger.wall_compliance * stiffness)
         opening = opening - np.maximum(step, 0.0)  # not at all where bars end it
     return np.asarray(opening)
 
 
-def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array]:
-    """The hinge's pull on the opening, N, and its stiffness, N/mm: with x = 2H sin m."""
+def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
+    """m (rad), the hinge's pull on the opening x = 2H sin m, N, and its stiffness, N/mm."""
     sine = opening / (2.0 * finger.segment_height)
+    sine = np.minimum(sine, SHORT_OF_LEVER)  # beyond it there is no well to ask for
     half_turn, cosine = np.arcsin(sine), np.sqrt(1.0 - sine * sine)
     stiffness = finger.hinge_stiffness / finger.segment_height**2
     pull = 2.0 * stiffness * finger.segment_height * half_turn / cosine
-    return pull, stiffness / cosine**2 * (1.0 + half_turn * sine / cosine)
+    return half_turn, pull, stiffness / cosine**2 * (1.0 + half_turn * sine / cosine)
 
 
 def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:

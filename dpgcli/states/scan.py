@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, single_units
+from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_stiffness, rigid_unit, single_units
 
 SEARCHED = 512  # extensions at which the force of a unit is looked at
 TANGENTS = 2.0  # times a slope's reach: a stiffness may have a kink in the cell
@@ -33,7 +33,7 @@ class Scan(NamedTuple):
 
 
 class _Profile(NamedTuple):
-    """Places along the extension of a unit, its energies and forces there, (place, unit, design)."""
+    """Places along the extension of a unit and its response there, (place, unit, design)."""
 
     places: Array
     energy: Array
@@ -57,7 +57,7 @@ def scan(finger: Finger) -> Scan:
     before = profile.places[:-1]
     is_well &= (before >= np.maximum(rests.top, 0.0)) & within_reach
     if not pulls(finger):
-        is_well &= before < rests.well
+        is_well &= before < rests.well  # beyond it the dome is not in touch
     at_top = attached.springs(rests.top).energy  # the barrier of a dome that inverts untouched
     untouched = np.where(rests.top < 0.0, at_top, -np.inf)
     # beyond the last place the unit's energy rises on, or bars end it: no well is shallow for that
@@ -72,11 +72,9 @@ def scan(finger: Finger) -> Scan:
     )
     along = profile.places
     reset = _largest(-profile.force, (along >= barrier) & (along <= extension))
-    snap = (
-        _largest(profile.force, along <= barrier) if pulls(finger) else np.full_like(reset, np.inf)
-    )
+    snap = _largest(profile.force, (along <= barrier) & pulls(finger))
     others = _between(attached, profile.places, (is_well, is_top), well)
-    return Scan(is_well.any(axis=0), widest, extension, barrier, *others, snap, reset)
+    return Scan(np.asarray(is_well.any(axis=0)), widest, extension, barrier, *others, snap, reset)
 
 
 def pulls(finger: Finger) -> bool:
@@ -120,7 +118,7 @@ def _turned(finger: Finger, profile: _Profile) -> _Profile:
     begins = profile.stiffness[cell, unit, design] >= 0.0
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        is_before = (rigid_unit(few, middle).stiffness >= 0.0) == begins
+        is_before = (rigid_stiffness(few, middle) >= 0.0) == begins
         low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
     places, energy, force = (part.copy() for part in profile[:3])
     for own, new in zip((places, energy, force), (low, *rigid_unit(few, low)[:2]), strict=True):

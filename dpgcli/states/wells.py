@@ -15,7 +15,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.rigid_unit import SHORT_OF_LEVER, opening_of, rigid_unit
+from dpgcli.states.rigid_unit import SHORT_OF_LEVER, opening_of, rigid_stiffness, rigid_unit
 from dpgcli.states.scan import WIDEST, pulls, scan
 
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
@@ -101,7 +101,8 @@ def inverted_wells(finger: Finger) -> Wells:
         np.where(exists, barrier, MIDDLE) * stroke,
         np.arcsin(extension / (2.0 * finger.segment_height)),
         _spring_barrier(finger),
-        *(np.full(exists.shape, end) for end in (-np.inf, np.inf)),
+        np.full(exists.shape, -np.inf),
+        np.full(exists.shape, np.inf),
         snap if pulls(finger) else np.full(exists.shape, np.inf),
         -reset,
     )
@@ -135,7 +136,7 @@ def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
     soft = np.minimum(0.5 * finger.stroke, stiff.max(axis=0)) + 0.0 * stiff
     for _ in range(INFLECTION_BISECTIONS):
         middle = 0.5 * (stiff + soft)
-        rises = rigid_unit(finger, middle).stiffness >= 0.0
+        rises = rigid_stiffness(finger, middle) >= 0.0
         stiff, soft = np.where(rises, middle, stiff), np.where(rises, soft, middle)
     return rigid_unit(finger, stiff).force
 
