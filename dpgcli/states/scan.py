@@ -13,6 +13,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_stiffness, rigid_unit, single_units
 
+MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
+IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
 SEARCHED = 512  # extensions at which the force of a unit is looked at
 TANGENTS = 2.0  # times a slope's reach: a stiffness may have a kink in the cell
 WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
@@ -23,7 +25,6 @@ class Scan(NamedTuple):
     """What there is of a unit's wells, extensions in mm; see `wells.Wells`."""
 
     exists: Flags
-    widest: Array
     extension: Array
     barrier: Array
     from_top: Array
@@ -66,20 +67,32 @@ def scan(finger: Finger) -> Scan:
     tops = np.where(is_top & (places < well), profile.energy[:-1], -np.inf)
     top = tops.argmax(axis=0)
     is_touching = tops.max(axis=0) > untouched
-    extension = _bisected(attached, profile.places, well, rises=True)
-    barrier = np.where(
-        is_touching, _bisected(attached, profile.places, top, rises=False), _or_zero(rests.top)
-    )
+    exists = np.asarray(is_well.any(axis=0))
+    at_well = _bisected(attached, profile.places, well, rises=True)
+    turning = _bisected(attached, profile.places, top, rises=False)
+    turning = np.where(is_touching, turning, _or_zero(rests.top))
+    extension = np.where(exists, at_well, opened(finger, widest))
+    barrier = np.where(exists, turning, MIDDLE * finger.stroke)
     along = profile.places
     reset = _largest(-profile.force, (along >= barrier) & (along <= extension))
     snap = _largest(profile.force, (along <= barrier) & pulls(finger))
     others = _between(attached, profile.places, (is_well, is_top), well)
-    return Scan(np.asarray(is_well.any(axis=0)), widest, extension, barrier, *others, snap, reset)
+    return Scan(exists, extension, barrier, *others, snap, reset)
 
 
 def pulls(finger: Finger) -> bool:
     """Whether domes act in any state, also where they pull."""
     return finger.law.pulling is finger.law
+
+
+def opened(finger: Finger, widest: Array) -> Array:
+    """Where a search begins in a unit without a second well, mm: open by its stroke.
+
+    A dome that only pushes has to be in touch, or nothing would hold the unit there.
+    """
+    highest = np.nan if pulls(finger) else finger.law.rests(finger.domes).well
+    opening = np.where(np.isnan(highest), finger.stroke, IN_TOUCH * highest)
+    return np.asarray(np.minimum(opening, widest))
 
 
 def _or_zero(top: Array) -> Array:

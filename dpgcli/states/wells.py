@@ -16,10 +16,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.rigid_unit import SHORT_OF_LEVER, opening_of, rigid_stiffness, rigid_unit
-from dpgcli.states.scan import WIDEST, pulls, scan
+from dpgcli.states.scan import MIDDLE, WIDEST, opened, pulls, scan
 
-MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
-IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
 INFLECTION_BISECTIONS = 24
 
 
@@ -93,7 +91,7 @@ def inverted_wells(finger: Finger) -> Wells:
     exists &= barrier < well
     stroke = np.broadcast_to(finger.stroke, exists.shape)
     full = np.minimum(1.0, widest)
-    extension = np.where(exists, well * stroke, _opened(finger, widest * stroke))
+    extension = np.where(exists, well * stroke, opened(finger, widest * stroke))
     snap, reset = _extreme_slopes(finger, np.stack((0.0 * full, full)) * stroke)
     return Wells(
         exists,
@@ -106,16 +104,6 @@ def inverted_wells(finger: Finger) -> Wells:
         snap if pulls(finger) else np.full(exists.shape, np.inf),
         -reset,
     )
-
-
-def _opened(finger: Finger, widest: Array) -> Array:
-    """Where a search begins in a unit without a second well, mm: open by its stroke.
-
-    A dome that only pushes has to be in touch, or nothing would hold the unit there.
-    """
-    highest = np.nan if pulls(finger) else finger.law.rests(finger.domes).well
-    opening = np.where(np.isnan(highest), finger.stroke, IN_TOUCH * highest)
-    return np.asarray(np.minimum(opening, widest))
 
 
 def _spring_barrier(finger: Finger) -> Array:
@@ -144,13 +132,11 @@ def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
 def _scanned_wells(finger: Finger) -> Wells:
     """The inverted well of any law, with walls that give way too."""
     found = scan(finger)
-    stroke = np.broadcast_to(finger.stroke, found.exists.shape)
-    extension = np.where(found.exists, found.extension, _opened(finger, found.widest))
-    opening = opening_of(finger, extension)
+    opening = opening_of(finger, found.extension)
     return Wells(
         found.exists,
-        extension,
-        np.where(found.exists, found.barrier, MIDDLE * stroke),
+        found.extension,
+        found.barrier,
         np.arcsin(opening / (2.0 * finger.segment_height)),
         _spring_barrier(finger),
         found.from_top,

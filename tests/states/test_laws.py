@@ -116,16 +116,16 @@ def test_a_hinge_never_resets_a_dome_that_still_pushes_in_the_straight_finger() 
 
 
 def test_barriers_of_a_dome_that_inverts_before_it_touches() -> None:
-    """To snap costs the dome's own barrier alone, to reset at least that less the well."""
+    """The dome's own, as the hinge is at rest at that top; to reset, that less the well."""
     finger = dome_that_inverts_before_it_touches()
     curve = finger.law.curve
     assert curve is not None
     own = 12.84 * 13.7**2 * float(curve(np.array(curve.rests[0])).value)
     wells = inverted_wells(finger)
     (lowest,) = barriers(finger, wells)
-    half_turns = np.arcsin(np.stack((wells.barrier, wells.extension))[:, 0, 0] / 21.5)
-    top, bottom = 0.5 * 24.2 * (2.0 * half_turns) ** 2
-    reset = own + top - float(finger.springs(wells.extension).energy[0, 0]) - bottom
+    half_turn = float(np.arcsin(wells.extension[0, 0] / 21.5))
+    bottom = 0.5 * 24.2 * (2.0 * half_turn) ** 2
+    reset = own - float(finger.springs(wells.extension).energy[0, 0]) - bottom
     assert lowest == pytest.approx(min(own, reset), rel=1e-9)
 
 
