@@ -17,7 +17,7 @@ from dpgcli.states.wells import Wells
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))  # below it, rounding may decide
 SMALL_SHARE = 0.1  # of a unit's holding force: a smaller residual cannot make it snap
 LARGEST_CURVATURE = 1.0  # a larger one is far from any loss of stability
-FINEST_BALANCE = 1e-13  # of the forces in play: rounding leaves so much of them
+FINEST_BALANCE = 1e-13  # of the finger's forces in play: rounding leaves so much of them
 
 
 class Status(IntEnum):
@@ -160,6 +160,7 @@ def _is_balanced(
     on_opening = (moments / np.where(lever > 0.0, lever, finger.segment_height)).max(axis=0)
     borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)
     curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
-    by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
+    rounding = FINEST_BALANCE * finger.force_scale.max(axis=0)  # a weak unit feels its neighbors'
+    by_fold = np.maximum(curvature * curvature / 96.0 * finger.force_scale, rounding)
     is_small = (on_opening <= SMALL_SHARE * borne) & (unbalance <= SMALL_SHARE * by_fold)
     return np.asarray(is_small.all(axis=0))

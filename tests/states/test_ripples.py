@@ -181,3 +181,20 @@ def test_wells_behind_walls_are_told_from_barriers_next_to_a_fold(
     inside, outside = wells(fold * (1.0 + sign * distance)), wells(fold * (1.0 - sign * distance))
     assert inside.exists.all() and not outside.exists.any()
     assert (inside.barrier < inside.extension).all()
+
+
+@pytest.mark.parametrize(("share", "is_balanced"), [(3e-15, True), (3e-14, False)])
+def test_a_weak_unit_may_feel_the_rounding_of_its_neighbors(
+    share: float, is_balanced: bool
+) -> None:
+    """A moment of that share of the strong unit's forces, at a curvature that tells nothing."""
+    strong = uniform_finger(2, **{**STUDY, "hinge_stiffness": 1e-6})
+    finger = strong.changed(bistable_stiffness=np.array([[100.0], [0.01]]))
+    units, inverted = UnitSolutions.of(finger), np.ones((2, 1), bool)
+    found = settle(units, chain_potential, inverted, 1e-12)
+    moment = share * 100.0 * 3.5 * 10.75
+    off = np.zeros((4, 1))
+    off[2] = moment
+    there = replace(found.equilibrium, gradient=off, curvature=np.array([1e-9]))
+    again = certified(units, found.potential, inverted, there, 1e-6)
+    assert again.is_balanced.tolist() == [is_balanced]
