@@ -48,6 +48,19 @@ def drop_orphans(path: Path) -> None:
     _drop_unheld(path, stat.S_ISREG, os.unlink)
 
 
+def working_folder_is_gone() -> bool:
+    """Whether the folder that this process works in was deleted: then no relative name means any.
+
+    >>> working_folder_is_gone()
+    False
+    """
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return True
+    return False
+
+
 def lock(handle: int, *, blocking: bool = True) -> bool:
     """Lock an open file or folder until it is closed, by whatever end of the process.
 

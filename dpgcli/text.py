@@ -1,8 +1,11 @@
 """Text from outside made fit to print: nothing in it moves a cursor or ends a line."""
 
+import re
+
 KeyPath = tuple[str | int, ...]
 
 MAX_SHOWN = 60
+COMMAND = re.compile(r"(^\s*):(?=:)|(#)#(?=\w*\[)")
 
 
 def printable(text: str) -> str:
@@ -16,6 +19,22 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def inert(line: str) -> str:
+    """A line that the runner of a workflow shows, where it would take a name for a command.
+
+    GitHub's obeys a line that begins with `::name`, blanks aside, and like that of Azure
+    `##[name]` or `##vso[name]` anywhere in it.
+
+    >>> inert("::stop-commands::x.yaml: ok"), inert("a##[add-mask]b"), inert("# a::b")
+    ('\\\\x3a:stop-commands::x.yaml: ok', 'a#\\\\x23[add-mask]b', '# a::b')
+    """
+    if "::" not in line and "##" not in line:  # as nearly all, of a million rows
+        return line
+    return COMMAND.sub(
+        lambda found: rf"{found[1] or ''}\x3a" if found[2] is None else r"#\x23", line
+    )
 
 
 def control_character(name: str) -> str:

@@ -12,6 +12,7 @@ FLOORS = {
     "errors": 0,
     "arrays": 0,
     "code": 0,
+    "cores": 0,
     "signals": 0,
     "temporary": 0,
     "text": 0,
@@ -107,3 +108,11 @@ def test_text_is_written_with_the_same_line_ends_everywhere() -> None:
                 assert [ast.literal_eval(end) for end in ends] == ["\n"], path
                 written.append(path)
     assert len(written) >= 5
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_temporary_files_are_those_that_the_next_run_removes(path: Path) -> None:
+    """What `tempfile` makes stays for good after a process that was killed."""
+    makers = ("TemporaryDirectory", "TemporaryFile", "mkdtemp", "mkstemp", "mktemp")
+    text = path.read_text(encoding="utf-8")
+    assert not [maker for maker in makers if maker in text]

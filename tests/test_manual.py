@@ -9,7 +9,9 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 from typer.models import OptionInfo
@@ -37,6 +39,7 @@ from dpgcli.cli.fit.bistable import bistable
 from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
+from dpgcli.cli.main import NAMES
 from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
@@ -81,6 +84,7 @@ PAGES = {"README": ROOT / "README.md"} | {
 MANUAL = "\n".join(path.read_text(encoding="utf-8") for path in PAGES.values())
 FENCED = re.compile(r"^```(\w+)(.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
+PROGRESS = re.compile(r"^.*, \d+ s( left)?\n", re.MULTILINE)  # while one waits
 TIMES = re.compile(r"[\d.,]+ (?=s\b|states/s|% of the workers|% in )")
 
 
@@ -93,8 +97,12 @@ class Block:
     text: str
 
 
+def text_of(page: str) -> str:
+    return PAGES[page].read_text(encoding="utf-8")
+
+
 def blocks(page: str) -> list[Block]:
-    found = FENCED.findall(PAGES[page].read_text(encoding="utf-8"))
+    found = FENCED.findall(text_of(page))
     return [Block(language, tuple(words.split()), text) for language, words, text in found]
 
 
@@ -106,13 +114,21 @@ def stories() -> Iterator[ParameterSet]:
             yield pytest.param(page, True, id=f"{page}, slow", marks=pytest.mark.slow)
 
 
+@pytest.fixture
+def scratch_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with the examples, as the current one, and `dpg` on the PATH."""
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    monkeypatch.chdir(tmp_path)
+    programs = Path(sys.executable).parent
+    monkeypatch.setenv("PATH", os.pathsep.join((str(programs), os.environ["PATH"])))
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.mark.parametrize(("page", "with_slow"), [*stories()])
+@pytest.mark.usefixtures("scratch_copy")
 def test_a_page_does_what_it_shows(
-    page: str,
-    with_slow: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    page: str, with_slow: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its blocks one after the other, in a folder of their own with the examples.
 
@@ -120,12 +136,8 @@ def test_a_page_does_what_it_shows(
     prints, a block with a file's name is that file. What takes long is marked `slow`, what needs
     CalculiX `ccx`.
     """
-    shutil.copytree(ROOT / "configs", tmp_path / "configs")
-    monkeypatch.chdir(tmp_path)
-    programs = Path(sys.executable).parent
-    monkeypatch.setenv("PATH", os.pathsep.join((str(programs), os.environ["PATH"])))
-    monkeypatch.setenv("NO_COLOR", "1")
     names: dict[str, object] = {}
+    before = ""
     for block in blocks(page):
         if ("slow" in block.words and not with_slow) or ("ccx" in block.words and not CCX):
             continue
@@ -135,9 +147,12 @@ def test_a_page_does_what_it_shows(
             capsys.readouterr()
             exec(block.text, names)
         elif block.language == "text":
-            assert capsys.readouterr().out == block.text
+            assert before == "python", "what is printed stands below what prints it"
+            printed = capsys.readouterr().out
+            assert is_shown(printed, block.text), printed
         elif block.words:
             Path(block.words[0]).write_text(block.text, encoding="utf-8")
+        before = block.language
 
 
 CCX = shutil.which("ccx")
@@ -150,8 +165,9 @@ def run_session(text: str) -> None:
         code = re.search(r"# exit code (\d)$", command)
         done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
         assert done.returncode == (int(code[1]) if code else 0), done.stderr
-        if not is_shown(done.stdout, shown) and not is_shown(done.stdout + done.stderr, shown):
-            assert done.stdout + done.stderr == shown, command
+        everything = done.stdout + PROGRESS.sub("", done.stderr)
+        if not is_shown(done.stdout, shown) and not is_shown(everything, shown):
+            assert everything == shown, command
 
 
 def is_shown(printed: str, shown: str) -> bool:
@@ -180,12 +196,38 @@ def test_a_page_that_shows_another_number_is_wrong(printed: str, is_the_same: bo
 
 
 def test_the_readme_fits_on_two_screens() -> None:
-    assert len(PAGES["README"].read_text(encoding="utf-8").splitlines()) <= 150
+    assert len(text_of("README").splitlines()) <= 150
+
+
+def examples() -> list[str]:
+    """Those in the README's table of commands."""
+    text = text_of("README")
+    return re.findall(r"^\| `dpg [^|]*\|[^|]*\| `(dpg [^`]*)` \|$", text, re.MULTILINE)
+
+
+def test_every_command_has_an_example() -> None:
+    assert {example.split()[1] for example in examples()} == set(NAMES)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("scratch_copy")
+def test_the_examples_of_commands_run() -> None:
+    """One after the other; the shards that one of them merges are made before."""
+    sweep_file = "configs/sweeps/height_separation.yaml"
+    shards = [f"dpg sweep {sweep_file} --shard {k}/2 -o shard-{k}" for k in (1, 2)]
+    for command in (*shards, *examples()):
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{command}: {done.stderr}"
+
+
+def test_words_of_our_own_are_only_in_the_glossary() -> None:
+    ours = re.compile(r"\brungs?\b|\blevers?\b|\b(held|hold|holds) \w* ?against\b")
+    assert not ours.findall(MANUAL.replace(text_of("glossary"), ""))
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
-    text = FENCED.sub("", PAGES[page].read_text(encoding="utf-8"))
+    text = FENCED.sub("", text_of(page))
     for target in re.findall(r"\]\(([^)]+)\)", text):
         name, _, heading = target.partition("#")
         path = PAGES[page].parent / name if name else PAGES[page]
@@ -198,6 +240,25 @@ def headings(path: Path) -> set[str]:
     text = FENCED.sub("", path.read_text(encoding="utf-8"))
     titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_the_picture_is_what_the_command_draws(tmp_path: Path) -> None:
+    """To a pixel: other versions of Matplotlib may write the same in other words."""
+    (named,) = re.findall(r"!\[[^]]+\]\((\S+\.svg)\)", text_of("README"))
+    spec = ROOT / "configs" / "three_unit.yaml"
+    plot = str(tmp_path / "states.svg")
+    dpg.predict(spec).draw(plot)
+    shown, drawn = (_drawing(Path(path)) for path in (ROOT / named, plot))
+    assert shown[0] == drawn[0]
+    np.testing.assert_allclose(shown[1], drawn[1], atol=1.0)
+
+
+def _drawing(path: Path) -> tuple[list[str], np.ndarray]:
+    """The texts of a picture and the coordinates of its lines."""
+    elements = list(ElementTree.parse(path).iter())
+    texts = [element.text for element in elements if (element.text or "").strip()]
+    lines = " ".join(element.get("d", "") for element in elements)
+    return texts, np.array(re.findall(r"-?[0-9.]+", lines), float)
 
 
 def test_the_spec_shown_is_valid(tmp_path: Path) -> None:
@@ -237,18 +298,32 @@ def test_every_command_and_option_is_named(name: str) -> None:
     assert not {option for option in options if option not in MANUAL}
 
 
-def test_every_key_of_the_spec_is_named() -> None:
+def test_every_key_of_the_spec_is_on_its_page() -> None:
     definitions = json_schema()["$defs"].values()
     keys = {key for part in definitions for key in part.get("properties", {})}
-    assert not {key for key in keys if key not in MANUAL}
+    assert not {key for key in keys if f"{key}" not in text_of("spec")}
+    assert not {origin for origin in Origin if f"`{origin}`" not in text_of("spec")}
 
 
-def test_every_column_group_status_origin_and_exit_code_is_named() -> None:
+def named_in(page: str) -> set[str]:
+    """What a page has in backticks."""
+    return set(re.findall(r"`([^`\n]+)`", text_of(page)))
+
+
+def test_every_column_group_and_status_is_on_its_page() -> None:
     columns = declared(3, ("bistable", "hinge", "bar"), True)
-    named = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
-    named |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status), *Origin}
-    assert not {name for name in named if f"`{name}" not in MANUAL}
-    named = {c.name for c in (*METRICS, *LEVEL_COLUMNS)} | {*DesignStatus, *ABLATIONS}
-    named |= {*Verdict, PATTERNS.name, *(family.name for family in FAMILIES)}
-    assert not {name for name in named if f"`{name}" not in MANUAL}
-    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", MANUAL, re.M)}
+    names = {c.name for c in columns if c.group not in (Group.NODES, Group.OPENINGS)}
+    names |= {"opening_1_mm", *(g.value for g in Group), *(s.text for s in Status)}
+    assert not names - named_in("columns")
+    assert not {c.name for c in (*METRICS, *LEVEL_COLUMNS)} - named_in("sweeps")
+    assert not {*DesignStatus} - named_in("sweeps")
+
+
+def test_every_verdict_family_and_ablation_is_on_its_page() -> None:
+    assert not {*Verdict, PATTERNS.name, *(f.name for f in FAMILIES)} - named_in("stress")
+    assert not {*ABLATIONS} - named_in("accuracy")
+
+
+def test_every_exit_code_is_on_its_page() -> None:
+    page = text_of("files")
+    assert not {code for code in ExitCode if not re.search(rf"^\|.*\b{code}\b.*\|", page, re.M)}

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from dpgcli.api.inputs import (
+    Place,
     Settings,
     SpecInput,
     as_texts,
@@ -13,9 +14,11 @@ from dpgcli.api.inputs import (
     check_numbers,
     check_whole,
     figure_path,
+    files_of,
+    frame_of,
     path_of,
-    point,
     scene_input,
+    table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
@@ -23,22 +26,29 @@ from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
 from dpgcli.files.known_states import states_of
+from dpgcli.files.output import Mark, check_outputs
+from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record
-from dpgcli.files.table_writer import write_states
 from dpgcli.reports.precision import changes, cheapest_way, draw_precision
 from dpgcli.sweeps.differences import differences
+
+MOST_REPEATS = 1000
 
 
 @dataclass(frozen=True)
 class BenchResult:
-    """Measurements, a row for each method and size; `recorded` are rows of an earlier record."""
+    """Measurements, a row for each method and size; `recorded` are rows of an earlier record.
+
+    `files` are those that were read.
+    """
 
     name: str
     spec_json: str
     rows: tuple[Row, ...]
     target_error: float | None = None
     recorded: tuple[Row, ...] | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def table(self) -> Table:
@@ -47,7 +57,7 @@ class BenchResult:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """The cheapest way for the target error, and what got slower since the record."""
+        """The cheapest method for the target error, and what got slower since the record."""
         cheapest = (
             () if self.target_error is None else (cheapest_way(self.rows, self.target_error),)
         )
@@ -55,11 +65,18 @@ class BenchResult:
 
     def save(self, path: str | Path, command: Sequence[str] = ()) -> None:
         """Write all rows to a Parquet file, with the `command` that asked for them."""
-        write_bench(path_of("path", path), self.rows, self.spec_json, command)
+        table = table_path(path)
+        check_outputs(self.files, (table, Mark.TABLE))
+        write_bench(table, self.rows, self.spec_json, command)
 
     def record(self, path: str | Path, command: Sequence[str] = ()) -> None:
-        """Write all rows and the machine to a JSON file, for `compare` in a later call."""
-        write_record(path_of("path", path), self.rows, self.spec_json, command)
+        """Write all rows and the machine to a JSON file, for `compare` in a later call.
+
+        Raises UsageError for the record that was compared with.
+        """
+        record = path_of("path", path)
+        check_outputs(self.files, (record, Mark.FACTS))
+        write_record(record, self.rows, self.spec_json, command)
 
     def draw(self, path: str | Path) -> None:
         """Draw error over time to a .svg or .png file."""
@@ -74,8 +91,8 @@ def bench(
     target_error: float | None = None,
     keep: str | Sequence[str] = (),
     against: Tabular | None = None,
-    first_station: tuple[float, float] = (0.0, 0.0),
-    tip_offset: tuple[float, float] = (0.0, 0.0),
+    first_station: Place = None,
+    tip_offset: Place = None,
     compare: str | Path | None = None,
     watch: Callable[[Row], None] = lambda row: None,
 ) -> BenchResult:
@@ -94,11 +111,13 @@ def bench(
     """
     check_installed("dpg bench", "mpmath")
     check_whole(repeats=repeats)
+    if not 1 <= repeats <= MOST_REPEATS:
+        raise UsageError(Field("repeats"), f" {repeats}: expected from 1 to {MOST_REPEATS:,}")
     check_numbers(target_error=target_error)
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
     then = None if compare is None else _recorded(path_of("compare", compare), given.json)
-    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
+    frame = Frame() if known is None else frame_of(given, known, first_station, tip_offset)[0]
     write = partial(write_states, spec_json="{}")
     study = Bench(given.scene, repeats, as_texts("keep", keep), target_error, known, frame, write)
     study.check()
@@ -106,7 +125,8 @@ def bench(
     for row in study.rows():
         watch(row)
         rows.append(row)
-    return BenchResult(given.name, given.json, tuple(rows), target_error, then)
+    files = (*given.files, *files_of(against, compare))
+    return BenchResult(given.name, given.json, tuple(rows), target_error, then, files)
 
 
 def _recorded(path: Path, spec_json: str) -> tuple[Row, ...]:

@@ -1,24 +1,24 @@
-"""`check`: hold a table of designs against requirements."""
+"""`check`: test a table of designs against requirements."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
-from dpgcli.api.inputs import as_texts
+from dpgcli.api.inputs import as_texts, path_of
 from dpgcli.api.tables import Table
-from dpgcli.errors import UsageError
+from dpgcli.arrays import Columns
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.frames import frame_of
 from dpgcli.files.table_reader import designs_in, read_designs
 from dpgcli.sweeps.gate import RequirementVerdict, check_designs
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DesignsInput: TypeAlias = str | Path | Table | Any
 """The designs.parquet of a sweep, or its content: of pandas, of Arrow, or a Table."""
 
 
 def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[RequirementVerdict, ...]:
-    """Hold every design of a table against requirements, one verdict each.
+    """Test every design of a table against requirements, one verdict each.
 
     Raises UsageError for what is no table of designs or no requirement, NothingSelectedError
     where every design is excluded.
@@ -29,20 +29,22 @@ def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[Requirem
     >>> verdict.is_met, [failure.design for failure in verdict.failures()]
     (False, [0])
     """
-    return check_designs(designs_of(designs)[0], as_texts("require", require))
+    requirements = as_texts("require", require)
+    if not requirements:
+        raise UsageError(Field("require"), ": expected one requirement or more")
+    return check_designs(designs_of(designs)[0], requirements)
 
 
-def designs_of(designs: DesignsInput) -> "tuple[pd.DataFrame, dict[str, str]]":
-    """A table of designs as a data frame, and the unit of each column."""
-    import pandas as pd
+def designs_of(designs: DesignsInput) -> tuple[Columns, dict[str, str]]:
+    """The columns of a table of designs, and the unit of each."""
+    if isinstance(designs, str | os.PathLike):
+        return read_designs(path_of("designs", designs))
     import pyarrow as pa
 
-    if isinstance(designs, str | Path):
-        return read_designs(Path(designs))
     rows: Any = designs.arrow if isinstance(designs, Table) else designs
-    if not isinstance(rows, pa.Table):
+    if not isinstance(rows, pa.Table) or rows.schema.pandas_metadata:  # there may be an index
         try:
-            rows = pa.Table.from_pandas(pd.DataFrame(rows), preserve_index=False)
+            rows = pa.Table.from_pandas(frame_of(rows), preserve_index=False)
         except (ValueError, TypeError, pa.ArrowException) as error:
             raise UsageError(f"expected a table of designs: {error}") from error
     return designs_in(rows, "the table")

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from dpgcli.api.inputs import Settings, SpecInput, figure_path, point, scene_input
+from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, frame_of, scene_input
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.benchmark.timing import measured
 from dpgcli.calibration import comparison
-from dpgcli.calibration.comparison import Comparison
+from dpgcli.calibration.comparison import Comparison, frame_misfit
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
+from dpgcli.errors import Message
 from dpgcli.files.calibration import Calibration
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
@@ -26,13 +27,18 @@ REPEATS = 5
 
 @dataclass(frozen=True)
 class CompareResult:
-    """Known states and the lattice's own, `calibrated` by another calibration if there is one."""
+    """Known states and the lattice's own, `calibrated` by another calibration if there is one.
+
+    `frame_words` say where the `frame` of the data is from.
+    """
 
     name: str
     finger: Finger
     known: KnownStates
     found: Comparison
     calibrated: Comparison | None
+    frame: Frame
+    frame_words: str
 
     @cached_property
     def rows(self) -> Columns:
@@ -53,7 +59,8 @@ class CompareResult:
     def summary(self) -> tuple[str, ...]:
         """Worst and mean errors of states that are in both, and the ratio of run times."""
         law = self.finger.law.description
-        lines = [*comparison_summary(self.found, self.calibrated, law), *self._times()]
+        lines = [*comparison_summary(self.found, self.calibrated, law), *self._frame()]
+        lines += self._times()
         if self.known.unused:
             lines.append(f"columns not used: {', '.join(self.known.unused)}")
         return tuple(lines)
@@ -61,6 +68,13 @@ class CompareResult:
     def draw(self, path: str | Path) -> None:
         """Draw shapes and known tips to a .svg or .png file."""
         draw_comparison(self.known, self.found, self.calibrated, self.name, figure_path(path))
+
+    def _frame(self) -> Iterator[str]:
+        """Where the frame is from, and whether it fits."""
+        if self.frame != Frame():
+            yield f"frame: {self.frame_words}"
+        if misfit := frame_misfit(self.finger, self.known, self.found, self.frame):
+            yield Message("warning: ", misfit)
 
     def _times(self) -> Iterator[str]:
         """Seconds a state: of the data, where they say, and of the prediction."""
@@ -81,14 +95,15 @@ def compare(
     settings: Settings = (),
     calibration: str | Path | Calibration | None = None,
     shapes: Tabular | None = None,
-    first_station: tuple[float, float] = (0.0, 0.0),
-    tip_offset: tuple[float, float] = (0.0, 0.0),
+    first_station: Place = None,
+    tip_offset: Place = None,
 ) -> CompareResult:
-    """Hold predictions against finite elements or measurements.
+    """Compare predictions with finite elements or measurements.
 
     `data` has `pattern` and what is known of it; `shapes` the layer's points: see
     `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
-    what the data call the tip, from the last node along the phalanx and to its left (mm). With a
+    what the data call the tip, from the last node along the phalanx and to its left (mm), unless
+    the data's header or the spec's section `data` says them. With a
     `calibration` its values are compared, too. Raises SpecError for a wrong spec or data.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -98,8 +113,8 @@ def compare(
     """
     given = scene_input(spec, settings)
     finger = given.scene.finger
-    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
     known = states_of(finger, data, shapes)
+    frame, said = frame_of(given, known, first_station, tip_offset)
     better = None if calibration is None else given.recalibrated(calibration).finger
     return CompareResult(
         name_of(data),
@@ -107,4 +122,6 @@ def compare(
         known,
         comparison.compare(finger, known, frame),
         None if better is None else comparison.compare(better, known, frame),
+        frame,
+        said,
     )

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from decimal import Decimal
 from enum import StrEnum
 from importlib import util
 from numbers import Integral, Real
@@ -12,10 +13,13 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias, TypeVar
 
+from dpgcli.calibration.choices import MOST_RESAMPLES
+from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
@@ -25,14 +29,25 @@ from dpgcli.files.scene_file import (
     recalibrated,
     scene_of,
 )
+from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
-from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 """Values by dotted key of a spec, or "key=value" texts."""
+
+Texts: TypeAlias = Mapping[str, str] | Sequence[str] | str
+"""Texts by name, or "name=text"."""
+
+Place: TypeAlias = Sequence[float] | None
+"""Two numbers in mm; None where somebody else says them."""
+
+ORIGINS = ("as given", "from the data's header", "from the spec")
+NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
+FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -91,7 +106,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
         name, own = str(spec), (path_of("spec", spec),)
         document = read_scene(spec, setting_texts(settings))
     found = checked(document)
-    return SceneInput(name, scene_of(found), found, document, (*own, *document.files))
+    return SceneInput(name, scene_of(found), found, document, files_of(*own, *document.files))
 
 
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
@@ -108,7 +123,8 @@ def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
 
 
 def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
-    return with_settings(Document("spec", plain(data), {}), setting_texts(settings))
+    own = without_free_keys(plain(data))
+    return with_settings(Document("spec", own, {}), setting_texts(settings))
 
 
 def setting_texts(settings: Settings, field: str = "settings") -> tuple[str, ...]:
@@ -138,6 +154,8 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
+    if isinstance(value, Decimal):  # of a database
+        return float(value)
     listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
     if listed is None and not isinstance(value, str | Real | date | NoneType):
         raise UsageError(f"a spec has no {type(value).__name__}: expected numbers and texts")
@@ -157,7 +175,7 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def path_of(field: str, path: str | os.PathLike[str]) -> Path:
-    """The path of a file or folder. Raises UsageError for what is none.
+    """The path of a file or folder. Raises UsageError for what is none, or no system can name.
 
     >>> path_of("spec", None)
     Traceback (most recent call last):
@@ -165,9 +183,18 @@ def path_of(field: str, path: str | os.PathLike[str]) -> Path:
     dpgcli.errors.UsageError: spec None: expected a path
     """
     try:
-        return Path(path)
-    except TypeError:
-        raise UsageError(Field(field), f" {path!r}: expected a path") from None
+        found = Path(path)
+        is_name = b"\0" not in os.fsencode(found)
+    except (TypeError, UnicodeEncodeError):  # half of a pair in UTF-16
+        is_name = False
+    if not is_name:
+        raise UsageError(Field(field), f" {path!r}: expected a path")
+    return found
+
+
+def files_of(*sources: object) -> tuple[Path, ...]:
+    """Those of the sources that are files, wherever the program works by the time of writing."""
+    return tuple(Path(s).absolute() for s in sources if isinstance(s, str | os.PathLike))
 
 
 def check_numbers(**values: float | None) -> None:
@@ -191,6 +218,27 @@ def check_whole(**values: int | None) -> None:
             raise UsageError(Field(field), f" {value!r}: expected a whole number")
 
 
+def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
+    """What of a table is read: our names and quantities with its titles and units.
+
+    >>> table_choice(["force_N=Load"], 4, {"force": "kN"})
+    Choice(columns={'force_N': 'Load'}, skip=4, units={'force': 'kN'})
+    """
+    check_whole(skip=skip)
+    return Choice(_by_name("column", column), skip, _by_name("units", units))
+
+
+def _by_name(field: str, texts: Texts) -> dict[str, str]:
+    """Texts by name. Raises UsageError for what is no "name=text"."""
+    if isinstance(texts, Mapping):
+        return {str(name): str(text) for name, text in texts.items()}
+    parts = [(text, *map(str.strip, text.partition("="))) for text in as_texts(field, texts)]
+    for text, name, _, said in parts:
+        if not name or not said:
+            raise UsageError(Field(field), f" {text}: expected {FORMS[field]}")
+    return {name: said for _, name, _, said in parts}
+
+
 def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     """A place in some data, mm. Raises UsageError for what is not two numbers.
 
@@ -208,6 +256,26 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     return x, y
 
 
+def frame_of(
+    given: SceneInput, known: KnownStates, first_station: Place, tip_offset: Place
+) -> tuple[Frame, str]:
+    """The frame of known states, and where it is from: options, else the data, else the spec."""
+    spec = (given.spec and given.spec.data) or DataSpec()
+    said: dict[str, tuple[Place, ...]] = {
+        "first_station": (first_station, known.first_station, spec.first_station_mm),
+        "tip_offset": (tip_offset, known.tip_offset, spec.tip_offset_mm),
+    }
+    points, words = [], []
+    for field, places in said.items():
+        pairs = zip(places, ORIGINS, strict=True)
+        found = [(place, origin) for place, origin in pairs if place is not None]
+        place, origin = found[0] if found else ((0.0, 0.0), "assumed")
+        x, y = point(field, place)
+        points.append((x, y))
+        words.append(f"{field.replace('_', ' ')} {x:g},{y:g} mm ({origin})")
+    return Frame(*points), ", ".join(words)
+
+
 def figure_path(path: str | Path) -> Path:
     """The path of a figure. Raises UsageError for a suffix that cannot be drawn."""
     figure = path_of("path", path)
@@ -217,12 +285,22 @@ def figure_path(path: str | Path) -> Path:
     return figure
 
 
+def table_path(path: str | Path) -> Path:
+    """The path of a Parquet file. Raises UsageError for a suffix that says something else."""
+    table = path_of("path", path)
+    if table.suffix.lower() in NO_TABLE:
+        raise UsageError(f"path {path}: writes Parquet, give a name that ends in .parquet")
+    return table
+
+
 def check_resampling(bootstrap: int, seed: int) -> None:
-    """Raise UsageError for numbers of samples, or seeds, below zero."""
+    """Raise UsageError for a number of samples, or a seed, that is none; or of too many samples."""
     check_whole(bootstrap=bootstrap, seed=seed)
     for field, value in (("bootstrap", bootstrap), ("seed", seed)):
         if value < 0:
             raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
+    if bootstrap > MOST_RESAMPLES:
+        raise UsageError(Field("bootstrap"), f" {bootstrap}: expected at most {MOST_RESAMPLES:,}")
 
 
 def check_installed(what: str, package: str) -> None:

@@ -15,6 +15,7 @@ from dpgcli.api.inputs import (
     figure_path,
     path_of,
     scene_input,
+    table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
@@ -69,19 +70,29 @@ class PredictResult:
     def save(self, path: str | Path) -> None:
         """Write the states to a Parquet file, the bytes of `dpg predict --output`.
 
-        What differs between runs goes into a `.run.json` beside it. Raises OutputError.
+        What differs between runs goes into a `.run.json` beside it. Raises OutputError, and
+        UsageError for a file that the states come from, or a name of another format.
         """
         from dpgcli.files.output import Mark, check_outputs, run_file
-        from dpgcli.files.prediction import write_prediction
+        from dpgcli.files.prediction import check_facts, write_prediction
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE), (run_file(table), Mark.FACTS))
+        check_facts(table_path(table))
         write_prediction(self.prediction, table, self.given.json, self.blocks)
 
-    def draw(self, path: str | Path) -> None:
-        """Draw the states, 64 at most, to a .svg or .png file."""
+    def draw(self, path: str | Path, *, overlay: bool = False) -> None:
+        """Draw the states, 64 at most, to a .svg or .png file.
+
+        A panel for each, those with fewer inverted units first, or all in one picture.
+        """
         check_drawable(self.plan.n_states)
-        draw(self.given.scene, self.plan.request.patterns, figure_path(path))
+        draw(self.given.scene, self.plan.request.patterns, figure_path(path), overlay=overlay)
+
+    def sketch(self, width: int = 80) -> str:
+        """Small pictures of the states, 64 at most, as braille in lines of `width` characters."""
+        check_drawable(self.plan.n_states, "sketch")
+        return sketch(self.given.scene, self.plan.request.patterns, width)
 
 
 def predict(
@@ -98,7 +109,8 @@ def predict(
 
     `settings` change keys of the spec; `patterns` are globs such as "1*1", none for all states;
     `columns` names columns or groups of them. `tolerance` is the largest residual over the forces
-    in play; a `target_error` (mm, of the tips) takes the cheapest way that is bounded by it.
+    in play; a `target_error` (mm, of the tips) takes the cheapest accuracy level that is bounded by
+    it.
     Raises SpecError for a wrong spec, UsageError for wrong choices, NothingSelectedError where no
     pattern matches.
 
@@ -154,16 +166,30 @@ def request_of(
     )
 
 
-def check_drawable(n_states: int) -> None:
+def check_drawable(n_states: int, field: str = "plot") -> None:
     """Raise UsageError for more shapes than one can see."""
     if n_states > MOST_DRAWN:
         what = f" draws at most {MOST_DRAWN} states, not {n_states:,}: select with "
-        raise UsageError(Field("plot"), what, Field("patterns"))
+        raise UsageError(Field(field), what, Field("patterns"))
 
 
-def draw(scene: Scene, patterns: tuple[str, ...], path: Path) -> None:
+def draw(scene: Scene, patterns: tuple[str, ...], path: Path, *, overlay: bool = False) -> None:
     """Draw the states with these patterns."""
     from dpgcli.reports.figures import draw_states
 
-    request = Request(patterns, columns=("pattern", "status", "nodes"))
-    draw_states(states.predict(scene, request), path)
+    draw_states(_with_nodes(scene, patterns), path, overlay=overlay)
+
+
+def sketch(scene: Scene, patterns: tuple[str, ...], width: int) -> str:
+    """The states with these patterns as braille."""
+    from dpgcli.reports.outlines import drawn_states
+    from dpgcli.reports.sketch import sketches
+
+    return sketches(drawn_states(_with_nodes(scene, patterns)), width)
+
+
+def _with_nodes(scene: Scene, patterns: tuple[str, ...]) -> Prediction:
+    from dpgcli.reports.outlines import COLUMNS, OF_GRIPPERS
+
+    columns = COLUMNS if scene.gripper is None else (*COLUMNS, *OF_GRIPPERS)
+    return states.predict(scene, Request(patterns, columns=columns))

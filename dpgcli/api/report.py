@@ -2,20 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from dpgcli.api.inputs import path_of
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
-from dpgcli.files.parts import FINGERPRINT
-from dpgcli.files.table_reader import read_designs, read_run
+from dpgcli.files.table_reader import read_designs
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
-from dpgcli.studies.sweep import DESIGNS, REPORT, RUN
-
-if TYPE_CHECKING:
-    import pandas as pd
+from dpgcli.reports.summary import DesignSpace
+from dpgcli.studies.sweep import DESIGNS, REPORT
 
 PAGES = {".md": markdown, ".html": html}
 AT_END = "<!-- written by dpg -->"
@@ -40,38 +36,29 @@ def report(folder: str | Path, *, format: str = "md") -> str:
     """
     if f".{format}" not in PAGES:
         raise UsageError(Field("format"), f" {format!r}: expected md or html")
-    return page(path_of("folder", folder), f".{format}", silent)[1]
+    return page(path_of("folder", folder), f".{format}")[1]
 
 
-def page(folder: Path, kind: str, say: Say) -> "tuple[pd.DataFrame, str]":
-    """The designs in a folder, and their page; `say` hears of facts that are left out."""
+def page(folder: Path, kind: str) -> tuple[DesignSpace, str]:
+    """The design space in a folder, and its page: the same for the same table."""
     designs, units = read_designs(folder / DESIGNS)
-    return designs, PAGES[kind](designs, units, _facts(folder, say))
+    space = DesignSpace(designs, units, read_metadata(folder / DESIGNS))
+    return space, PAGES[kind](space)
 
 
-def summarize(folder: Path, *, is_new: bool, say: Say = silent) -> "tuple[pd.DataFrame, str]":
+def summarize(folder: Path, *, is_new: bool) -> tuple[DesignSpace, str]:
     """The designs of a finished sweep and their page, written into its folder if need be."""
-    designs, text = page(folder, ".md", say)
+    space, text = page(folder, ".md")
     path = folder / REPORT
     if is_new or not path.exists() or _is_outdated(path, text):
         write_page(path, text)
-    return designs, text
+    return space, text
 
 
 def write_page(path: Path, text: str) -> None:
     """Write a page, at its end the mark by which `dpg` knows it."""
     with whole_file(path, Mark.REPORT) as temporary:
         temporary.write_bytes(_bytes(text))
-
-
-def _facts(folder: Path, say: Say) -> dict[str, Any] | None:
-    """The facts of the run that made the tables in a folder, if they are there."""
-    facts = read_run(folder / RUN)
-    made = read_metadata(folder / DESIGNS).get(FINGERPRINT)
-    if facts is not None and facts.get("fingerprint") != made:
-        say(f"{folder / RUN} is not of the run that made these tables: left out")
-        return None
-    return facts
 
 
 def _is_outdated(path: Path, text: str) -> bool:

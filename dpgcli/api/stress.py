@@ -1,4 +1,4 @@
-"""`stress`: stiff and extreme cases, held against extended precision."""
+"""`stress`: stiff and extreme cases beside extended precision."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_installed,
-    path_of,
     scene_input,
+    table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, NothingSelectedError, UsageError
@@ -46,7 +46,7 @@ class StressResult:
 
     def save(self, path: str | Path) -> None:
         """Write every case to a Parquet file."""
-        write_stress(path_of("path", path), self.outcomes, self.spec_json)
+        write_stress(table_path(path), self.outcomes, self.spec_json)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def stress(
     settings: Settings = (),
     watch: Callable[[Outcome], None] = lambda outcome: None,
 ) -> StressResult:
-    """Hold stiff and extreme cases against extended precision; needs mpmath.
+    """Compare stiff and extreme cases with extended precision; needs mpmath.
 
     Without a spec the built-in cases alone; `only` names families. `watch` sees each outcome.
     Raises SpecError for a wrong spec, UsageError for unknown families.

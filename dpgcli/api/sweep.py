@@ -1,13 +1,12 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import Any
 
 from dpgcli.api.inputs import (
@@ -21,14 +20,17 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
+from dpgcli.cores import cores
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
-from dpgcli.files.parts import PartStore
+from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
-from dpgcli.files.table_reader import read_run, read_undamaged
-from dpgcli.files.yaml_file import Document
+from dpgcli.files.table_reader import read_undamaged
+from dpgcli.files.yaml_file import Document, without_free_keys
 from dpgcli.mechanics.finger import Finger
+from dpgcli.reports.summary import DesignSpace
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
@@ -43,34 +45,52 @@ from dpgcli.studies.sweep import (
     outputs,
     stores,
 )
-from dpgcli.sweeps import cluster, executors
+from dpgcli.sweeps import cluster, executors, pool
 from dpgcli.sweeps.executors import Backend
+from dpgcli.temporary import temporary_folder
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
-ADDRESS = r"(?:(?:tcp|tls|ws|wss|ucx)://)?[^\s/]+:[0-9]{1,5}/?"
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The tables of a sweep; of a shard there are none before `merge`.
+    """The tables of a sweep, read when asked for; of a shard there are none before `merge`.
 
-    `n_failed` designs killed their worker, twice. `report` is the page on the space.
+    `n_failed` designs killed their worker, twice. `report` is the page on the space, `space` what
+    it was made of; `fingerprint` is that of all the tables depend on.
     """
 
     folder: Path
+    fingerprint: str
     n_failed: int
     report: str = ""
+    space: DesignSpace | None = None
 
     @cached_property
     def designs(self) -> Table:
-        """A row for each design: what became of it, and its metrics."""
-        return Table(read_undamaged(self.folder / DESIGNS))
+        """A row for each design: what became of it, and its metrics.
+
+        Raises UsageError where the folder has the table of another sweep by now, or none.
+        """
+        return self._table(DESIGNS)
 
     @cached_property
     def states(self) -> Table:
-        """A row for each state of each design."""
-        return Table(read_undamaged(self.folder / STATES))
+        """A row for each state of each design. Raises UsageError as `designs` does."""
+        return self._table(STATES)
+
+    def _table(self, name: str) -> Table:
+        path = self.folder / name
+        table = read_undamaged(path)
+        said = (table.schema.metadata or {}).get(FINGERPRINT.encode(), b"").decode()
+        if said != self.fingerprint:
+            raise UsageError(
+                f"{path} is of another sweep by now than this result: give each an ",
+                Field("output"),
+                " of its own, or read its tables before the next",
+            )
+        return Table(table)
 
 
 def sweep(
@@ -137,15 +157,19 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
     if output is not None:
         yield path_of("output", output)
         return
-    with TemporaryDirectory() as folder:
-        yield Path(folder)
+    with temporary_folder(Path(gettempdir()) / "sweep") as folder:
+        yield folder / "output"  # which is locked, as the folder is
 
 
 def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
     if part is not None:
-        return SweepResult(study.folder, study.n_failed)
-    designs, text = summarize(study.folder, is_new=is_new)
-    return SweepResult(study.folder, int((designs["status"] == "failed").sum()), text)
+        return SweepResult(study.folder, study.metadata[FINGERPRINT], study.n_failed)
+    return _summarized(study.folder, study.metadata[FINGERPRINT], is_new=is_new)
+
+
+def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
+    space, text = summarize(folder, is_new=is_new)
+    return SweepResult(folder, fingerprint, len(space.of_status("failed")), text, space)
 
 
 def study_of(
@@ -169,7 +193,7 @@ def _read(sweep: str | Path | Mapping[str, Any], settings: Settings) -> Sweep:
     base = sweep.get("base")
     if isinstance(base, Finger | Scene):
         raise UsageError("base: a finger's values have no keys that could vary: give a spec")
-    data = plain({**sweep, "space": _axes(sweep.get("space"))})
+    data = without_free_keys(plain({**sweep, "space": _axes(sweep.get("space"))}))
     if not isinstance(base, Mapping):
         return sweep_in(Document("sweep", data, {}), Path(), texts)
     document = Document("sweep", {**data, "base": "base"}, {})
@@ -180,15 +204,20 @@ def _axes(space: Any) -> Any:
     """Axes of a space, data frames among them as values that go together."""
     if not isinstance(space, list | tuple):
         return space
-    return [
-        {"paired": axis["table"].to_dict(orient="list")} if _is_frame(axis) else axis
-        for axis in space
-    ]
+    return [{"paired": _columns(axis["table"])} if _is_frame(axis) else axis for axis in space]
 
 
 def _is_frame(axis: Any) -> bool:
-    """Whether an axis is a table of pandas."""
-    return isinstance(axis, Mapping) and hasattr(axis.get("table"), "to_dict")
+    """Whether an axis is a table of pandas, of Arrow, or ours."""
+    table = axis.get("table") if isinstance(axis, Mapping) else None
+    return hasattr(table, "to_dict") or hasattr(table, "to_pandas")
+
+
+def _columns(table: Any) -> dict[Any, list[Any]]:
+    frame = frame_of(table)
+    if twice := [str(name) for name in frame.columns[frame.columns.duplicated()]]:
+        raise UsageError(f"table: expected each column once, found {', '.join(twice)} again")
+    return {name: frame[name].tolist() for name in frame}
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:
@@ -228,8 +257,8 @@ class Place:
             raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
-        if self.scheduler is not None and re.fullmatch(ADDRESS, self.scheduler) is None:
-            raise UsageError(scheduler, f" {self.scheduler}: expected tcp://host:port")
+        if self.scheduler is not None:
+            cluster.check_address(self.scheduler)
         if self.scheduler is None and self.wait is not None:
             raise UsageError(Field("wait"), " is for the workers of ", dask, " dask")
 
@@ -242,10 +271,10 @@ class Place:
         """The workers, found or about to be started; `say` hears of those that are waited for."""
         if self.scheduler is not None:
             return self._cluster(self.scheduler, say)
-        n_workers = self.jobs or os.cpu_count() or 1
+        n_workers = self.jobs or cores().usable
         if self.executor == "serial" or n_workers == 1:
             return executors.serial()
-        return executors.processes(n_workers)
+        return pool.processes(n_workers)
 
     def _cluster(self, scheduler: str, say: Say) -> Backend:
         try:
@@ -275,22 +304,20 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
     if not folders:
         raise UsageError("shards: expected one folder or more")
     paths = [path_of("shards", folder) for folder in folders]
-    return merged(paths, path_of("output", output), silent)
+    return merged(paths, path_of("output", output))
 
 
-def merged(shards: Sequence[Path], folder: Path, say: Say) -> SweepResult:
-    """The same; `say` hears of what the report leaves out."""
+def merged(shards: Sequence[Path], folder: Path) -> SweepResult:
+    """The same, of paths."""
     found = [_store(shard) for shard in shards]
     with sole_use(folder):
         drop_half_written(folder)
         check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
-        read_run(folder / RUN)  # what no report can be made beside is refused before the work
-        assemble(found, folder)
-        designs, text = summarize(folder, is_new=True, say=say)
+        result = _summarized(folder, assemble(found, folder), is_new=True)
         for store in found:
             if store.folder.parent.parent.samefile(folder):
                 store.drop()
-    return SweepResult(folder, int((designs["status"] == "failed").sum()), text)
+    return result
 
 
 def _store(folder: Path) -> PartStore:

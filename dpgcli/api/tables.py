@@ -31,7 +31,7 @@ class Table:
         """Rows, given as one or more blocks of arrays by name."""
         import pyarrow as pa
 
-        from dpgcli.files.table_writer import record_batch, schema
+        from dpgcli.files.record_batches import record_batch, schema
 
         batches = [record_batch(columns, block) for block in blocks]
         return cls(pa.Table.from_batches(batches, schema(columns)))

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ from dpgcli.states.predict import Prediction, predict
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
+from dpgcli.temporary import temporary_folder
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
@@ -52,12 +53,12 @@ Row = dict[str, Any]
 
 COLUMNS = (
     Column("group", "", "what was varied", kind=Kind.TEXT),
-    Column("way", "", "how the states were found", kind=Kind.TEXT),
+    Column("method", "", "how the states were found", kind=Kind.TEXT),
     Column("n_units", "", "units of the finger", kind=Kind.COUNT),
     Column("n_designs", "", "designs in a call", kind=Kind.COUNT),
     Column("stiffness_ratio", "", "k_L over the largest k_b"),
     Column("n_states", "", "states in a call", kind=Kind.COUNT),
-    Column("certified", "", "whether the way certifies what it finds", kind=Kind.FLAG),
+    Column("certified", "", "whether the method certifies what it finds", kind=Kind.FLAG),
     Column("n_missing", "", "states not found, of those that exist", kind=Kind.COUNT),
     Column("max_tip_error_mm", "mm", "largest error of a tip"),
     Column("rms_tip_error_mm", "mm", "root mean square of the tips' errors"),
@@ -116,11 +117,11 @@ class Bench:
         reference = extended_states(self.finger, patterns, digits=REFERENCE_DIGITS)
         yield from self._ladder(patterns, reference)
         yield from self._alone(patterns, reference)
-        if not self.finger.is_rigid:
+        if not (self.finger.is_rigid or self.finger.has_walls):  # third parties know neither
             most = max(1, PEER_STATES // math.ceil(self.finger.n_units / MANY_UNITS))
             few = slice(None, None, -(-patterns.shape[1] // most))
-            for way in third_party_methods(self.finger, patterns[:, few]):
-                yield self._row(way, _only(reference, few))
+            for method in third_party_methods(self.finger, patterns[:, few]):
+                yield self._row(method, _only(reference, few))
         if self.known is not None:
             yield self._model_error(self.known)
         yield from self._by_units()
@@ -132,34 +133,34 @@ class Bench:
             yield from self._kept(name)
 
     def _ladder(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
-        """The package's ways in a batch as large as those of a sweep."""
+        """The package's methods in a batch as large as those of a sweep."""
         n_copies = max(1, BATCH // patterns.shape[1])
         tiled = np.tile(patterns, (1, n_copies))
-        for way in package_methods(self.finger, tiled):
-            yield self._row(way, reference)
+        for method in package_methods(self.finger, tiled):
+            yield self._row(method, reference)
 
     def _alone(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
         """The same for this finger's states only."""
-        for way in package_methods(self.finger, patterns):
-            yield self._row(way._replace(group="one finger"), reference)
+        for method in package_methods(self.finger, patterns):
+            yield self._row(method._replace(group="one finger"), reference)
 
-    def _row(self, way: BenchmarkMethod, reference: ExtendedStates) -> Row:
-        found = way.run()
+    def _row(self, method: BenchmarkMethod, reference: ExtendedStates) -> Row:
+        found = method.run()
         n_states = reference.energy.shape[0]
         first = BenchmarkResult(found.pose[:, :n_states], found.energy[:n_states])
         return {
-            **self._facts(way.group, way.name, way.n_states),
-            "certified": way.certifies,
+            **self._facts(method.group, method.name, method.n_states),
+            "certified": method.certifies,
             **errors(first, reference),
-            **_times(measured(way.run, self.repeats), way.n_states),
+            **_times(measured(method.run, self.repeats), method.n_states),
         }
 
-    def _facts(self, group: str, way: str, n_states: int, finger: Finger | None = None) -> Row:
+    def _facts(self, group: str, method: str, n_states: int, finger: Finger | None = None) -> Row:
         finger = finger or self.finger
         ratio = finger.linear_stiffness.max() / finger.bistable_stiffness.max()
         return {
             "group": group,
-            "way": way,
+            "method": method,
             "n_units": finger.n_units,
             "n_designs": 1,
             "stiffness_ratio": float(ratio),
@@ -227,37 +228,37 @@ class Bench:
             finger = short.with_bars(ratio * float(short.bistable_stiffness.max()))
             reference = extended_states(finger, patterns, digits=REFERENCE_DIGITS)
             wanted = (f"chain, {DEFAULT_TOLERANCE:g}", f"lattice, {DEFAULT_TOLERANCE:g}")
-            for way in package_methods(finger, patterns):
-                if way.name in wanted:
+            for method in package_methods(finger, patterns):
+                if method.name in wanted:
                     yield {
-                        **self._row(way, reference),
-                        **self._facts("stiffness", way.name, way.n_states, finger),
-                        "peak_MiB": peak_bytes(way.run) / 2**20,
+                        **self._row(method, reference),
+                        **self._facts("stiffness", method.name, method.n_states, finger),
+                        "peak_MiB": peak_bytes(method.run) / 2**20,
                     }
 
     def _to_parquet(self, write: Callable[[Prediction, Path], None]) -> Row:
         """All states of a long finger, computed, certified and written to a file."""
         finger = repeated(self.finger, TABLE_UNITS)
 
-        with TemporaryDirectory() as folder:
+        with temporary_folder(Path(gettempdir()) / "bench") as folder:
 
             def whole() -> None:
-                write(predict(Scene(finger, ())), Path(folder) / "states.parquet")
+                write(predict(Scene(finger, ())), folder / "states.parquet")
 
             times = measured(whole, self.repeats)
         n_states = 2**TABLE_UNITS
-        way = "predicted into a Parquet file"
-        return {**self._facts("units", way, n_states, finger), **_times(times, n_states)}
+        method = "predicted into a Parquet file"
+        return {**self._facts("units", method, n_states, finger), **_times(times, n_states)}
 
     def _kept(self, name: str) -> Iterator[Row]:
         """The scene as planned, and with one thing put back that the plan leaves out."""
-        for way in ablations(self.scene, name, self.target_error):
+        for method in ablations(self.scene, name, self.target_error):
             yield {
-                **self._facts("kept", way.name, way.n_states),
-                **_times(measured(way.run, self.repeats), way.n_states),
-                "max_tip_error_mm": way.change,
-                "bound_mm": way.bound,
-                "peak_MiB": peak_bytes(way.run) / 2**20,
+                **self._facts("kept", method.name, method.n_states),
+                **_times(measured(method.run, self.repeats), method.n_states),
+                "max_tip_error_mm": method.change,
+                "bound_mm": method.bound,
+                "peak_MiB": peak_bytes(method.run) / 2**20,
             }
 
 

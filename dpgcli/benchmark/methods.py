@@ -48,25 +48,25 @@ def package_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod
     """The package's methods for these patterns, (unit, state), of one finger."""
     n_states = inverted.shape[1]
 
-    def way(
+    def method(
         name: str, run: Callable[[], BenchmarkResult], *, certifies: bool = True
     ) -> BenchmarkMethod:
         return BenchmarkMethod(name, "ladder", run, n_states, certifies)
 
     rigid = finger.with_bars(np.inf)
-    yield way("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
+    yield method("rigid bars, unit by unit", lambda: _looked_up(rigid, inverted), certifies=False)
     if not finger.is_rigid:
         name = "units looked up, poses composed"
-        yield way(name, lambda: _looked_up(finger, inverted), certifies=False)
+        yield method(name, lambda: _looked_up(finger, inverted), certifies=False)
     for level in ACCURACY_LEVELS:
         if level.drops_bars and finger.is_rigid:
             continue
         used, name = (rigid, "chain, rigid bars") if level.drops_bars else (finger, "chain")
         tolerance = level.tolerance
-        yield way(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
+        yield method(f"{name}, {tolerance:g}", _solver(used, inverted, chain_potential, tolerance))
     if not finger.is_rigid:
         lattice = _solver(finger, inverted, lattice_potential, DEFAULT_TOLERANCE)
-        yield way(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
+        yield method(f"lattice, {DEFAULT_TOLERANCE:g}", lattice)
 
 
 def third_party_methods(finger: Finger, inverted: Flags) -> Iterator[BenchmarkMethod]:
@@ -94,16 +94,19 @@ def _looked_up(finger: Finger, inverted: Flags) -> BenchmarkResult:
     pose, _ = chain.tip(coordinates)
     openings = chain.openings(coordinates)
     energy = _energy(finger, shape, openings)
-    in_wells = (openings > units.wells.barrier) == inverted
+    in_wells = (openings + shape.wall > units.wells.barrier) == inverted
     is_there = (in_wells & (units.wells.exists | ~inverted)).all(axis=0)
     return BenchmarkResult(np.where(is_there, pose, np.nan), np.where(is_there, energy, np.nan))
 
 
 def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
     """Energy of a shape, mJ, (state,)."""
-    domes = finger.springs(openings)
+    domes = finger.springs(openings + shape.wall)
     corners = finger.hinge_stiffness * (shape.near_angle**2 + shape.far_angle**2)
     energy = total(domes.energy + corners)
+    if finger.has_walls:
+        yielding = np.where(finger.wall_compliance > 0.0, finger.wall_compliance, 1.0)
+        energy = energy + total(0.5 * shape.wall**2 / yielding)
     if finger.is_rigid:
         return energy
     bars = 0.5 * finger.linear_stiffness * (shape.chord**2 + shape.strut**2)

@@ -6,11 +6,22 @@ are compared as they are, forces as f F(x), since dE/du = f dE/dx.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.calibration.choices import LINEARITY, STIFFNESS, STROKE, Loss, Quantity, Rule
+from dpgcli.calibration.beginning import beginning_warnings, check_sign
+from dpgcli.calibration.branches import branch_of, in_time, ways, with_hysteresis
+from dpgcli.calibration.choices import (
+    LINEARITY,
+    STIFFNESS,
+    STROKE,
+    Branches,
+    Loss,
+    Quantity,
+    Rule,
+)
 from dpgcli.calibration.fits import Fit, Parameter, fit
 from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import (
@@ -43,17 +54,25 @@ UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quanti
 
 @dataclass(frozen=True)
 class BistableOptions:
-    """Options of a fit: mapping, quantity, part of the record, loss; `fixed` are values by key."""
+    """Options of a fit: mapping, quantity, part of the record, loss; `fixed` are values by key.
+
+    Without `branches` both are fitted, if they are not too far apart.
+    """
 
     opening: Opening
     quantity: Quantity
-    is_quasi_static: bool = False
+    branches: Branches | None = None
     area: float = float("nan")
     fixed: Mapping[str, float] | None = None
     loss: Loss = Loss.LINEAR
     loss_scale: float | None = None
     resamples: int = 0
     seed: int = 0
+
+    @property
+    def is_quasi_static(self) -> bool:
+        """Whether only slow pieces are fitted."""
+        return self.branches is Branches.QUASI_STATIC
 
 
 @dataclass(frozen=True)
@@ -122,17 +141,27 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
 
     Raises FitError if the record lacks what is asked for, or the fit fails.
     """
-    record, said = in_order(record)
-    observed = _observed(record, choice)
+    if choice.branches in (Branches.LOADING, Branches.UNLOADING):
+        record = branch_of(record, choice.branches)
+    ordered, said = in_order(_by_travel(record))
+    if choice.quantity is not Quantity.ENERGY:
+        check_sign(ordered)
+    observed = _observed(ordered, choice)
     kept = np.ones(len(observed), bool)
-    warnings = [*said, *record_warnings(record, is_cut=choice.is_quasi_static)]
+    warnings = [*said, *record_warnings(ordered, is_cut=choice.is_quasi_static)]
+    warnings += beginning_warnings(ordered)
     if choice.is_quasi_static:
-        kept, cut = quasi_static(record)
+        kept, cut = quasi_static(ordered)
         warnings.append(cut)
-    curve, observed = record.points(kept), observed[kept]
+    curve, observed = ordered.points(kept), observed[kept]
     well = inverted_well(curve)
     factor = _factor(choice.opening, well)
     found = _fitted(factor * curve.travel, observed, factor, choice)
+    if choice.branches not in (Branches.LOADING, Branches.UNLOADING):
+        found, differing = _with_hysteresis(
+            found, curve if choice.is_quasi_static else record, choice, factor
+        )
+        warnings += differing
     energies = None
     try:
         energies = _energies(curve, observed, choice)
@@ -141,6 +170,30 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     gaps = unsampled(curve.travel)
     result = BistableFit(found, curve.travel, observed, factor, well, gaps, energies, ())
     return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result)))
+
+
+def _by_travel(record: Record) -> Record:
+    """The record by its travel where that goes to and fro, which is no fault of it."""
+    if record.time is not None or ways(record) is None:
+        return record
+    return record.points(np.argsort(record.travel, kind="stable"))
+
+
+def _with_hysteresis(
+    found: Fit, record: Record, choice: BistableOptions, factor: float
+) -> tuple[Fit, tuple[str, ...]]:
+    """The fit with what its two branches say of its errors; a ringing dome has none."""
+    if rings(in_time(record)):
+        return found, ()
+    alone = partial(_alone, replace(choice, resamples=0), factor)
+    is_asked = choice.branches is not None
+    return with_hysteresis(record, found, alone, is_asked=is_asked, is_cut=choice.is_quasi_static)
+
+
+def _alone(choice: BistableOptions, factor: float, branch: Record) -> Fit:
+    """The fit to a part of a record, with the mapping of the whole."""
+    record, _ = in_order(_by_travel(branch))
+    return _fitted(factor * record.travel, _observed(record, choice), factor, choice)
 
 
 def _observed(record: Record, choice: BistableOptions) -> Array:
@@ -253,9 +306,7 @@ def _unsampled_points(found: BistableFit) -> Iterator[str]:
     top, well = (float(opening) / found.factor for opening in at_rest)
     largest = float(found.travel.max())
     if found.well is None:
-        said = f"the inverted well is not sampled (travel up to {largest:.4g} mm)"
-        where = f"; the fitted one, at {well:.4g} mm, is an extrapolation"
-        yield said if np.isnan(well) else said + where
+        yield _unseen_well(found, well)
     if np.isnan(top):
         return
     height = float(law(at_rest.top, found.fit.values, Quantity.ENERGY))
@@ -265,3 +316,21 @@ def _unsampled_points(found: BistableFit) -> Iterator[str]:
             yield f"nothing is sampled from {start:.4g} to {end:.4g} mm: {barrier}"
     if top > largest:
         yield f"nothing is sampled beyond {largest:.4g} mm: {barrier}"
+
+
+def _unseen_well(found: BistableFit, well: float) -> str:
+    """What is to be said of the law's inverted well (mm of travel) where the data show none."""
+    largest = float(found.travel.max())
+    gap = next((gap for gap in found.gaps if gap[0] < well < gap[1]), None)
+    if np.isnan(well) or well > largest or gap is not None:
+        said = f"the inverted well is not sampled (travel up to {largest:.4g} mm)"
+        if gap is not None:
+            said = (
+                f"the inverted well is not sampled (nothing from {gap[0]:.4g} to {gap[1]:.4g} mm)"
+            )
+        where = f"; the fitted one, at {well:.4g} mm, is an extrapolation"
+        return said if np.isnan(well) else said + where
+    return (
+        f"the data alone do not show where the inverted dome rests; the law has it at {well:.4g} "
+        "mm, within the data"
+    )

@@ -8,7 +8,8 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
     "stroke_mm",
 )
 
-LEVER = "segment_height_mm"  # fitted to known states by default
+MOST_RESAMPLES = 100_000  # of a bootstrap: minutes
+FITTED_BY_DEFAULT = "segment_height_mm"  # what is fitted to known states if nothing is named
 
 
 class Loss(StrEnum):
@@ -30,9 +31,11 @@ class Quantity(StrEnum):
 
 
 class Branches(StrEnum):
-    """The part of a record that is fitted: all of it, or its slow pieces."""
+    """The part of a record that is fitted: both ways of the travel, one of them, or slow pieces."""
 
-    ALL = "all"
+    BOTH = "both"
+    LOADING = "loading"
+    UNLOADING = "unloading"
     QUASI_STATIC = "quasi-static"
 
 

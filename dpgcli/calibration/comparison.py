@@ -6,10 +6,13 @@ import numpy as np
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
+from dpgcli.errors import Field, Message
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 
+MISFIT = 0.02  # of the finger's length: how far a straight finger may be off in its own frame
+ALIKE = 2.0  # times the spread of errors: a mean that is larger is one of the frame
 POINTS_AT_ONCE = 2**12
 SMALLEST_DEFLECTION = 1e-2  # of the largest: a smaller one counts as the straight finger
 
@@ -43,7 +46,7 @@ class Comparison:
 
 
 def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
-    """Hold the states of one finger against known ones.
+    """Compare the states of one finger with known ones.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> finger = uniform_finger(2, **STUDY)
@@ -67,6 +70,36 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
         shape=_shape_errors(
             _from_clamp(states.layer, float(finger.straight_length[0])), known.shapes
         ),
+    )
+
+
+def frame_misfit(finger: Finger, known: KnownStates, found: Comparison, frame: Frame) -> str:
+    """What is to be said if the data's frame is another one; empty if it fits.
+
+    A straight finger is straight in any model. Without one in the data, tips that are all off by
+    the same show it.
+    """
+    off = known.tip - found.states.tip
+    off = off[:, np.isfinite(off).all(axis=0)]
+    straight = ~known.patterns.any(axis=0) & np.isfinite(known.tip - found.states.tip).all(axis=0)
+    if straight.any():
+        shift, what = (known.tip - found.states.tip)[:, straight][:, 0], "the straight state is off"
+    elif off.shape[1] > 1:
+        shift, what = off.mean(axis=1), "all tips are off in the same way,"
+        if np.hypot(*shift) < ALIKE * np.sqrt(((off - shift[:, None]) ** 2).sum(axis=0).mean()):
+            return ""
+    else:
+        return ""
+    if np.hypot(*shift) < MISFIT * float(finger.straight_length[0]):
+        return ""
+    places = (np.add(place, shift) + 0.0 for place in (frame.first_station, frame.tip))
+    station, tip = ("{:.4g},{:.4g}".format(*place) for place in places)
+    return Message(
+        f"the frame does not fit: {what} by {np.hypot(*shift):.4g} mm; ",
+        Field("first_station"),
+        f" {station} would bring that to zero, as would ",
+        Field("tip_offset"),
+        f" {tip}, or a part of it in each",
     )
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import COMPLEX_STEP, Array, Flags
 from dpgcli.calibration.choices import Loss, Target
-from dpgcli.calibration.comparison import Comparison, compare
+from dpgcli.calibration.comparison import Comparison, compare, frame_misfit
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.search import Parameter
@@ -23,7 +23,7 @@ from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
-from dpgcli.states.sensitivities import COMPLEX_STEP, sensitivities
+from dpgcli.states.sensitivities import sensitivities
 
 EDGE_FRACTION = 1e-3  # of a value: ending so close to where a state ceases to exist is no fit
 LARGEST_FACTOR = 5.0  # between the start and a bound: beyond it a value means nothing
@@ -105,7 +105,9 @@ class FingerFit:
     def judgments(self, found: Fit) -> Iterator[str]:
         """Warnings about a fit and its data."""
         yield from found.warnings
-        if np.nanmax(self.compared(found).relative, initial=0.0) > LARGE_ERROR:
+        if misfit := frame_misfit(self.finger, self.known, self.compared(None), self.frame):
+            yield misfit
+        elif np.nanmax(self.compared(found).relative, initial=0.0) > LARGE_ERROR:
             yield LARGE_ERROR_WARNING
         if self.known.unused:
             yield f"columns not used: {', '.join(self.known.unused)}"
@@ -115,6 +117,7 @@ class FingerFit:
         finger = self.finger if found is None else self.finger.with_values(found.by_key)
         return compare(finger, self.known, self.frame)
 
+    @cached_property
     def left_out(self) -> Array:
         """Relative errors (state,) of tips, each predicted by a fit to the other states.
 

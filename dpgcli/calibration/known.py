@@ -23,7 +23,8 @@ class KnownStates:
     the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
     their domes (N), `seconds` (state,) that each state took. `shapes` are the limiting layer's
     points from base to tip, (2, point) in mm, by state. `unused` names what else the data have,
-    `sha256` is that of their file.
+    `sha256` is that of their file; `first_station` and `tip_offset` (mm) are a `Frame`'s, None
+    where the data do not say them.
     """
 
     patterns: Flags
@@ -35,6 +36,8 @@ class KnownStates:
     shapes: tuple[Array, ...] = ()
     unused: tuple[str, ...] = ()
     sha256: str = ""
+    first_station: tuple[float, float] | None = None
+    tip_offset: tuple[float, float] | None = None
 
     def chosen(self, states: Indices) -> "KnownStates":
         """Some of the states."""

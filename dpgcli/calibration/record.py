@@ -18,6 +18,7 @@ from dpgcli.errors import Field, FitError, Message
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
 BEYOND_REST = 0.4  # of the largest travel: where an inverted well may be
+SMALLEST_DEPTH = 0.1  # of the barrier before a well: less is noise
 FAST_RATIO = 10.0  # times the speed that three quarters of the moving time stay below
 RESTING_SPEED = 0.01  # of the mean speed, range over duration: slower is not moving
 SHORTEST_PIECE = 0.01  # of the record's duration: slower for less than that is a turning point
@@ -120,7 +121,8 @@ def inverted_well(record: Record) -> float | None:
     """The travel (mm) of the inverted dome at rest, None if the curve does not show it.
 
     The minimum of a cubic through the energies (without them, the integrated force) around the
-    lowest one in the last 60 % of the travel, if it is near the points.
+    one that lies deepest below both sides, else the lowest in the last 60 % of the travel, if it
+    is near the points.
 
     >>> travel = np.linspace(0.0, 3.0, 31)
     >>> round(inverted_well(Record(travel, energy=travel**2 * (travel - 2.5) ** 2)), 3)
@@ -133,7 +135,8 @@ def inverted_well(record: Record) -> float | None:
         if push is None:
             return None
         energy = integral(push, record.travel)
-    late = record.travel > BEYOND_REST * largest
+    begin = min(BEYOND_REST * largest, _well_of(record.travel, energy))
+    late = record.travel > begin
     if not late.any():
         return None
     lowest = record.travel[late][np.argmin(energy[late])]
@@ -150,7 +153,19 @@ def inverted_well(record: Record) -> float | None:
         return None
     well = float(wells[0])
     is_near = np.abs(record.travel[late] - well).min() <= NEAR_WELL * largest
-    return well if is_near and well > BEYOND_REST * largest else None
+    on_the_way = (record.travel < well) & (record.travel > well - LARGEST_STEP * largest)
+    comes_down = not on_the_way.any() or energy[on_the_way].mean() > cubic(well)
+    return well if is_near and comes_down and well > begin else None
+
+
+def _well_of(travel: Array, energy: Array) -> float:
+    """Half the travel of the energy that lies deepest below both sides; inf if none lies deep."""
+    travel, energy = cleaned(travel, energy)
+    before, after = (np.maximum.accumulate(part) for part in (energy, energy[::-1]))
+    depth = np.minimum(before, after[::-1]) - energy
+    place = int(depth.argmax())
+    is_deep = depth[place] > SMALLEST_DEPTH * (before[place] - energy[0])
+    return 0.5 * float(travel[place]) if is_deep and depth[place] > 0.0 else np.inf
 
 
 def speeds(record: Record) -> tuple[Array, float]:

@@ -1,8 +1,7 @@
 """`dpg bench`: error against run time, on the user's own finger."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +12,7 @@ from dpgcli.cli.options import (
     Quiet,
     Settings,
     SpecPath,
+    TableFile,
     TargetError,
     TipOffset,
     check_plot,
@@ -21,13 +21,14 @@ from dpgcli.cli.options import (
     target_in_mm,
 )
 from dpgcli.cli.printing import Format, print_grid, print_rows
-from dpgcli.cli.streams import say
+from dpgcli.cli.progress import under_way
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.benchmark.bench import Row
 
 GROUPS = {
-    "ladder": "Ways to the states, in a batch as large as a sweep's",
+    "ladder": "Methods, with a batch of states as large as a sweep's",
     "one finger": "The same, for the states of this finger alone",
     "peer": "What one would do instead, state by state",
     "model": "The lattice against the data given",
@@ -48,26 +49,29 @@ SHOWN = {
 }  # fmt: skip
 
 
-Repeats = Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Times each way is timed")]
+Repeats = Annotated[
+    int, typer.Option("--repeats", min=1, max=1000, help="How often each method is timed")
+]
 Keep = Annotated[
     list[str] | None,
     typer.Option("--keep", metavar="WHAT", help="Put back what is left out; repeatable"),
 ]
 Against = Annotated[
-    Path | None, typer.Option("--against", help="CSV of known tips, for the model's own error")
+    Path | None,
+    typer.Option("--against", metavar="FILE", help="CSV of known tips, for the model's own error"),
 ]
-PrintedAs = Annotated[Format, typer.Option("--format", help="How to print what was measured")]
-Output = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
-]
+PrintedAs = Annotated[Format, typer.Option("--format", help="How to print rows")]
 Plot = Annotated[
-    Path | None, typer.Option("--plot", help="Draw error over time: a .svg or .png file")
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw error over time: a .svg or .png file"),
 ]
 Record = Annotated[
-    Path | None, typer.Option("--json", help="Write all rows and the machine to this file")
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write all rows and the machine to this file"),
 ]
 Compare = Annotated[
-    Path | None, typer.Option("--compare", help="Say what got slower since this --json file")
+    Path | None,
+    typer.Option("--compare", metavar="FILE", help="Say what got slower since this --json file"),
 ]
 
 
@@ -81,7 +85,7 @@ def bench(
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     printed_as: PrintedAs = Format.TABLE,
-    output: Output = None,
+    output: TableFile = None,
     plot: Plot = None,
     record: Record = None,
     compare: Compare = None,
@@ -101,17 +105,17 @@ def bench(
     outputs = ((output, Mark.TABLE), (record, Mark.FACTS), (plot, Mark.FIGURE))
     check_outputs([*sources, *given.files], *outputs)
     frame = frame_of(first_station, tip_offset)
-    with _watching(quiet) as watch:
+    with under_way("bench", quiet=quiet) as say_that:
         found = bench(
             given,
             repeats=repeats,
             target_error=target_in_mm(target_error),
             keep=tuple(keep or ()),
             against=against,
-            first_station=frame.first_station,
-            tip_offset=frame.tip,
+            first_station=frame[0],
+            tip_offset=frame[1],
             compare=compare,
-            watch=watch,
+            watch=lambda row: say_that(f"measured: {row['group']}: {row['method']}"),
         )
     command = ("dpg", *sys.argv[1:])
     if output is not None:
@@ -125,24 +129,10 @@ def bench(
         _tell(printed_as, line)
 
 
-@contextmanager
-def _watching(quiet: bool) -> "Iterator[Callable[[Row], None]]":
-    """Name each row on a terminal as it is measured."""
-    interactive = sys.stderr.isatty() and not quiet
-
-    def show(row: "Row") -> None:
-        if interactive:
-            print(f"\r{row['group']}: {row['way']}"[:70].ljust(71), end="\r", file=sys.stderr)
-
-    yield show
-    if interactive:
-        print(" " * 71, end="\r", file=sys.stderr)
-
-
 def _tell(printed_as: Format, line: str) -> None:
     """A finding: with the tables for people, beside the data for programs."""
     if printed_as is Format.TABLE:
-        print(line)
+        put(line)
     else:
         say(line)
 
@@ -163,14 +153,14 @@ def _print_tables(rows: "Sequence[Row]") -> None:
         own = [row for row in rows if row["group"] == group]
         if own:
             names = SHOWN.get(group, SHOWN["ladder"])
-            print(f"{title}\n")
+            put(f"{title}\n")
             print_grid(
-                {"way": [row["way"] for row in own]}
+                {"method": [row["method"] for row in own]}
                 | {name: [_cell(row, name) for row in own] for name in names},
-                left=("way",),
+                left=("method",),
             )
-            print()
-    print("\n".join(text_figure(rows)))
+            put("")
+    put("\n".join(text_figure(rows)))
 
 
 def _cell(row: "Row", name: str) -> str:

@@ -1,4 +1,4 @@
-"""`dpg check`: hold a table of designs against requirements."""
+"""`dpg check`: test a table of designs against requirements."""
 
 import os
 from collections.abc import Sequence
@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.streams import put, say
-from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat, escaped
-from dpgcli.text import printable
+from dpgcli.cli.streams import annotate, put, put_json, say
+from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat
 
 if TYPE_CHECKING:
     from dpgcli.sweeps.gate import RequirementVerdict
@@ -30,7 +29,8 @@ def check(
         ProblemFormat, typer.Option("--format", help="How to list designs that fail")
     ] = ProblemFormat.TEXT,
     summary_file: Annotated[
-        Path | None, typer.Option("--summary-file", help="Append Markdown to this file")
+        Path | None,
+        typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
     ] = None,
 ) -> None:
     """Check that every design of a table meets requirements."""
@@ -89,26 +89,26 @@ def _print_text(verdicts: Sequence["RequirementVerdict"]) -> None:
         for failure in verdict.failures(MOST_LINES):
             put(f"  {failure}")
         if len(verdict.rows) > MOST_LINES:
-            print(f"  and {len(verdict.rows) - MOST_LINES:,} more")
+            put(f"  and {len(verdict.rows) - MOST_LINES:,} more")
 
 
 def _print_json(verdicts: Sequence["RequirementVerdict"]) -> None:
     import json
 
-    print(json.dumps([_record(verdict) for verdict in verdicts], indent=2))
+    put_json(json.dumps([_record(verdict) for verdict in verdicts], indent=2) + "\n")
 
 
 def _print_github(verdicts: Sequence["RequirementVerdict"]) -> None:
     messages = [
-        f"{printable(verdict.requirement.text)}: {failure}"
+        f"{verdict.requirement.text}: {failure}"
         for verdict in verdicts
         for failure in verdict.failures(MOST_ANNOTATIONS)
     ]
     for message in messages[:MOST_ANNOTATIONS]:
-        print(f"::error ::{escaped(message)}")
+        annotate(message)
     n_more = sum(len(verdict.rows) for verdict in verdicts) - MOST_ANNOTATIONS
     if n_more > 0:
-        print(f"::error ::and {n_more:,} more")
+        annotate(f"and {n_more:,} more")
 
 
 _PRINTERS = {

@@ -20,10 +20,11 @@ from dpgcli.cli.streams import say
 
 Data = Annotated[Path, typer.Argument(metavar="DATA", help="CSV of known states")]
 Shapes = Annotated[
-    Path | None, typer.Option("--shapes", help="CSV of the layer's points: pattern, x_mm, y_mm")
+    Path | None,
+    typer.Option("--shapes", metavar="FILE", help="CSV of the layer's points: pattern, x_mm, y_mm"),
 ]
 CalibrationFile = Annotated[
-    Path | None, typer.Option("--calibration", help="Compare with its values, too")
+    Path | None, typer.Option("--calibration", metavar="FILE", help="Compare with its values, too")
 ]
 
 
@@ -36,14 +37,17 @@ def compare(
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
     printed_as: Annotated[
-        Format, typer.Option("--format", help="How to print the states")
+        Format, typer.Option("--format", help="How to print rows")
     ] = Format.TABLE,
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw shapes and known tips: a .svg or .png file")
+        Path | None,
+        typer.Option(
+            "--plot", metavar="FILE", help="Draw shapes and known tips: a .svg or .png file"
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold predictions against finite elements or measurements."""
+    """Compare predictions with finite elements or measurements."""
     from dpgcli.api.compare import compare
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
@@ -58,12 +62,13 @@ def compare(
         data,
         calibration=calibration,
         shapes=shapes,
-        first_station=frame.first_station,
-        tip_offset=frame.tip,
+        first_station=frame[0],
+        tip_offset=frame[1],
     )
     print_rows(found.columns, found.rows, printed_as)
     if plot is not None:
         found.draw(plot)
     if not quiet:
         sys.stdout.flush()
-        say("\n".join(found.summary))
+        for line in found.summary:
+            say(line)

@@ -1,5 +1,6 @@
 """How a command ends: exit codes, and what becomes of each kind of error."""
 
+import errno
 import functools
 import gc
 import signal
@@ -15,6 +16,7 @@ import typer
 
 from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
+from dpgcli.cli.usage import refusal
 from dpgcli.errors import (
     FitError,
     NothingSelectedError,
@@ -26,11 +28,15 @@ from dpgcli.errors import (
     WorkplaceError,
 )
 from dpgcli.signals import STOP_SIGNALS
+from dpgcli.temporary import working_folder_is_gone
 
 P = ParamSpec("P")
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
+MOST_ROWS = 10  # of data whose problems are shown
+# open files, disk, processes, memory
+EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
 
 
 class ExitCode(IntEnum):
@@ -61,10 +67,8 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except SpecError as error:
-            for problem in map(problem_with_options, error.problems):
-                say(str(problem))  # which starts with its place
-            count = len(error.problems)
-            fail(ExitCode.USAGE, f"{count} problem{'s' * (count != 1)}")
+            say_problems(error)
+            raise typer.Exit(ExitCode.USAGE) from None
         except NoWorkerError as error:
             fail(ExitCode.FAILED_CASES, error.message)
         except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
@@ -75,10 +79,26 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
         except Terminated as stop:
             fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
-        except Exception:
+        except Exception as error:
+            _fail_if_refused(error)
             _internal_error()
 
     return run
+
+
+def say_problems(error: SpecError) -> None:
+    """Say the problems, each of which starts with its place, and how many there are.
+
+    What is wrong in one row of data may be wrong in thousands: of these the first are enough.
+    """
+    rows = [p for p in error.problems if p.line is not None and p.column is None]
+    hidden = {id(problem) for problem in rows[MOST_ROWS:]}
+    for problem in error.problems:
+        if id(problem) not in hidden:
+            say(str(problem_with_options(problem)))
+    count = len(error.problems)
+    rest = f"; of those in rows of data the first {MOST_ROWS} are shown" if hidden else ""
+    say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
 
 
 def fail(code: ExitCode, message: str) -> NoReturn:
@@ -86,6 +106,14 @@ def fail(code: ExitCode, message: str) -> NoReturn:
     for line in with_options(message).split("\n") if message else ():
         say(f"dpg: {line}")
     raise typer.Exit(code)
+
+
+def _fail_if_refused(error: Exception) -> None:
+    """End where it is no bug: the working folder was deleted, or the system has run out of it."""
+    if isinstance(error, OSError) and working_folder_is_gone():
+        fail(ExitCode.USAGE, "the working folder was deleted: change to one that is there")
+    if isinstance(error, OSError) and error.errno in EXHAUSTED:
+        fail(ExitCode.USAGE, f"the system refuses: {error}")
 
 
 def check_failed(n_failed: int, max_failed: int) -> None:
@@ -119,15 +147,26 @@ def _code_of(app: Callable[..., object]) -> int:
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        getattr(error, "show", traceback.print_exc)()
-        return error.exit_code
+        if type(error).__name__ == "NoArgsIsHelpError":
+            say(str(error))
+        else:
+            say(f"dpg: {refusal(error)}")
+        return ExitCode.USAGE
     except Terminated:  # before a command has begun, or after it is done
         say(f"dpg: terminated; {NOTHING_HALF}")
         return ExitCode.TERMINATED
     except (KeyboardInterrupt, typer.Abort):
         say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
-    return code if isinstance(code, int) else ExitCode.DONE
+    except OSError as error:  # commands answer for their own: these are of shell completion
+        say(f"dpg: cannot install completion: {error}")
+        return ExitCode.USAGE
+    if isinstance(code, ExitCode):
+        return code
+    if code == ExitCode.INTERRUPTED:  # by typer, which does not say so
+        say(f"dpg: interrupted; {NOTHING_HALF}")
+        return ExitCode.INTERRUPTED
+    return ExitCode.USAGE if code else ExitCode.DONE  # of typer, which knows none of ours
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
@@ -166,5 +205,5 @@ def _ignore_further_signals() -> None:
 
 
 def _internal_error() -> NoReturn:
-    traceback.print_exc()
+    say(traceback.format_exc().rstrip())
     fail(ExitCode.INTERNAL, "this is a bug in dpg; please report it with the text above")

@@ -1,5 +1,6 @@
 """`dpg explain`: what a scene needs and leaves out, before any work."""
 
+from collections.abc import Iterator
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,7 @@ from dpgcli.cli.options import (
     request_of,
 )
 from dpgcli.cli.spelling import with_options
-from dpgcli.cli.streams import put
+from dpgcli.cli.streams import put, put_json
 
 if TYPE_CHECKING:
     from dpgcli.design.scene import Source
@@ -60,7 +61,7 @@ def explain(
     if printed_as is PlanFormat.JSON:
         import json
 
-        print(json.dumps(facts(made), indent=2))
+        put_json(json.dumps(facts(made), indent=2) + "\n")
     else:
         put("\n".join(_lines(str(spec), made)))
 
@@ -83,6 +84,8 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "bar_flexibility_mm": plan.bar_flexibility,
         "accuracy_level": plan.accuracy_level and plan.accuracy_level.name,
         "error_bound_mm": spelled(plan.error_bound),
+        "model_error": plan.scene.model_error.text,
+        "uncertainty": _uncertainty_facts(plan),
         "columns": [column.name for column in plan.columns],
         "left_out": [
             {"what": o.what, "why": with_options(o.why), "keep": o.keep} for o in plan.omissions
@@ -101,6 +104,25 @@ def facts(plan: "Plan") -> dict[str, Any]:
             for s in plan.scene.sources
         ],
     }
+
+
+def _uncertainty_facts(plan: "Plan") -> dict[str, Any] | None:
+    known = plan.scene.uncertainty
+    if known is None:
+        return None
+    sizes = {step.cause: step.size for step in known.steps if step.size}
+    return {"covers": known.covers, "tolerances": sizes, "model_error": known.model_error or None}
+
+
+def _uncertainty(plan: "Plan") -> Iterator[str]:
+    """What is known of the model's error, and what values may be off by."""
+    known = plan.scene.uncertainty
+    yield f"{'the model itself':<30} {plan.scene.model_error.text}"
+    for step in known.steps if known else ():
+        if step.size:
+            yield f"{step.cause:<30} ± {step.size}, the same error in all units"
+    if known is not None:
+        yield f"{'counted in by --uncertainty':<30} {known.covers}"
 
 
 def _lines(name: str, plan: "Plan") -> list[str]:
@@ -130,6 +152,9 @@ def _lines(name: str, plan: "Plan") -> list[str]:
             for o in plan.omissions
         ),
         "  [names] are what dpg bench --keep puts back, to show what it costs and changes",
+        "",
+        "Uncertainty",
+        *(f"  {line}" for line in _uncertainty(plan)),
         "",
         "Error and cost",
         f"  {_bar_error(plan)}",
@@ -175,10 +200,10 @@ def _bar_error(plan: "Plan") -> str:
 def _bound(plan: "Plan") -> str:
     if plan.error_bound == float("inf"):
         return "the tip's numerical error is bounded only after the work, in numerical_error_mm"
-    way = (
+    level = (
         f"{plan.accuracy_level.name}, chosen for the target error: " if plan.accuracy_level else ""
     )
-    return f"{way}the tip's error will be below {plan.error_bound:.1e} mm (the model's left aside)"
+    return f"{level}the tip's numerical error will be below {plan.error_bound:.1e} mm"
 
 
 def _count(number: int, what: str) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.exits import command
+from dpgcli.cli.commands import add_command
 from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class Mesh(StrEnum):
 
 
 Out = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of deck and results")
+    Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of deck and results")
 ]
 Poisson = Annotated[float, typer.Option("--poisson", help="Poisson's ratio, below 0.5")]
 MeshOption = Annotated[Mesh, typer.Option("--mesh", help="How fine the mesh is")]
@@ -177,7 +178,8 @@ def _carry_out(
             return
         start = time.monotonic()
         try:
-            finding = studies.run(model, folder, limits)
+            with under_way(f"ccx on {deck}", quiet=quiet):
+                finding = studies.run(model, folder, limits)
         finally:
             put(str(deck))
         put(str(curve))
@@ -192,4 +194,4 @@ def _as_before(name: str) -> str:
 
 
 for _function in (dome, hinge):
-    app.command(context_settings={"token_normalize_func": _as_before})(command(_function))
+    add_command(app, _function, "fe", context_settings={"token_normalize_func": _as_before})

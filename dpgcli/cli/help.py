@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from dpgcli.cli.streams import put
 from dpgcli.errors import UsageError
 
 TOPICS = (  # in the order in which one reads them
@@ -52,8 +53,8 @@ def _hint(word: str) -> str:
 
 def _list_topics() -> None:
     for topic in TOPICS:
-        print(f"{topic:<12} {page(topic).splitlines()[2]}")  # the first sentence below the title
-    print("\ndpg help TOPIC shows a page, dpg COMMAND --help the options of a command")
+        put(f"{topic:<12} {page(topic).splitlines()[2]}")  # the first sentence below the title
+    put("\ndpg help TOPIC shows a page, dpg COMMAND --help the options of a command")
 
 
 def _show(text: str) -> None:

@@ -6,10 +6,9 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from dpgcli import __version__
-from dpgcli.cli.exits import command, run_and_exit
+from dpgcli.cli.commands import Group, add_command
+from dpgcli.cli.exits import run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
 for _library in ("OPENBLAS", "MKL", "OMP"):
@@ -32,9 +31,9 @@ class Commands(Mapping[str, Any]):
         module = import_module(f"dpgcli.cli.{name}")
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
         if hasattr(module, "app"):  # commands of its own
-            app.add_typer(module.app, name=name)
+            app.add_typer(module.app, name=name, cls=Group)
         else:
-            app.command()(command(getattr(module, name)))
+            add_command(app, getattr(module, name))
         return typer.main.get_group(app).commands[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -44,7 +43,7 @@ class Commands(Mapping[str, Any]):
         return len(NAMES)
 
 
-class _Program(TyperGroup):
+class _Program(Group):
     def __init__(self, **named: Any) -> None:
         super().__init__(**{**named, "commands": Commands()})
 
@@ -57,31 +56,33 @@ app = typer.Typer(
     "3 internal error, 4 more failed cases than --max-failed, or no worker, 5 nothing selected, "
     "130/143 interrupted.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
 
-def _version(wanted: bool) -> None:
+def _version(context: typer.Context, wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from dpgcli.cli.version import print_version
 
-        from dpgcli.code import sha256_of_code
-
-        print(f"dpg {__version__}")
-        libraries = (f"{name} {version(name)}" for name in ("numpy", "scipy", "pyarrow"))
-        print(f"package {sha256_of_code()[:16]}, {', '.join(libraries)}")
+        print_version(verbose=context.params["verbose"])
         raise typer.Exit
 
 
 @app.callback()
 def options(
+    verbose: Annotated[  # before the version, which looks at it
+        bool,
+        typer.Option("-v", "--verbose", is_eager=True, help="With -V: what was found here, too"),
+    ] = False,
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version")
+        bool, typer.Option("-V", "--version", callback=_version, help="Show the version")
     ] = False,
 ) -> None:
     """Stable shapes of multistable soft grippers, predicted by a lumped spring lattice."""
+    if verbose:
+        raise typer.BadParameter("--verbose goes with --version")
 
 
 def main() -> None:

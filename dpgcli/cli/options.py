@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.known import Frame
     from dpgcli.states.plan import Request
 
 SpecPath = Annotated[Path, typer.Argument(metavar="SPEC", help="YAML spec; - reads standard input")]
@@ -25,12 +24,13 @@ Patterns = Annotated[
 ColumnNames = Annotated[
     str,
     typer.Option(
-        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see explain"
+        "--columns", metavar="LIST", help="Columns or groups, comma-separated; see dpg help columns"
     ),
 ]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]
 WithUncertainty = Annotated[
-    bool, typer.Option("--uncertainty", help="Add what errors of fitted values do to the tips")
+    bool,
+    typer.Option("--uncertainty", help="Add what errors of fits, tolerances and model do"),
 ]
 Tolerance = Annotated[
     float | None,
@@ -45,7 +45,9 @@ POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of te
 TargetError = Annotated[
     str | None,
     typer.Option(
-        "--target-error", metavar="LENGTH", help="Cheapest way whose tips are this exact: 0.01mm"
+        "--target-error",
+        metavar="LENGTH",
+        help="Cheapest accuracy level whose tips are this exact: 0.01mm",
     ),
 ]
 
@@ -77,6 +79,10 @@ class FormulationName(StrEnum):
 FormulationOption = Annotated[
     FormulationName,
     typer.Option("--formulation", help="Internal coordinates, or the study's node coordinates"),
+]
+TableFile = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No summary, no report, no progress")]
 
@@ -124,20 +130,19 @@ def check_table_name(path: Path | None) -> None:
         )
 
 
-def frame_of(first_station: str | None, tip_offset: str | None) -> "Frame":
-    """Where the lattice lies in given data."""
-    from dpgcli.calibration.known import Frame
-
-    return Frame(
-        _point("--first-station", first_station or "0,0"),
-        _point("--tip-offset", tip_offset or "0,0"),
-    )
+def frame_of(
+    first_station: str | None, tip_offset: str | None
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Where the lattice lies in given data, as far as the options say it."""
+    return _point("--first-station", first_station), _point("--tip-offset", tip_offset)
 
 
-def _point(option: str, text: str) -> tuple[float, float]:
+def _point(option: str, text: str | None) -> tuple[float, float] | None:
     from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
 
+    if text is None:
+        return None
     try:
         x, y = map(float, text.split(","))
     except ValueError:

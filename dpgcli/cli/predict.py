@@ -1,5 +1,6 @@
 """`dpg predict`: every stable state of a finger or gripper, certified."""
 
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -28,23 +29,41 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import is_read, say
+from dpgcli.cli.streams import is_read, put, say
 
 if TYPE_CHECKING:
     from dpgcli.arrays import Columns
+    from dpgcli.design.scene import Scene
     from dpgcli.states.accuracy import AccuracyLevel
     from dpgcli.states.predict import Prediction, Summary
+
+BRAILLE = "\u28ff"
+
+
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
+]
+PrintedAs = Annotated[
+    Format | None,
+    typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Draw the states: a .svg or .png file"),
+]
+Overlay = Annotated[
+    bool, typer.Option("--overlay", help="Draw all states in one picture of --plot")
+]
+Sketch = Annotated[
+    bool, typer.Option("--sketch", help="Show small pictures of the states under the table")
+]
 
 
 def predict(
     spec: SpecPath,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write all rows to this Parquet file")
-    ] = None,
-    printed_as: Annotated[
-        Format | None,
-        typer.Option("--format", help="How to print rows  [default: table]", show_default=False),
-    ] = None,
+    output: Output = None,
+    printed_as: PrintedAs = None,
     patterns: Patterns = None,
     settings: Settings = None,
     columns: ColumnNames = "default",
@@ -53,14 +72,13 @@ def predict(
     formulation: FormulationOption = FormulationName.CHAIN,
     tolerance: Tolerance = None,
     target_error: TargetError = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw the states: a .svg or .png file")
-    ] = None,
+    plot: Plot = None,
+    overlay: Overlay = False,
+    sketch: Sketch = False,
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
     from dpgcli.api.inputs import scene_input
-    from dpgcli.api.predict import check_drawable, draw
     from dpgcli.states import predict as states
 
     given = scene_input(spec, settings or ())
@@ -68,9 +86,8 @@ def predict(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
     prediction = states.predict(given.scene, request)
-    if plot is not None:
-        check_plot(plot)
-        check_drawable(prediction.plan.n_states)
+    _check_figure(plot, prediction.plan.n_states, overlay=overlay)
+    _check_sketch(printed_as, prediction.plan.n_states if sketch else 0)
     _check_outputs(given.files, output, plot)
     if prediction.plan.expected_seconds > LONG and not quiet:
         say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
@@ -87,8 +104,7 @@ def predict(
     for _ in rows:
         if only_prints and not is_read():  # the work is for nobody
             break
-    if plot is not None:
-        draw(given.scene, request.patterns, plot)
+    _draw(given.scene, request.patterns, plot, overlay=overlay, sketch=sketch and is_read())
     sys.stdout.flush()
     if not quiet and (is_read() or not only_prints):
         say("\n".join(_summary(prediction)))
@@ -105,6 +121,50 @@ def _progress(prediction: "Prediction", quiet: bool) -> Iterator["Columns"]:
         line.clear()
 
 
+def _draw(
+    scene: "Scene", patterns: Sequence[str], plot: Path | None, *, overlay: bool, sketch: bool
+) -> None:
+    """The pictures that are asked for."""
+    from dpgcli.api import predict as face
+
+    if sketch:
+        width = shutil.get_terminal_size().columns
+        put(f"\n{face.sketch(scene, tuple(patterns), width)}")
+    if plot is not None:
+        face.draw(scene, tuple(patterns), plot, overlay=overlay)
+
+
+def _check_figure(plot: Path | None, n_states: int, *, overlay: bool) -> None:
+    """Before any work: a figure that can be drawn; raises UsageError."""
+    from dpgcli.api.predict import check_drawable
+    from dpgcli.errors import UsageError
+
+    if plot is not None:
+        check_plot(plot)
+        check_drawable(n_states)
+    elif overlay:
+        raise UsageError("--overlay draws all states in one picture: name its file with --plot")
+
+
+def _check_sketch(printed_as: Format | None, n_states: int) -> None:
+    """Before any work: sketches of so many states can be shown; raises UsageError."""
+    from dpgcli.api.predict import check_drawable
+    from dpgcli.errors import UsageError
+
+    if not n_states:
+        return
+    check_drawable(n_states, "sketch")
+    if printed_as in (Format.CSV, Format.JSON):
+        raise UsageError(f"--sketch draws under a table: drop it, or --format {printed_as}")
+    try:
+        BRAILLE.encode(sys.stdout.encoding)
+    except UnicodeEncodeError:
+        raise UsageError(
+            f"--sketch needs braille, which {sys.stdout.encoding} does not have: set a locale "
+            "with UTF-8, or PYTHONIOENCODING=utf-8"
+        ) from None
+
+
 def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | None) -> None:
     """Before any work: files that can be written, under names that are not taken."""
     from dpgcli.files.output import Mark, check_outputs, run_file
@@ -112,22 +172,10 @@ def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | No
     beside = None if output is None else run_file(output)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE), (beside, Mark.FACTS))
     check_table_name(output)
-    if output is not None and beside is not None:
-        _check_whose(beside, output)
+    if output is not None:
+        from dpgcli.files.prediction import check_facts
 
-
-def _check_whose(beside: Path, output: Path) -> None:
-    """Refuse to write over the facts of another table: t and t.parquet have one name for theirs."""
-    import json
-
-    from dpgcli.errors import UsageError
-
-    try:
-        table = json.loads(beside.read_bytes())["table"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
-        return
-    if table != output.name and (output.parent / str(table)).is_file():
-        raise UsageError(f"{beside} has the facts of {table}: give another name")
+        check_facts(output)
 
 
 def _summary(prediction: "Prediction") -> Iterator[str]:
@@ -150,6 +198,19 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"
+    yield from _uncertainty(prediction)
+    yield f"the model's own error: {plan.scene.model_error.text}"
+
+
+def _uncertainty(prediction: "Prediction") -> Iterator[str]:
+    """What uncertainties cover, and what the largest one is made of."""
+    worst = prediction.summary.breakdown
+    if worst is None:
+        return
+    yield f"uncertainties cover: {prediction.plan.covers}"
+    largest_first = sorted(worst.shares.items(), key=lambda item: -item[1])
+    causes = ", ".join(f"{share:.2g} by {cause}" for cause, share in largest_first)
+    yield f"the least certain tip, of {worst.pattern}: ± {worst.total:.2g} mm; {causes} alone"
 
 
 def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
@@ -157,7 +218,8 @@ def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:
     promise = f"bound on the tips' error {bound:.1e} mm (tips only)"
     if bound > target:
         promise = (
-            "no method promises that before the work: numerical_error_mm says what was reached"
+            "no accuracy level promises that before the work: "
+            "numerical_error_mm says what was reached"
         )
     return f"chosen for the target error: {level.name}; {promise}"
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from dpgcli.cli.streams import put, put_json, say, unobeyed
 from dpgcli.states.columns import Column, Kind
 from dpgcli.text import printable
 
@@ -27,10 +28,19 @@ PRINCIPAL = (
     "tip_y_uncertainty_mm",
     "tip_angle_uncertainty_rad",
     "aperture_mm",
+    "aperture_uncertainty_mm",
     "fingers_overlap",
     "numerical_error_mm",
 )
-DROPPED_FIRST = ("numerical_error_mm",)
+IN_SUMMARY = "uncertainty_covers"  # the same in all rows
+TABLE_WIDTH = 100  # characters, where there is no terminal
+DROPPED_FIRST = (
+    "numerical_error_mm",
+    "tip_angle_uncertainty_rad",
+    "energy_mJ",
+    "tip_angle_deg",
+    "fingers_overlap",
+)
 TOO_SMALL = 1e-3  # for fixed decimals: such as the tips of a finger of micrometers
 ROUNDED = {
     "residual_N": ".1e",
@@ -58,11 +68,15 @@ Printer = Callable[[tuple[Column, ...], Iterable["Columns"]], Iterator["Columns"
 
 
 def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
-    """Print and pass on; numbers in full, NaN where a pattern has no state."""
+    """Print and pass on; numbers in full, NaN where a pattern has no state.
+
+    Texts of others are spelled as in a table: a cell may begin a line.
+    """
     writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow([column.name for column in columns])
+    writer.writerow([unobeyed(column.name) for column in columns])
     for block in blocks:
-        writer.writerows(_rows(columns, block))
+        for row in _rows(columns, block):
+            writer.writerow([unobeyed(cell) if isinstance(cell, str) else cell for cell in row])
         yield block
 
 
@@ -74,7 +88,7 @@ def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iter
         for row in _rows(columns, block):
             finite = (None if isinstance(v, float) and not math.isfinite(v) else v for v in row)
             text = json.dumps(dict(zip(names, finite, strict=True)))
-            sys.stdout.write(f"{separator}  {text}")
+            put_json(f"{separator}  {text}")
             separator = ",\n"
         yield block
     sys.stdout.write("\n]\n")
@@ -97,18 +111,15 @@ def table_printer(*, principal: bool) -> Printer:
         shown = {
             column.name: _shown(column, [row[place] for row in first])
             for place, column in enumerate(columns)
-            if not principal
-            or column.name in PRINCIPAL
+            if column.name in PRINCIPAL
             or (strays and column.name == "reached_pattern")
+            or not (principal or column.name == IN_SUMMARY)
         }
         right = (Kind.NUMBER, Kind.FLAG)
         left = {column.name for column in columns if column.kind not in right}
         print_grid(shown, left=left, may_drop=principal)
         if n_rows > len(first):
-            print(
-                f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output",
-                file=sys.stderr,
-            )
+            say(f"first {len(first)} of {n_rows:,} rows; all with --format csv or --output")
 
     return print_table
 
@@ -138,11 +149,10 @@ def _rows(
 def print_grid(
     texts: dict[str, list[str]], *, left: Container[str], may_drop: bool = False
 ) -> None:
-    """Aligned columns; on a terminal with folded heads, and without some if it is narrow."""
+    """Aligned columns; on a terminal with folded heads, without some where there is no room."""
     interactive = sys.stdout.isatty()
-    heads = {name: name.replace("_", "_\n") if interactive else name for name in texts}
-    if interactive and may_drop:
-        _drop_to_fit(heads, texts)
+    names, is_folded = _fitted(texts, interactive) if may_drop else (list(texts), interactive)
+    heads = {name: _head(name, is_folded) for name in names}
     n_folds = max(head.count("\n") for head in heads.values())
     columns = []
     for name, head in heads.items():
@@ -152,7 +162,27 @@ def print_grid(
     lines = ["  ".join(row) for row in zip(*columns, strict=True)]
     if interactive:
         lines.insert(n_folds + 1, "─" * _width(lines[0]))
-    print("\n".join(line.rstrip() for line in lines))
+    put("\n".join(line.rstrip() for line in lines))
+    if dropped := [name for name in texts if name not in names]:
+        say(f"no room for {', '.join(dropped)}: see --columns, --format")
+
+
+def _fitted(texts: dict[str, list[str]], interactive: bool) -> tuple[list[str], bool]:
+    """What a table has room for, and whether its heads are folded for that."""
+    room = shutil.get_terminal_size().columns if interactive else TABLE_WIDTH
+    ways = [(True, n) for n in range(len(DROPPED_FIRST) + 1)]
+    if not interactive:
+        ways = [(False, 0), (False, 1), *ways]
+    for is_folded, n_dropped in ways:
+        names = [name for name in texts if name not in DROPPED_FIRST[:n_dropped]]
+        cells = ([*_head(name, is_folded).split("\n"), *texts[name]] for name in names)
+        if sum(max(map(_width, column)) + 2 for column in cells) - 2 <= room:
+            break
+    return names, is_folded
+
+
+def _head(name: str, is_folded: bool) -> str:
+    return name.replace("_", "_\n") if is_folded else name
 
 
 def _aligned(cells: list[str], *, left: bool) -> list[str]:
@@ -170,21 +200,6 @@ def _width(text: str) -> int:
     from rich.cells import cell_len
 
     return cell_len(text)
-
-
-def _drop_to_fit(heads: dict[str, str], texts: dict[str, list[str]]) -> None:
-    """Leave out what a narrow terminal has no room for, and say so."""
-    widths = {
-        name: max(map(len, [*head.split("\n"), *texts[name]])) for name, head in heads.items()
-    }
-    room = shutil.get_terminal_size().columns
-    dropped = []
-    for name in DROPPED_FIRST:
-        if name in heads and sum(widths[n] + 2 for n in heads) - 1 > room:
-            del heads[name]
-            dropped.append(name)
-    if dropped:
-        print(f"no room for {', '.join(dropped)}", file=sys.stderr)
 
 
 def _shown(column: Column, values: list[Any]) -> list[str]:

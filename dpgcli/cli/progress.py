@@ -1,7 +1,10 @@
 """Progress on standard error: a bar that moves on a terminal, a line now and then elsewhere."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
+from threading import Event, Thread
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -10,6 +13,39 @@ if TYPE_CHECKING:
 
 FIRST_SHOWN = 1.0  # s: what is over sooner needs no progress
 TERMINAL_PERIOD, PLAIN_PERIOD = 0.2, 5.0  # s
+ELAPSED_PERIOD = 30.0  # s
+LINE = 70  # characters on a terminal
+
+
+@contextmanager
+def under_way(what: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Say what goes on and for how long, on a terminal after a second, elsewhere twice a minute.
+
+    For work that counts nothing; what is yielded takes other words for it.
+    """
+    words, began, is_over = [what], monotonic(), Event()
+    is_terminal = sys.stderr.isatty()
+
+    def say_so() -> None:
+        period = FIRST_SHOWN if is_terminal else ELAPSED_PERIOD
+        while not is_over.wait(period):
+            line = f"{words[-1]}, {monotonic() - began:.0f} s"
+            if is_terminal:
+                print(f"\r{line[:LINE]:{LINE}}", end="\r", file=sys.stderr, flush=True)
+            else:
+                print(line, file=sys.stderr, flush=True)
+
+    teller = Thread(target=say_so, daemon=True)
+    if not quiet:
+        teller.start()
+    try:
+        yield words.append
+    finally:
+        is_over.set()
+        if not quiet:
+            teller.join()
+            if is_terminal:
+                print(" " * LINE, end="\r", file=sys.stderr, flush=True)
 
 
 class ProgressLine:

@@ -5,14 +5,16 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put
 
 
 def report(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a finished sweep")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File, .md or .html  [default: standard output]"),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="File, .md or .html  [default: standard output]"
+        ),
     ] = None,
 ) -> None:
     """Summarize a design space: what is best, what failed and why, where bistability ends."""
@@ -23,9 +25,9 @@ def report(
     kind = ".md" if output is None else output.suffix.lower()
     if kind not in PAGES:
         raise UsageError(f"--output {output}: expected a name that ends in {' or '.join(PAGES)}")
-    check_outputs((folder / "designs.parquet", folder / "run.json"), (output, Mark.REPORT))
-    _, text = page(folder, kind, say)
+    check_outputs((folder / "designs.parquet",), (output, Mark.REPORT))
+    _, text = page(folder, kind)
     if output is None:
-        print(text, end="")
+        put(text, end="")
     else:
         write_page(output, text)

@@ -1,5 +1,7 @@
 """`dpg schema`: the JSON Schema of the spec."""
 
+from dpgcli.cli.streams import put_json
+
 
 def schema() -> None:
     """Print the JSON Schema of the spec, for editors."""
@@ -7,4 +9,4 @@ def schema() -> None:
 
     from dpgcli.files.scene_file import json_schema
 
-    print(json.dumps(json_schema(), indent=2))
+    put_json(json.dumps(json_schema(), indent=2) + "\n")

@@ -7,7 +7,7 @@ from select import select
 from typing import Any, TextIO
 
 from dpgcli.cli.spelling import with_options
-from dpgcli.text import printable
+from dpgcli.text import inert, printable
 
 
 class Stream(io.RawIOBase):
@@ -91,11 +91,38 @@ def say(message: str) -> None:
     print(_shown(with_options(message)), file=sys.stderr, flush=True)
 
 
-def put(text: str) -> None:
+def put(text: str, end: str = "\n") -> None:
     """Print lines that may hold names and texts of others on standard output."""
-    print(_shown(text))
+    print(_shown(text), end=end)
+
+
+def put_json(text: str) -> None:
+    """Print JSON, of which a runner would obey the same inside of texts: its data stay the same."""
+    print(text.replace("##", r"#\u0023"), end="")
+
+
+def annotate(message: str, **place: str | int | None) -> None:
+    """Print an error for GitHub's runner, which is to obey it, at a `file`, `line` and `col`."""
+    said = ",".join(
+        f"{key}={_escaped(printable(str(value)), ':,')}"
+        for key, value in place.items()
+        if value is not None
+    )
+    print(f"::error {said}::{_escaped(printable(message))}")
+
+
+def _escaped(text: str, also: str = "") -> str:
+    """Text as a workflow command takes it."""
+    for character in "%\r\n" + also:
+        text = text.replace(character, f"%{ord(character):02X}")
+    return text
 
 
 def _shown(text: str) -> str:
-    """Lines in which nothing but their ends does anything to a terminal."""
-    return "\n".join(map(printable, text.split("\n")))
+    """Lines in which nothing but their ends does anything to a terminal, or to a runner."""
+    return "\n".join(map(unobeyed, text.split("\n")))
+
+
+def unobeyed(text: str) -> str:
+    """Text of others in one line, which neither a terminal nor a runner obeys."""
+    return inert(printable(text))

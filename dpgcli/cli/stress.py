@@ -1,4 +1,4 @@
-"""`dpg stress`: stiff and extreme cases, held against extended precision."""
+"""`dpg stress`: stiff and extreme cases beside extended precision."""
 
 import math
 import sys
@@ -16,7 +16,7 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Quiet, Settings, check_table_name
 from dpgcli.cli.printing import Format, print_grid, printer_of
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
     from dpgcli.api.stress import HardCases, StressResult
@@ -45,11 +45,14 @@ def stress(
         Format, typer.Option("--format", help="A summary, or every case as json or csv")
     ] = Format.TABLE,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write every case to this Parquet file")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write every case to this Parquet file"
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Hold stiff and extreme cases against extended precision."""
+    """Compare stiff and extreme cases with extended precision."""
     from dpgcli.api.stress import hard_cases
     from dpgcli.files.output import Mark, check_outputs
 
@@ -121,9 +124,9 @@ def _print_table(title: str, records: list[dict[str, str]]) -> None:
     left = ("subject", "family", "case", "formulation", "pattern", "verdict", "status", "units")
     if records:
         texts = {name: [record[name] for record in records] for name in records[0]}
-        print(f"{title}\n")
+        put(f"{title}\n")
         print_grid(texts, left=(*left, "reached_pattern"))
-        print()
+        put("")
 
 
 def _family(summary: "FamilySummary") -> dict[str, str]:

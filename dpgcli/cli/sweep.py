@@ -1,6 +1,8 @@
 """`dpg sweep`: the design space, into two tables."""
 
+import math
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
@@ -23,13 +25,14 @@ from dpgcli.cli.options import (
     seconds,
 )
 from dpgcli.cli.progress import ProgressLine
-from dpgcli.cli.streams import say
+from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import ProblemFormat
+from dpgcli.cores import cores
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from dpgcli.api.sweep import Place
+    from dpgcli.arrays import Columns
+    from dpgcli.reports.summary import DesignSpace
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict
@@ -45,11 +48,13 @@ class ExecutorName(StrEnum):
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
 Output = Annotated[  # as it is typed, for Make
-    str, typer.Option("-o", "--output", metavar="<path>", help="Folder of the tables")
+    str, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the tables")
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: cores]"),
+    typer.Option(
+        "-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: usable cores]"
+    ),
 ]
 Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
 Scheduler = Annotated[
@@ -67,14 +72,15 @@ Part = Annotated[
 Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
 DepfilePath = Annotated[
-    Path | None, typer.Option("--depfile", help="Write the files read, for Make")
+    Path | None, typer.Option("--depfile", metavar="FILE", help="Write the files read, for Make")
 ]
 Require = Annotated[
     list[str] | None,
     typer.Option("--require", metavar="EXPR", help="What each design must meet; repeatable"),
 ]
 SummaryFile = Annotated[
-    Path | None, typer.Option("--summary-file", help="Append the report to this file")
+    Path | None,
+    typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
 ]
 
 
@@ -165,11 +171,12 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
 
 def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
-    if executor is not ExecutorName.PROCESSES or jobs == 1 or folder.exists():
+    n_workers = jobs or cores().usable
+    if executor is not ExecutorName.PROCESSES or n_workers == 1 or folder.exists():
         return
-    from dpgcli.sweeps.executors import start_fork_server
+    from dpgcli.sweeps.pool import start_fork_server
 
-    start_fork_server("dpgcli.studies.sweep", "filelock", "shapely")
+    start_fork_server("dpgcli.studies.work", "filelock", "shapely")
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
@@ -205,23 +212,38 @@ def _judge(
     from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements
 
-    designs, text = summarize(study.folder, is_new=is_new, say=say)
+    space, text = summarize(study.folder, is_new=is_new)
+    designs = space.designs
     if is_new and not quiet:
-        print(text, end="")
+        print_in_short(study.folder, space)
         if study.target_error is not None:
             say(_chosen(designs))
     verdicts: Sequence[RequirementVerdict] = check_requirements(designs, rules) if rules else ()
     print_verdicts(verdicts, ProblemFormat.TEXT)
     summary = text + ("\n" + verdicts_markdown(verdicts) if rules else "")
     is_written = summary_file is None or append_summary(summary_file, summary)
-    return int((designs["status"] == "failed").sum()), code_of(verdicts, is_written=is_written)
+    return len(space.of_status("failed")), code_of(verdicts, is_written=is_written)
 
 
-def _chosen(designs: "pd.DataFrame") -> str:
+def print_in_short(folder: Path, space: "DesignSpace") -> None:
+    """Where the tables are, how many designs, the best and the worst of them."""
+    from dpgcli.cli.printing import print_grid
+    from dpgcli.reports.summary import in_short
+    from dpgcli.studies.sweep import REPORT
+
+    counts, table = in_short(space)
+    put(f"{folder}: {counts}; more in {folder / REPORT}")
+    if table.rows:
+        places = enumerate(table.head)
+        texts = {name: [row[place] for row in table.rows] for place, name in places}
+        print_grid(texts, left=table.head)
+
+
+def _chosen(designs: "Columns") -> str:
     """The accuracy levels that designs took for the target error."""
-    counts = designs.loc[designs["accuracy_level"] != "", "accuracy_level"].value_counts()
-    ways = ", ".join(f"{count:,} {level}" for level, count in counts.items())
-    bound = designs["error_bound_mm"].max()
+    counts = Counter(level for level in designs["accuracy_level"].tolist() if level)
+    ways = ", ".join(f"{count:,} {level}" for level, count in counts.most_common())
+    bound = max((mm for mm in designs["error_bound_mm"].tolist() if mm == mm), default=math.nan)
     return f"chosen for the target error: {ways or 'nothing'}; largest bound {bound:.1e} mm"
 
 

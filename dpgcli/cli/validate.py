@@ -9,9 +9,8 @@ import typer
 from dpgcli.cli.exits import ExitCode
 from dpgcli.cli.options import Settings
 from dpgcli.cli.spelling import problem_with_options
-from dpgcli.cli.streams import put
+from dpgcli.cli.streams import annotate, put, put_json
 from dpgcli.errors import Problem
-from dpgcli.text import printable
 
 MOST_ANNOTATIONS = 9  # GitHub shows ten per step
 
@@ -47,27 +46,23 @@ def validate(
 
 def _print_text(problems: list[Problem]) -> None:
     for problem in problems:
-        print(problem)
+        put(str(problem))
     if problems:
-        print(f"{len(problems)} problem{'s' * (len(problems) != 1)}")
+        put(f"{len(problems)} problem{'s' * (len(problems) != 1)}")
 
 
 def _print_json(problems: list[Problem]) -> None:
     import json
     from dataclasses import asdict
 
-    print(json.dumps([asdict(problem) for problem in problems], indent=2))
+    put_json(json.dumps([asdict(problem) for problem in problems], indent=2) + "\n")
 
 
 def _print_github(problems: list[Problem]) -> None:
-    """Workflow commands; property values and messages are escaped as GitHub asks."""
     for problem in problems[:MOST_ANNOTATIONS]:
-        place = f"file={escaped(printable(problem.file), ':,')}"
-        place += f",line={problem.line}" if problem.line is not None else ""
-        place += f",col={problem.column}" if problem.column is not None else ""
-        print(f"::error {place}::{escaped(str(problem))}")
+        annotate(str(problem), file=problem.file, line=problem.line, col=problem.column)
     if len(problems) > MOST_ANNOTATIONS:
-        print(f"::error ::and {len(problems) - MOST_ANNOTATIONS} more problems")
+        annotate(f"and {len(problems) - MOST_ANNOTATIONS} more problems")
 
 
 _PRINTERS = {
@@ -75,10 +70,3 @@ _PRINTERS = {
     ProblemFormat.JSON: _print_json,
     ProblemFormat.GITHUB: _print_github,
 }
-
-
-def escaped(text: str, also: str = "") -> str:
-    """Text as a GitHub workflow command takes it."""
-    for character in "%\r\n" + also:
-        text = text.replace(character, f"%{ord(character):02X}")
-    return text

@@ -7,6 +7,7 @@ takes stays far from overflow; the linear stiffness, a stiff limit, may reach 1e
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from dpgcli.text import KeyPath, dotted
 
 UNITS = "finger.units"
 LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
+WALL_COMPLIANCE = "wall_compliance_mm_per_N"
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
 MAX_UNITS = 64
 AGREEMENT = 1e-6  # of a value given twice
@@ -26,16 +28,39 @@ BOUNDS = {  # where they are not those of a length
     "units": (1.0, float(MAX_UNITS)),
     "force_linearity": (0.0, 1.0),
     "hinge_stiffness_N_mm_per_rad": (0.0, LARGEST),
+    WALL_COMPLIANCE: (0.0, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
 }
 SUFFIXES = {  # units in the names of keys
     "_N_mm_per_rad": "N mm/rad",
     "_N_per_mm": "N/mm",
+    "_mm_per_N": "mm/N",
     "_mm": "mm",
     "_MPa": "MPa",
     "_deg": "°",
 }
 Sizes = Mapping[str, Array]
+LEAVE_ONE_OUT = "leave_one_out"  # instead of a model error: that of the calibration
+
+
+class Tolerance(NamedTuple):
+    """A standard uncertainty: in the unit of its key, or relative to its value."""
+
+    size: float
+    is_relative: bool
+
+    def of(self, values: Array) -> Array:
+        """The uncertainty of each value.
+
+        >>> Tolerance(0.1, True).of(np.array([26.0])), Tolerance(0.1, False).of(np.array([6.5]))
+        (array([2.6]), array([0.1]))
+        """
+        return self.size * np.real(values) if self.is_relative else np.full(values.shape, self.size)
+
+    def text(self, key: str) -> str:
+        """In words, for the key it is of."""
+        unit, size = ("%", 100.0 * self.size) if self.is_relative else (unit_of(key), self.size)
+        return f"{size:.6g} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -52,6 +77,7 @@ class Design:
 
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
+    `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
     """
 
     units: int
@@ -62,6 +88,8 @@ class Design:
     law: str | None = None
     gripper: Sizes = field(default_factory=dict)
     n_designs: int = 1
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
+    model_error: float | str | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -82,10 +110,10 @@ class Design:
             return replace(self, gripper={**self.gripper, key: column})
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
-        section = parents[-1]
-        if parents[1] != "overrides":
+        section = parents.pop() if key != WALL_COMPLIANCE else "lattice"
+        if len(parents) == 1:
             return replace(self, finger=_changed(self.finger, section, key, column))
-        units = parents[2]
+        units = parents[-1]
         own = _changed(self.overrides.get(units, GivenValues()), section, key, column)
         return replace(self, overrides={**self.overrides, units: own})
 
@@ -120,9 +148,10 @@ class UnitGroup:
     def path(self, section: str, key: str) -> KeyPath:
         """Where the spec sets, or would set, a value of these units."""
         own = self.own_geometry if section == "geometry" else self.own_lattice
+        at = (key,) if key == WALL_COMPLIANCE else (section, key)
         if self.override is not None and key in own:
-            return ("finger", "overrides", self.override, section, key)
-        return ("finger", section, key)
+            return ("finger", "overrides", self.override, *at)
+        return ("finger", *at)
 
 
 def groups_of(design: Design) -> list[UnitGroup]:
@@ -214,6 +243,15 @@ def agree(given: Array, derived: Array) -> Flags:
     first, second = np.real(given), np.real(derived)
     largest = np.maximum(np.abs(first), np.abs(second))
     return np.asarray(np.abs(first - second) <= AGREEMENT * largest)
+
+
+def without_unit(key: str) -> str:
+    """A key's name without its unit.
+
+    >>> without_unit("elastic_modulus_MPa"), without_unit("force_linearity")
+    ('elastic_modulus', 'force_linearity')
+    """
+    return next((key.removesuffix(suffix) for suffix in SUFFIXES if key.endswith(suffix)), key)
 
 
 def unit_of(key: str) -> str:

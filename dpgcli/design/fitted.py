@@ -79,7 +79,7 @@ def _brought(
     if unknown := [need for need in here if need not in own]:
         rule = f"{name}, which does not state its {listed(unknown)}"
         return _beyond(replace(base, rules=(name,)), everywhere, rule)
-    moved = np.any(np.broadcast_arrays(*(~agree(s, own[n]) for n, s in here.items())), axis=0)
+    moved = np.any(np.broadcast_arrays(*(_differs(s, own[n]) for n, s in here.items())), axis=0)
     value = replace(base, rules=(name,))
     if not moved.any():
         return value
@@ -88,6 +88,11 @@ def _brought(
             value, moved, f"{name}, which does not state its {listed(missing)} to scale by"
         )
     return _scaled(derivation, value, moved, own, here)
+
+
+def _differs(here: Array, own: Array) -> Flags:
+    """Where a dimension is not that of the fit, or is a complex step away from it."""
+    return np.asarray(~agree(here, own) | (np.imag(here) != 0.0))
 
 
 def _scaled(

@@ -9,7 +9,9 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import (
+    LEAVE_ONE_OUT,
     LINEAR_STIFFNESS,
+    WALL_COMPLIANCE,
     Design,
     GivenValues,
     UnitGroup,
@@ -18,20 +20,31 @@ from dpgcli.design.dimensions import (
     range_issues,
 )
 from dpgcli.design.domes import Domes, domes_of
+from dpgcli.design.model_error import known_model_error
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
-from dpgcli.design.scene import ORIGINS, Gripper, Origin, Scene, Source
-from dpgcli.design.uncertainty import Share, uncertainty_of
+from dpgcli.design.scene import (
+    ORIGINS,
+    Chambers,
+    Gripper,
+    ModelError,
+    Origin,
+    Scene,
+    Source,
+    Uncertainty,
+)
+from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.text import KeyPath
 
 SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
-NO_BARS = Issue(
-    ("finger", LINEAR_STIFFNESS),
-    "a stiffness > 0 in N/mm, or .inf",
-    "nothing",
-    "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
+NO_LEAVE_ONE_OUT = Issue(
+    ("model_error",),
+    "a calibration in use that has a leave-one-out error",
+    "none",
+    "dpg fit finger writes one; or give a percentage such as 5%",
 )
 Pairs = Sequence[tuple[UnitGroup, Value]]
 
@@ -54,12 +67,14 @@ class Resolution:
     def gravest_origins(self) -> Indices:
         """The gravest origin among each design's values, (design,), as indices of `ORIGINS`.
 
-        Values that the geometry alone fixes count as given.
+        Values that the geometry alone fixes count as given; so does an assumed stiffness of the
+        bars, which hardly matters.
         """
         gravest = np.zeros(self.design.n_designs, np.int64)
-        derived, given = map(ORIGINS.index, (Origin.DERIVED, Origin.GIVEN))
+        given, *harmless = map(ORIGINS.index, (Origin.GIVEN, Origin.DERIVED, Origin.ASSUMED))
         for _, value in (pair for pairs in self.values.values() for pair in pairs):
-            gravest = np.maximum(gravest, np.where(value.origin == derived, given, value.origin))
+            is_harmless = np.isin(value.origin, harmless)
+            gravest = np.maximum(gravest, np.where(is_harmless, given, value.origin))
         return gravest
 
     @cached_property
@@ -89,13 +104,24 @@ class Resolution:
             tuple(self._sources()),
             gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
             None if layer is None else np.asarray(layer).item(),
-            uncertainty_of(self.design.calibrations, self._shares()),
+            self._uncertainty(),
+            self.model_error,
+            self._chambers(),
         )
+
+    @property
+    def model_error(self) -> ModelError:
+        """What is known of the model's own error, for a single design."""
+        values = [value for pairs in self.values.values() for _, value in pairs]
+        lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
+        if WALL_COMPLIANCE in self.values:  # nothing is known of a lever beside walls
+            lever = None
+        return known_model_error(self.design, lever, values)
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
 
-        Their bars are all rigid or none are; sources and uncertainty are left out.
+        Bars and walls are rigid in all or in none; sources, uncertainty and chambers are left out.
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
@@ -104,11 +130,21 @@ class Resolution:
         return Scene(finger, (), self._gripper(designs), thickness)
 
     def alike(self, designs: Indices) -> list[Indices]:
-        """Some of the designs, none of them wrong, apart by whether their bars are rigid."""
+        """Some of the designs, none of them wrong, apart by whether bars or all walls are rigid."""
         if not len(designs):
             return []
-        is_rigid = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0])
-        return [part for part in (designs[is_rigid], designs[~is_rigid]) if len(part)]
+        kind = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0]).astype(int)
+        if "wall_compliance" in self.lattice:
+            kind += 2 * (_picked(self.lattice["wall_compliance"], designs) > 0.0).any(axis=0)
+        return [part for part in (designs[kind == k] for k in (1, 0, 3, 2)) if len(part)]
+
+    def _chambers(self) -> Chambers:
+        """Sizes of the chambers of the first design."""
+        groups = [group for group in groups_of(self.design) if group.units]
+        keys = ("unit_separation_mm", "chamber_width_mm", "dome_height_mm")
+        unknown = np.full(1, np.nan)
+        pairs = ([(group, group.geometry.get(key, unknown)) for group in groups] for key in keys)
+        return Chambers(*(_by_unit(self.design.units, sizes)[:, 0] for sizes in pairs))
 
     def _gripper(self, designs: Indices) -> Gripper | None:
         given = self.design.gripper
@@ -128,6 +164,13 @@ class Resolution:
                 same[source] = (*same.get(source, ()), *units)
             for source, units in sorted(same.items(), key=lambda item: min(item[1])):
                 yield replace(source, units=_ranges(units))
+
+    def _uncertainty(self) -> Uncertainty | None:
+        """What a single design's values, and the model if the spec counts it in, may be off by."""
+        design = self.design
+        steps = tolerance_steps(design, self.lattice, lambda moved: resolve(moved).lattice)
+        share = None if design.model_error is None else self.model_error.share
+        return uncertainty_of(design.calibrations, [*self._shares()], [*steps], share or 0.0)
 
     def _shares(self) -> Iterator[Share]:
         """Standard errors of what comes from calibration files, unit by unit."""
@@ -170,12 +213,16 @@ def resolve(design: Design) -> Resolution:
         chosen = [base] if derivation is SEGMENT_HEIGHT else groups
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
-    bars = _bars(design, base)
-    if bars is None:
-        problems.everywhere(NO_BARS)
-    else:
-        values[LINEAR_STIFFNESS] = [(base, bars)]
-    return Resolution(design, domes, values, problems)
+    values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
+    walls = [(group, _walls(group)) for group in groups]
+    if any(value.numbers.any() for _, value in walls):
+        values[WALL_COMPLIANCE] = walls
+    resolution = Resolution(design, domes, values, problems)
+    for issue in tolerance_issues(design, [*values]):
+        problems.everywhere(issue)
+    if design.model_error == LEAVE_ONE_OUT and resolution.model_error.share is None:
+        problems.everywhere(NO_LEAVE_ONE_OUT)
+    return resolution
 
 
 def _check_linearities(design: Design, domes: Domes, problems: Problems) -> None:
@@ -197,13 +244,28 @@ def _linearity_issue(where: KeyPath, law: str | None, given: Array, design: int)
     return Issue(where, f"none beside law: {law}", number(of_design(given, design)), hint)
 
 
-def _bars(design: Design, base: UnitGroup) -> Value | None:
-    """The stiffness of the bars: given, or fitted."""
+def _bars(design: Design, base: UnitGroup) -> Value:
+    """The stiffness of the bars: given, fitted, or assumed."""
     if design.linear_stiffness is not None:
         return all_by(design.linear_stiffness, Origin.GIVEN, "as given")
-    for place, calibration in enumerate(base.calibrations):
-        if isinstance(calibration, Calibration) and LINEAR_STIFFNESS in calibration.values:
-            fitted = calibration.values[LINEAR_STIFFNESS]
+    rule = "the study calls the bars nearly rigid and names no number"
+    assumed = all_by(np.array([NEARLY_RIGID]), Origin.ASSUMED, rule)
+    return _fitted(LINEAR_STIFFNESS, base) or assumed
+
+
+def _walls(group: UnitGroup) -> Value:
+    """How far walls give way: given, fitted, or not at all."""
+    if WALL_COMPLIANCE in group.lattice:
+        return all_by(group.lattice[WALL_COMPLIANCE], Origin.GIVEN, "as given")
+    rigid = all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
+    return _fitted(WALL_COMPLIANCE, group) or rigid
+
+
+def _fitted(key: str, group: UnitGroup) -> Value | None:
+    """The value of the first calibration that has one."""
+    for place, calibration in enumerate(group.calibrations):
+        if isinstance(calibration, Calibration) and key in calibration.values:
+            fitted = calibration.values[key]
             value = all_by(np.array([fitted.value]), Origin.CALIBRATED, f"from {calibration.file}")
             error = fitted.standard_error
             return replace(

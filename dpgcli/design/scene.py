@@ -19,6 +19,7 @@ class Origin(StrEnum):
     INTERPOLATED = "interpolated"
     SCALED = "scaled"
     EXTRAPOLATED = "extrapolated"
+    ASSUMED = "assumed"
 
 
 ORIGINS = tuple(Origin)
@@ -39,16 +40,77 @@ class Source:
     standard_error: float | None = None
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """Standard errors and correlations of fitted values.
+FITTED = "fitted_values"
+MODEL = "model_error"
 
-    `covariance` (step, step) of steps along `directions`, which change the finger's arrays by the
-    values given by name, each (1 or unit, 1).
+
+@dataclass(frozen=True)
+class Step:
+    """One standard uncertainty of one value, and by how much it changes what depends on it.
+
+    `cause` is the value's key, or `FITTED` of a calibration's; `size` says how large it is.
+    `finger` has the changes of the finger's arrays by name, each (1 or unit, 1); the others are
+    those of the gripper's base spacing (mm) and mounting angle (rad), and of the limiting layer's
+    thickness (mm).
     """
 
-    directions: tuple[Mapping[str, Array], ...]
+    cause: str
+    finger: Mapping[str, Array]
+    base_spacing: float = 0.0
+    mounting_angle: float = 0.0
+    layer_thickness: float = 0.0
+    size: str = ""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What values may be off by, and the model.
+
+    `covariance` (step, step) of multiples of the `steps`. `model_error` is the standard uncertainty
+    of the model itself: of a tip's place as a share of its deflection, of its angle as a share of
+    that angle; 0 where it is left out.
+    """
+
+    steps: tuple[Step, ...]
     covariance: Array
+    model_error: float = 0.0
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """What it counts in, each once."""
+        model = (MODEL,) if self.model_error else ()
+        return (*dict.fromkeys(step.cause for step in self.steps), *model)
+
+    @property
+    def covers(self) -> str:
+        """What it counts in, and what not, in words.
+
+        >>> Uncertainty((Step("stroke_mm", {}), Step(FITTED, {})), np.eye(2)).covers
+        'fitted values, tolerance of stroke_mm; without the model error'
+        """
+        keys = [cause for cause in self.causes if cause not in (FITTED, MODEL)]
+        parts = ["fitted values"] if FITTED in self.causes else []
+        listed = " and ".join([", ".join(keys[:-1]), keys[-1]] if keys[1:] else keys)
+        parts += [f"tolerance{'s' * (len(keys) > 1)} of {listed}"] if keys else []
+        if self.model_error:
+            return f"{', '.join([*parts, ''])}model error of {100.0 * self.model_error:.3g} %"
+        return f"{', '.join(parts)}; without the model error"
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """What is known of the model's own error, in words, and as a share of the deflection.
+
+    The `share` is a root mean square, None where there is no number.
+    """
+
+    text: str
+    share: float | None = None
+
+
+UNKNOWN = ModelError(
+    "unknown for this law and these values; dpg compare finds it: dpg help accuracy"
+)
 
 
 @dataclass(frozen=True)
@@ -63,11 +125,25 @@ class Gripper:
 
 
 @dataclass(frozen=True)
+class Chambers:
+    """Sizes (mm) of a finger's chambers that its lattice does not have, NaN where none is known.
+
+    Each is (unit,), or (1,) for all: the gap to the next chamber, the inner width, the height of
+    the dome. They are for pictures.
+    """
+
+    gap: Array
+    width: Array
+    dome_height: Array
+
+
+@dataclass(frozen=True)
 class Scene:
     """A finger, its gripper if any, and the thickness (mm) of its limiting layer if known.
 
     Of a batch of fingers gripper and thickness are arrays by design. `uncertainty` is that of
-    fitted values, if any has an error.
+    fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
+    is known of the last; `chambers` are those of a finger given by its geometry.
     """
 
     finger: Finger
@@ -75,9 +151,11 @@ class Scene:
     gripper: Gripper | None = None
     layer_thickness: float | Array | None = None
     uncertainty: Uncertainty | None = None
+    model_error: ModelError = UNKNOWN
+    chambers: Chambers | None = None
 
     def take_lanes(self, index: Indices) -> "Scene":
-        """Some designs of a batch; sources and uncertainty are left out."""
+        """Some designs of a batch; sources, uncertainty and chambers are left out."""
         gripper, thickness = self.gripper, self.layer_thickness
         if gripper is not None:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))

@@ -62,6 +62,15 @@ def _piped(path: Path, place: Location, most: int, hint: str) -> bytes:
     return content
 
 
+def beside(folder: Path, name: str) -> Path:
+    """The file that a name in another file means: from its folder, ~ being the user's own.
+
+    >>> beside(Path("configs"), "five_unit.yaml").as_posix()
+    'configs/five_unit.yaml'
+    """
+    return folder / os.path.expanduser(name)  # noqa: PTH111  as it is where there is no such user
+
+
 def opened(path: Path) -> BinaryIO:
     """A file to read; raises OSError for a device or pipe, which may have no end."""
     if path.exists() and not path.is_file() and not path.is_dir():

@@ -1,13 +1,12 @@
 """CSV and data frames read strictly: what each cell says, where it stands, all problems at once."""
 
-import csv
 import hashlib
 import io
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
@@ -15,8 +14,19 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.design.dimensions import LARGEST
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.content import content_of, decoded
+from dpgcli.files.frames import frame_of
+from dpgcli.files.headers import headed
+from dpgcli.files.layout import (
+    GROUPED,
+    NUMBER,
+    Marks,
+    is_number,
+    marks_in,
+    rows_in,
+    separator_of,
+)
 from dpgcli.files.places import Location, in_order, located, shown
 
 if TYPE_CHECKING:
@@ -27,20 +37,56 @@ Tabular: TypeAlias = Union[str, Path, "pd.DataFrame", Mapping[str, Any]]
 
 FRAME = "data frame"
 MAX_BYTES = 64 * 1024 * 1024
-COMMENT = re.compile(r"#+\s|#$")
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # its marks
+FOREIGN = {
+    b"PK\x03\x04": "an Excel workbook or an archive",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook",
+    b"PAR1": "a Parquet file",
+}
+WESTERN = frozenset("äöüÄÖÜßéèêàâçñáíóúåøæÅØÆôîïëìòùõãÉÈÇÑ°µ²³·±–—’“”…€×«»§® ")
 TO_COMMENT = "behind the # of a comment stands a space"
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+TO_BEGIN = Message(
+    "a title that stands there once, or a column's place; ",
+    Field("skip"),
+    " N if the table begins below N lines",
+)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What of a file is read, where a machine wrote it: `columns` have our names for its titles.
+
+    A title with a minus before it is that of a column whose numbers are reversed, a number that of
+    the column at this place. `skip` lines lie above the table, `units` are those of quantities.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    skip: int | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+AS_IT_IS = Choice()
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The cells of a CSV file by row, the line of each row, and the SHA-256 of the file."""
+    """The cells of a CSV file by row, the line of each row, and the SHA-256 of the file.
+
+    `names` are ours for columns that were chosen. By name, `units` are those that the file says
+    itself, `titles` what it calls a column that was chosen; `reversed` are those whose sign is.
+    `comments` are lines with a # above the header, and their numbers.
+    """
 
     file: str
     names: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
     sha256: str
+    separator: str = ","
+    units: Mapping[str, str] = field(default_factory=dict)
+    titles: Mapping[str, str] = field(default_factory=dict)
+    reversed: frozenset[str] = frozenset()
+    comments: tuple[tuple[int, str], ...] = ()
 
     def cells(self, name: str) -> list[str]:
         """The texts of one column."""
@@ -65,27 +111,54 @@ class Sheet:
         Raises SpecError with every cell that holds no number.
         """
         cells = {name: self.cells(name) for name in names}
-        columns = {name: [_number(cell, may_lack) for cell in cells[name]] for name in names}
+        columns = {
+            name: [_number(self.marks.plain(cell), may_lack) for cell in cells[name]]
+            for name in names
+        }
         problems = [
-            self.problem(row, name, *_no_number(cells[name][row]))
+            self.problem(row, name, *self._no_number(cells[name][row]))
             for name, values in columns.items()
             for row, value in enumerate(values)
             if value is None
         ]
         if problems:
             raise SpecError(in_order(problems))
-        return {name: np.array(values, np.float64) for name, values in columns.items()}
+        return {
+            name: np.array(values, np.float64) * (-1.0 if name in self.reversed else 1.0)
+            for name, values in columns.items()
+        }
+
+    @cached_property
+    def marks(self) -> Marks:
+        """The marks of its numbers: those of the columns that are mostly numbers."""
+        columns = [[row[place] for row in self.rows] for place in range(len(self.names))]
+        mostly = [cells for cells in columns if 2 * sum(map(is_number, cells)) >= len(cells)]
+        return marks_in([cell for cells in mostly for cell in cells], self.separator)
+
+    def _no_number(self, cell: str) -> tuple[str, str, str]:
+        """Expected, found and hint where there is no number."""
+        plain = self.marks.plain(cell)
+        if NUMBER.fullmatch(plain):
+            expected = f"a number of at most {LARGEST:g}"
+            return expected, shown(cell), "is the unit another one?"
+        if self.marks.doubtful and GROUPED.fullmatch(cell):
+            return "a number", shown(cell), "thousands, or a decimal comma? write a decimal point"
+        if is_number(cell):
+            mark = "point" if self.marks.decimal == "." else "comma, as elsewhere"
+            return "a number", shown(cell), f"write a decimal {mark}"
+        return "a number", shown(cell), TO_COMMENT if cell.startswith("#") else ""
 
     def check_names(self, needed: Sequence[str]) -> None:
         """Raise SpecError for columns that are missing."""
         if problems := [self.missing(name) for name in needed if name not in self.names]:
             raise SpecError(tuple(problems))
 
-    def missing(self, *wanted: str) -> Problem:
+    def missing(self, *wanted: str, hint: str = "") -> Problem:
         """The problem that there is no column of any of these names."""
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
-        hint = f"is it {close[0]}?" if close else ""
-        expected, found = f"a column {' or '.join(wanted)}", ", ".join(self.names)
+        hint = f"is it {close[0]}?" if close else hint
+        expected = f"a column {' or '.join(wanted)}"
+        found = ", ".join(self.titles.get(name, name) for name in self.names if name)
         return located(Location(self.file), "header", expected, found, hint)
 
 
@@ -103,56 +176,94 @@ def _content(source: Tabular) -> tuple[str, bytes]:
     if isinstance(source, str | Path):
         hint = "a curve or a table of states is short"
         return str(source), content_of(Path(source), Location(str(source)), MAX_BYTES, hint)
-    import pandas as pd
-
-    convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
-    frame = convert() if convert is not None else pd.DataFrame(source)
-    return FRAME, frame.to_csv(index=False).encode()
+    return FRAME, frame_of(source).to_csv(index=False).encode(errors="backslashreplace")
 
 
-def read_sheet(source: Tabular) -> Sheet:
+def text_of(content: bytes, place: Location) -> str:
+    """The text of a table, in UTF-8, in UTF-16 with its mark, or as Windows writes in the West.
+
+    Raises SpecError for what is no text.
+    """
+    if b"\0" in content[:1000] and not content.startswith(UTF_16):
+        raise SpecError((located(place, "file", "text", "zero bytes", "save it as UTF-8"),))
+    if kind := next((kind for mark, kind in FOREIGN.items() if content.startswith(mark)), None):
+        raise SpecError((located(place, "file", "text", kind, "save it as CSV"),))
+    try:
+        if content.startswith(UTF_16):
+            return content.decode("utf-16")
+        return decoded(content, place)
+    except UnicodeDecodeError as error:
+        raise SpecError((located(place, "file", "text in UTF-16", error.reason),)) from None
+    except SpecError:
+        text = content.decode("cp1252", errors="replace")
+        if WESTERN.issuperset(c for c in text if c > "\x7f"):
+            return text
+        raise
+
+
+def read_sheet(
+    source: Tabular, wanted: Container[str] = frozenset(), choice: Choice = AS_IT_IS
+) -> Sheet:
     """Read a CSV file with a header; lines that start with # are comments.
 
-    A data frame is read as the CSV that it would be written to, header in line 1.
+    A file may have its own separators and marks, titles above the header and units below it: see
+    `files.layout`. The header is the row with the titles that are chosen or names that are
+    `wanted`. A data frame is read as the CSV that it would be written to, header in line 1, but
+    for comments: it has none, and every row counts.
 
     Below the header a comment has a space behind the #: spreadsheets write #DIV/0!, and of a row
     such as #5,0.2 nobody knows whether it is meant.
     Raises SpecError for what cannot be read, names that repeat, and rows of another length.
     """
     file, content = _content(source)
-    rows: list[list[str]] = []
-    lines, problems = [], []
-    text = io.StringIO(decoded(content, Location(file)), newline=None)
-    for number, line in enumerate(map(str.strip, text), start=1):
-        if line and not (COMMENT.match(line) if rows else line.startswith("#")):
-            try:
-                cells = next(csv.reader([line], skipinitialspace=True, strict=True))
-            except csv.Error as error:
-                problems.append(
-                    located(Location(file, number), "row", "cells of a CSV", str(error))
-                )
-                continue
-            rows.append([cell.strip() for cell in cells])
-            lines.append(number)
-    if not rows and not problems:
-        problems.append(located(Location(file), "file", "a header and rows", "nothing"))
-    if problems:
-        raise SpecError(in_order(problems))
-    digest = hashlib.sha256(content).hexdigest()
-    sheet = Sheet(file, tuple(rows[0]), rows[1:], lines[1:], digest)
-    problems = list(_form_problems(sheet, lines[0]))
+    is_file = isinstance(source, str | Path)
+    text = text_of(content, Location(file)) if is_file else content.decode()
+    lines = list(io.StringIO(text, newline=None))
+    lines[: choice.skip or 0] = ["\n"] * min(choice.skip or 0, len(lines))
+    separator = separator_of(lines) if is_file else ","
+    rows, problems = rows_in(lines, separator, file, has_comments=is_file)
+    if not rows:
+        found = problems or [located(Location(file), "file", "a header and rows", "nothing")]
+        raise SpecError(in_order(found))
+    is_first = choice.skip is not None or not is_file
+    head = headed(rows, wanted, choice.columns, is_first=is_first)
+    line = head.line
+    below = [row for row in head.rows if is_file or row.line > 1]  # names that are numbers are none
+    problems = [problem for problem in problems if (problem.line or 0) > line]
+    sheet = Sheet(
+        file,
+        head.names,
+        [row.cells for row in below],
+        [row.line for row in below],
+        hashlib.sha256(content).hexdigest(),
+        separator,
+        head.units,
+        head.titles,
+        head.reversed,
+        tuple(_comments(lines[:line])) if is_file else (),
+    )
+    problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
     if problems:
         raise SpecError(in_order(problems))
     return sheet
 
 
+def _comments(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(map(str.strip, lines), start=1):
+        if line.startswith("#"):
+            yield number, line.lstrip("#").strip()
+
+
+def _unfound(sheet: Sheet, choice: Choice) -> Iterator[Problem]:
+    """Columns that were chosen, and are not there, or more than once."""
+    for name, title in choice.columns.items():
+        if name not in sheet.titles:
+            yield sheet.missing(title, hint=TO_BEGIN)
+
+
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Location(sheet.file, header)
-    if len(sheet.names) == 1 and (foreign := [c for c in ";\t" if c in sheet.names[0]]):
-        hint = "and write decimal points"
-        yield located(top, "header", "columns separated by commas", shown(foreign[0]), hint)
-        return
-    for name in dict.fromkeys(n for n in sheet.names if sheet.names.count(n) > 1):
+    for name in dict.fromkeys(n for n in sheet.names if n and sheet.names.count(n) > 1):
         yield located(top, "header", "each column once", f"{shown(name)} again")
     for row, cells in enumerate(sheet.rows):
         if len(cells) != len(sheet.names):
@@ -170,12 +281,3 @@ def _number(cell: str, may_lack: bool) -> float | None:
         return None
     value = float(cell)
     return value if abs(value) <= LARGEST else None
-
-
-def _no_number(cell: str) -> tuple[str, str, str]:
-    """Expected, found and hint where there is no number."""
-    if NUMBER.fullmatch(cell):
-        return f"a number of at most {LARGEST:g}", shown(cell), "is the unit another one?"
-    if NUMBER.fullmatch(cell.replace(",", ".", 1)):
-        return "a number", shown(cell), "write a decimal point"
-    return "a number", shown(cell), TO_COMMENT if cell.startswith("#") else ""

@@ -10,12 +10,14 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
+from dpgcli.files.layout import NUMBER
 from dpgcli.files.places import Location, in_order, located
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
 SECONDS = "seconds"
+STATION, OFFSET = "first_station_mm", "tip_offset_mm"
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
@@ -27,17 +29,20 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
 
     Columns: `pattern`; `tip_x_mm` and `tip_y_mm`; `tip_angle_rad`; `chamber2_angle_rad` …, of the
     phalanges after the first; `opening1_mm` …; `push1_N` …; `seconds`. A second file has the
-    points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Raises SpecError
-    with every problem of a file.
+    points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Comments above the
+    header may say the frame: `# first_station_mm: 5.375, 0.75`, `# tip_offset_mm: 5.375, -0.75`.
+    Raises SpecError with every problem of a file.
     """
-    sheet = read_sheet(source)
+    names = _names(n_units)
+    sheet = read_sheet(source, names)
     sheet.check_names(("pattern",))
     if len(sheet.rows) * n_units > MOST_UNITS:
         expected = f"at most {MOST_UNITS // n_units:,} states of {n_units} units"
         wrong = sheet.problem(None, "file", expected, f"{len(sheet.rows):,}", "a part at a time")
         raise SpecError((wrong,))
     patterns = sheet.cells("pattern")
-    problems = [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
+    frame, problems = _frame(sheet)
+    problems += [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
     if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
         problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
     try:
@@ -56,6 +61,8 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
+        first_station=frame.get(STATION),
+        tip_offset=frame.get(OFFSET),
     )
     problems = [
         sheet.problem(row, SECONDS, "a time > 0", f"{known.seconds[row]:g}")
@@ -67,6 +74,23 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
     if problems:
         raise SpecError(in_order(problems))
     return known
+
+
+def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]:
+    """Points of the frame by key, from comments, and what is wrong with them."""
+    frame: dict[str, tuple[float, float]] = {}
+    problems = []
+    for line, text in sheet.comments:
+        key, mark, said = (part.strip() for part in text.partition(":"))
+        if not mark or key not in (STATION, OFFSET):
+            continue
+        numbers = said.removeprefix("[").removesuffix("]").split(",")
+        if len(numbers) == len(TIP) and all(NUMBER.fullmatch(n.strip()) for n in numbers):
+            frame[key] = (float(numbers[0]), float(numbers[1]))
+        else:
+            place = Location(sheet.file, line)
+            problems.append(located(place, key, "two numbers in mm, such as 5.375, -0.75", said))
+    return frame, problems
 
 
 def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
@@ -100,11 +124,16 @@ def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
         raise SpecError(tuple(problems))
 
 
+def _names(n_units: int) -> set[str]:
+    """The columns that a table of states may have."""
+    by_unit = (*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units))
+    return {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units), *by_unit}
+
+
 def _unused(sheet: Sheet, n_units: int) -> tuple[str, ...]:
-    used = {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units)}
-    used |= {*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units)}
+    used = _names(n_units)
     used -= set() if {*TIP} <= {*sheet.names} else {*TIP}  # one coordinate places no tip
-    return tuple(name for name in sheet.names if name not in used)
+    return tuple(name for name in sheet.names if name and name not in used)
 
 
 def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
@@ -160,7 +189,7 @@ def _angles(sheet: Sheet, n_units: int) -> Array:
 
 def _read_shapes(source: Tabular, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
     """Points by state, in the order of the file; none for a state that is not in it."""
-    sheet = read_sheet(source)
+    sheet = read_sheet(source, ("pattern", *POINT))
     sheet.check_names(("pattern", *POINT))
     problems = _pattern_problems(sheet, n_units)
     points = sheet.numbers(POINT)

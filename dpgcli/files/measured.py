@@ -9,53 +9,42 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.choices import LINEARITY
 from dpgcli.calibration.record import Record
 from dpgcli.design.dimensions import SMALLEST, unit_of
-from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.calibration.models import Values
-from dpgcli.files.csv_file import Sheet, Tabular, read_sheet
+from dpgcli.files.csv_file import AS_IT_IS, Choice, Sheet, Tabular, read_sheet
+from dpgcli.files.own_units import chosen_units, in_own_units
 from dpgcli.files.places import in_order
+from dpgcli.files.plausible import other_scales, other_springs, wrong_signs
 from dpgcli.files.sections import Geometry, expected_of
+from dpgcli.files.units import factor_of
 from dpgcli.files.yaml_file import MAX_NODES
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}
 OTHERS = {"volume_mm3": "volume", "time_s": "time"}
+CURVE = {**dict.fromkeys(TRAVELS, "travel"), **QUANTITIES, **OTHERS}  # quantities by column
 MOMENT, ROTATIONS = "moment_N_mm", ("rotation_rad", "rotation_mid_chamber_rad")
+HINGE = {MOMENT: "moment", **dict.fromkeys(ROTATIONS, "rotation")}
 
-PLAUSIBLE = {  # of the largest value, for what soft fingers are made of; without geometry
-    "travel": (0.1, 1e3),
-    "energy": (0.1, 1e5),
-    "force": (1e-3, 1e4),
-    "pressure": (1e-4, 10.0),
-    "moment": (0.02, 1e6),
-    "rotation": (1e-6, 3.2),
-}
-GUESSES = {  # the unit behind values that are too small, and too large
-    "travel": ("meters?", "micrometers?"),
-    "energy": ("joules?", "microjoules?"),
-    "force": ("kilonewtons?", "millinewtons?"),
-    "pressure": ("gigapascals?", "kPa or Pa?"),
-    "moment": ("N m?", "N um?"),
-    "rotation": ("", "degrees?"),
-}
 USUAL = {  # largest values of a geometry, by the unit of its key, and what others may be in
     "mm": (0.05, 200.0, "meters?", "micrometers?"),
     "MPa": (1e-3, 1e4, "gigapascals?", "kPa or Pa?"),
 }
 MOST_NUMBERS = MAX_NODES * 9 // 10
 POSITIVE = f"a number > 0, at least {SMALLEST:g}, since logarithms are fitted"
-DOME = ("dome_height_mm", "dome_thickness_mm", "elastic_modulus_MPa")
-BEHIND = {"travel": DOME[:1], "energy": DOME, "force": DOME, "pressure": DOME}  # a range of its own
-MARGIN = 100.0  # between a dome and the estimate for its geometry; another unit is 1000 off
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A curve, the columns that were not used, and the SHA-256 of the file."""
+    """A curve, the columns that were not used, and the SHA-256 of the file.
+
+    `notes` say in which units other than ours its columns were.
+    """
 
     curve: Record
     ignored: tuple[str, ...]
     sha256: str
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,11 +59,12 @@ class Moments:
     texts: Mapping[str, tuple[str, ...]]
     ignored: tuple[str, ...]
     sha256: str
+    notes: tuple[str, ...] = ()
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Columns whose texts tell rows of different hinges apart, in words."""
-        return tuple(
+        """Units, and columns whose texts tell rows of different hinges apart, in words."""
+        return self.notes + tuple(
             Message(
                 f"rows of {n} different {name} are fitted as one hinge: choose with ",
                 Field("where"),
@@ -102,49 +92,58 @@ class GridTable:
     sha256: str
 
 
-def read_curve(source: Tabular, geometry: Mapping[str, float] | None = None) -> Measured:
+def read_curve(
+    source: Tabular, geometry: Mapping[str, float] | None = None, choice: Choice = AS_IT_IS
+) -> Measured:
     """A dome's curve; the geometry tells units that are a thousand times off.
 
-    Raises SpecError with every problem at once.
+    Raises SpecError with every problem at once, UsageError for a choice that is none.
     """
-    sheet = read_sheet(source)
-    headless = list(_one_of(sheet, TRAVELS))
+    given = chosen_units(choice, CURVE)
+    sheet = read_sheet(source, CURVE, choice)
+    headless = list(_one_of(sheet, TRAVELS, "travel"))
     if not set(QUANTITIES) & set(sheet.names):
-        headless.append(sheet.missing(*QUANTITIES))
+        headless.append(sheet.missing(*QUANTITIES, hint=_titled(sheet, *QUANTITIES.values())))
     if headless:
         raise SpecError(tuple(headless))
-    travel = next(name for name in TRAVELS if name in sheet.names)
-    known = {travel: "travel", **QUANTITIES, **OTHERS}
-    columns = sheet.numbers([name for name in sheet.names if name in known])
-    arrays = {known[name]: values for name, values in columns.items()}
-    problems = [*_signs(sheet, travel, arrays["travel"]), *_scales(sheet, columns, known, geometry)]
+    columns = {name: kind for name, kind in CURVE.items() if name in sheet.names}
+    own = in_own_units(sheet, columns, given)
+    arrays = {kind: own.values[name] for name, kind in columns.items()}
+    travel = next(name for name in TRAVELS if name in columns)
+    problems = [
+        *wrong_signs(sheet, travel, arrays["travel"]),
+        *other_scales(sheet, own.values, columns, geometry),
+    ]
+    problems = problems or list(other_springs(sheet, own, columns, geometry))
     if problems:
         raise SpecError(in_order(problems))
-    return Measured(Record(**arrays), _unused(sheet, known), sheet.sha256)
+    return Measured(Record(**arrays), _unused(sheet, columns), sheet.sha256, own.notes)
 
 
-def read_moments(source: Tabular, where: str | None = None) -> Moments:
+def read_moments(source: Tabular, where: str | None = None, choice: Choice = AS_IT_IS) -> Moments:
     """Moments and rotations of a hinge; `where` "COLUMN=TEXT" chooses rows.
 
-    Raises SpecError with every problem at once.
+    Raises SpecError with every problem at once, UsageError for a choice that is none.
     """
-    sheet = read_sheet(source)
-    headless = list(_one_of(sheet, ROTATIONS))
+    given = chosen_units(choice, HINGE)
+    sheet = read_sheet(source, HINGE, choice)
+    headless = list(_one_of(sheet, ROTATIONS, "rotation"))
     if MOMENT not in sheet.names:
-        headless.append(sheet.missing(MOMENT))
+        headless.append(sheet.missing(MOMENT, hint=_titled(sheet, "moment")))
     if headless:
         raise SpecError(tuple(headless))
     rotation = next(name for name in ROTATIONS if name in sheet.names)
     if where is not None:
         sheet = _chosen(sheet, where)
     known = {MOMENT: "moment", rotation: "rotation"}
-    columns = sheet.numbers(list(known))
-    problems = list(_scales(sheet, columns, known, None))
+    own = in_own_units(sheet, known, given)
+    columns = own.values
+    problems = list(other_scales(sheet, columns, known, None))
     if problems:
         raise SpecError(in_order(problems))
     texts = {name: tuple(sheet.cells(name)) for name in sheet.names if not _is_numeric(sheet, name)}
     unused = tuple(name for name in _unused(sheet, known) if name not in texts)
-    return Moments(columns[MOMENT], columns[rotation], texts, unused, sheet.sha256)
+    return Moments(columns[MOMENT], columns[rotation], texts, unused, sheet.sha256, own.notes)
 
 
 def read_table(source: Tabular) -> GridTable:
@@ -152,7 +151,7 @@ def read_table(source: Tabular) -> GridTable:
 
     Columns of text are left out. Raises SpecError with every problem at once.
     """
-    sheet = read_sheet(source)
+    sheet = read_sheet(source, Geometry.model_fields)
     keys = [name for name in sheet.names if name in Geometry.model_fields]
     others = [
         name
@@ -202,17 +201,28 @@ def _doubts(geometry: Mapping[str, Array]) -> Iterator[str]:
             yield f"{key} is {values.max():.4g} at most: {guess}"
 
 
-def _one_of(sheet: Sheet, names: tuple[str, ...]) -> Iterator[Problem]:
+def _one_of(sheet: Sheet, names: tuple[str, ...], quantity: str) -> Iterator[Problem]:
     """The problem that there is none of these columns, or more than one."""
     found = [name for name in names if name in sheet.names]
     if len(found) > 1:
         yield sheet.problem(None, "header", f"one of {', '.join(names)}", " and ".join(found))
     elif not found:
-        yield sheet.missing(*names)
+        yield sheet.missing(*names, hint=_titled(sheet, quantity))
+
+
+def _titled(sheet: Sheet, *quantities: str) -> str:
+    """How to say which column it is: the first whose unit is one of these quantities."""
+    for quantity in quantities:
+        for title, unit in sheet.units.items():
+            if title and factor_of(quantity, unit) is not None:
+                names = (name for name, kind in {**CURVE, **HINGE}.items() if kind == quantity)
+                name = min(names, key=len)
+                return Message(Field("column"), f" '{name}={title}'?")
+    return ""
 
 
 def _unused(sheet: Sheet, known: Mapping[str, str]) -> tuple[str, ...]:
-    return tuple(name for name in sheet.names if name not in known)
+    return tuple(name for name in sheet.names if name and name not in known)
 
 
 def _is_numeric(sheet: Sheet, name: str) -> bool:
@@ -247,53 +257,3 @@ def _repeated(sheet: Sheet, geometry: Array) -> Iterator[Problem]:
             found = f"that of line {sheet.lines[first[values]]} again"
             yield sheet.problem(row, "geometry", "each geometry once", found)
         first.setdefault(values, row)
-
-
-def _signs(sheet: Sheet, name: str, travel: Array) -> Iterator[Problem]:
-    if travel.max() <= 0.0 or travel.min() < -0.5 * travel.max():
-        found = f"{travel.min():g} to {travel.max():g}"
-        yield sheet.problem(None, name, "travels that are positive towards inversion", found)
-
-
-def _scales(
-    sheet: Sheet,
-    columns: Mapping[str, Array],
-    known: Mapping[str, str],
-    geometry: Mapping[str, float] | None,
-) -> Iterator[Problem]:
-    """Columns whose largest value no dome has: most likely in another unit."""
-    ranges = {**PLAUSIBLE, **_of_dome(geometry or {})}
-    for name, values in columns.items():
-        kind = known[name]
-        largest = float(np.abs(values).max())
-        if kind not in ranges or largest == 0.0:
-            continue
-        low, high = ranges[kind]
-        if not low <= largest <= high:
-            hint = GUESSES[kind][largest > high]
-            needed = BEHIND.get(kind, ())
-            if missing := [key for key in needed if key not in (geometry or {})]:
-                hint = Message(hint, " if it is right, say how large the dome is:")
-                for key in missing:
-                    hint = Message(hint, " ", Field("geometry"), f" {key}=...")
-            expected = f"a largest value of {low:.3g} to {high:.3g}"
-            yield sheet.problem(None, name, expected, f"{largest:.4g}", hint)
-
-
-def _of_dome(geometry: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Largest values that a dome of this geometry may have.
-
-    Energy E t^2.8 h^1.75, from 68 mJ at h = 6.5 mm, t = 0.75 mm, E = 26 MPa: the finite-element
-    grid of configs/calibration.
-    """
-    height = geometry.get("dome_height_mm")
-    if height is None:
-        return {}
-    ranges = {"travel": (0.05 * height, 20.0 * height)}
-    if set(DOME) <= set(geometry):
-        _, thickness, modulus = dome = [geometry[key] for key in DOME]
-        energy = 68.0 * modulus / 26.0 * (thickness / 0.75) ** 2.8 * (height / 6.5) ** 1.75
-        pressure = snap_pressure(*dome)
-        usual = {"energy": energy, "force": energy / height, "pressure": pressure}
-        ranges |= {kind: (size / MARGIN, size * MARGIN) for kind, size in usual.items()}
-    return ranges

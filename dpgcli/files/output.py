@@ -1,5 +1,6 @@
 """Files appear whole or not at all, and never in the place of what somebody else wrote."""
 
+import errno
 import os
 import re
 import stat
@@ -15,6 +16,9 @@ from dpgcli.text import control_character
 
 OPENS_FOLDERS = hasattr(os, "O_DIRECTORY")  # not Windows
 ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark stands
+# by a file system that has no permissions, or cannot be told when to write: Windows drives in WSL,
+# FUSE, network drives; a full or broken disk says something else
+REFUSED = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EBADF)  # and PermissionError
 NO_TEXT = (".parquet", ".csv", ".yaml", ".yml", ".json", ".html", ".svg", ".png", ".pdf")
 
 
@@ -56,11 +60,13 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
     try:
         with _beside(target) as temporary:
             yield temporary
-            _sync(temporary, os.O_RDWR)
+            with _as_far_as_allowed():
+                _sync(temporary, os.O_RDWR)
             _check_replaceable(target, mark)
             temporary.replace(target)
-            if OPENS_FOLDERS:
-                _sync(target.parent, os.O_RDONLY)
+            with _as_far_as_allowed():
+                if OPENS_FOLDERS:
+                    _sync(target.parent, os.O_RDONLY)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -245,14 +251,26 @@ def _permit(handle: int | None, old: Path) -> None:
     if not old.exists():
         mask = os.umask(0)
         os.umask(mask)
-        os.fchmod(handle, 0o666 & ~mask)
+        with _as_far_as_allowed():
+            os.fchmod(handle, 0o666 & ~mask)
         return
     status = old.stat()
     for owner, group in ((status.st_uid, -1), (-1, status.st_gid)):
-        with suppress(PermissionError):
+        with _as_far_as_allowed():
             os.fchown(handle, owner, group)
     is_same_group = os.fstat(handle).st_gid == status.st_gid
-    os.fchmod(handle, stat.S_IMODE(status.st_mode) & (0o777 if is_same_group else 0o707))
+    with _as_far_as_allowed():
+        os.fchmod(handle, stat.S_IMODE(status.st_mode) & (0o777 if is_same_group else 0o707))
+
+
+@contextmanager
+def _as_far_as_allowed() -> Iterator[None]:
+    """Go on where the file system refuses what is only nice to have; losing data is an error."""
+    try:
+        yield
+    except OSError as error:
+        if not isinstance(error, PermissionError) and error.errno not in REFUSED:
+            raise
 
 
 def _sync(path: Path, flags: int) -> None:

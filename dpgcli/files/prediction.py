@@ -1,12 +1,19 @@
 """A prediction in files: the table of its states, and what differs between runs beside it."""
 
+import hashlib
+import json
 import platform
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from dpgcli.arrays import Columns
+from dpgcli.errors import UsageError
 from dpgcli.files.output import run_file
-from dpgcli.files.table_writer import write_run, write_states
+from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.scene_file import spelled
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
+from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 
 
@@ -28,6 +35,8 @@ def write_prediction(
             "finger_solves": summary.n_finger_solves,
             "worst_residual_N": summary.residual,
             "worst_numerical_error_mm": summary.tip_error,
+            "model_error": prediction.plan.scene.model_error.text,
+            **_uncertainty(prediction),
             "seconds": summary.seconds,
             "cpu_seconds": summary.cpu_seconds,
             "machine": platform.machine(),
@@ -36,3 +45,53 @@ def write_prediction(
             "command": list(command),
         },
     )
+
+
+def _uncertainty(prediction: Prediction) -> dict[str, Any]:
+    """What uncertainties cover, and what the largest one is made of, if they are asked for."""
+    worst, known = prediction.summary.breakdown, prediction.plan.scene.uncertainty
+    if worst is None or known is None:
+        return {}
+    said = {"covers": known.covers, "largest_tip_mm": worst.total, "pattern": worst.pattern}
+    return {"uncertainty": {**said, "tip_by_cause_mm": dict(worst.shares)}}
+
+
+def check_facts(table: Path) -> None:
+    """Raise UsageError where those of another table would go: t and t.parquet share one name."""
+    beside = run_file(table)
+    try:
+        other = json.loads(beside.read_bytes())["table"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
+        return
+    if other != table.name and (table.parent / str(other)).is_file():
+        raise UsageError(f"{beside} has the facts of {other}: give another name")
+
+
+def write_states(
+    prediction: Prediction, path: Path, spec_json: str, blocks: Iterable[Columns] | None = None
+) -> None:
+    """Write all states of a prediction, as they come; see `write_table`."""
+    columns = prediction.plan.columns
+    rows = prediction.blocks() if blocks is None else blocks
+    batches = (record_batch(columns, block) for block in rows)
+    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
+
+
+def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
+    request = plan.request
+    return {
+        "dpg.schema_version": str(SCHEMA_VERSION),
+        "dpg.spec": spec_json,
+        "dpg.spec_sha256": hashlib.sha256(spec_json.encode()).hexdigest(),
+        "dpg.patterns": json.dumps(request.patterns),
+        "dpg.formulation": request.formulation,
+        "dpg.method": plan.method,
+        "dpg.tolerance": repr(request.tolerance),
+        "dpg.law": plan.scene.finger.law.description,
+        "dpg.sources": json.dumps(
+            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
+        ),
+        "dpg.model_error": plan.scene.model_error.text,
+        **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
+        "dpg.versions": versions(),
+    }

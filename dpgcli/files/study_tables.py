@@ -11,15 +11,9 @@ from typing import Any
 import numpy as np
 
 from dpgcli.benchmark.bench import COLUMNS, Row, as_columns
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
-from dpgcli.files.table_writer import (
-    SCHEMA_VERSION,
-    record_batch,
-    schema,
-    versions,
-    write_run,
-    write_table,
-)
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
 from dpgcli.hard_cases.table import STRESS_COLUMNS
 from dpgcli.hard_cases.table import rows as stress_rows
 from dpgcli.hard_cases.verdicts import Outcome

@@ -8,10 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import pandas as pd
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
+from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
@@ -27,7 +29,7 @@ DAMAGED = (
 NO_ROOM = "it takes more memory than there is"
 
 
-def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
+def read_designs(path: Path) -> tuple[Columns, dict[str, str]]:
     """A table of designs and the unit of each of its columns, empty where there is none.
 
     Columns are text, whole numbers or numbers, whatever types they were stored as; what is
@@ -38,7 +40,7 @@ def read_designs(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     return designs_in(read_undamaged(path, partial(_readable, str(path))), str(path))
 
 
-def designs_in(table: Any, name: str) -> tuple[pd.DataFrame, dict[str, str]]:
+def designs_in(table: Any, name: str) -> tuple[Columns, dict[str, str]]:
     """The same of a pyarrow Table; `name` is what messages call it."""
     table = table.select(_readable(name, table.schema))
     units = {
@@ -54,7 +56,7 @@ def _all(described: Any) -> list[str]:
 
 
 def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any:
-    """A Parquet file as a pyarrow Table, its bytes held against its seal if `dpg` wrote it.
+    """A Parquet file as a pyarrow Table, its bytes checked by its seal if `dpg` wrote it.
 
     Only the columns that are `chosen` from its schema are read, their `TEXTS` as dictionaries: a
     text that repeats is there once. Raises UsageError for what is damaged, no Parquet file, or
@@ -153,11 +155,11 @@ def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
     return UsageError(f"{source}: column {name}: expected {_kind(name)}, found {kind}")
 
 
-def _plain(source: str, table: Any) -> pd.DataFrame:
+def _plain(source: str, table: Any) -> Columns:
     """The columns of three plain types."""
     names = table.column_names
     swept = names[names.index("design") + 1 : names.index("calibration")]
-    columns = {}
+    columns: Columns = {}
     for name in names:
         column = table.column(name)
         plain = READERS[_kind(name)](column)
@@ -165,52 +167,67 @@ def _plain(source: str, table: Any) -> pd.DataFrame:
             columns[name] = plain
         elif name in (*NEEDED, *swept):
             raise _wrong_type(source, name, column.type)
-    return pd.DataFrame(columns)
+    return columns
 
 
-def _text(column: Any) -> Any:
+def _text(column: Any) -> NDArray[Any] | None:
     """Text, empty where there is none; None for a column of anything else."""
     if _is_text(column.type):
         try:
-            return column.to_pandas().astype(object).fillna("")
+            return _looked_up(column)
         except UnicodeDecodeError:
             return None
     numbers = _numbers(column)
-    is_empty = column.null_count == len(column) or (numbers is not None and numbers.isna().all())
-    return pd.Series([""] * len(column), dtype=object) if is_empty else None
+    is_empty = column.null_count == len(column) or (numbers is not None and np.isnan(numbers).all())
+    return np.full(len(column), "", object) if is_empty else None
 
 
-def _whole(column: Any) -> Any:
+def _looked_up(column: Any) -> NDArray[Any]:
+    """The texts of a column, each of them once in memory."""
+    parts = [np.empty(0, object)]
+    is_dictionary = pa.types.is_dictionary(column.type)
+    for chunk in (column if is_dictionary else column.dictionary_encode()).chunks:
+        known = np.array([*(text or "" for text in chunk.dictionary.to_pylist()), ""], object)
+        codes = chunk.indices.fill_null(len(known) - 1) if chunk.null_count else chunk.indices
+        parts.append(known[np.from_dlpack(codes)])
+    return np.concatenate(parts)
+
+
+def _whole(column: Any) -> NDArray[Any] | None:
     """Whole numbers, none missing; None for a column of anything else."""
     numbers = _numbers(column)
-    if numbers is None or (numbers % 1 != 0).any() or (numbers.abs() >= 2**63).any():
-        return None
-    return numbers.astype("int64")
+    if numbers is None or numbers.dtype == np.int64:
+        return numbers
+    is_whole = (np.abs(numbers) < 2**63) & (np.trunc(numbers) == numbers)
+    return numbers.astype(np.int64) if is_whole.all() else None
 
 
-def _numbers(column: Any) -> Any:
+def _numbers(column: Any) -> NDArray[Any] | None:
     """Whole numbers if all are there and fit, else numbers; None for a column of neither."""
     if pa.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
     kind = column.type
     if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
-        kinds = ["float64"] if column.null_count else ["int64", "float64"]
+        kinds = [pa.float64()] if column.null_count else [pa.int64(), pa.float64()]
     elif pa.types.is_floating(kind) or pa.types.is_decimal(kind):
-        kinds = ["float64"]
+        kinds = [pa.float64()]
     else:
         return None
     for plain in kinds:
         with suppress(pa.ArrowException):  # more than 63 bits
-            return column.cast(plain, safe=plain == "int64").to_pandas()
+            return _unboxed(column if plain == kind else column.cast(plain, plain == pa.int64()))
     return None
 
 
+def _unboxed(column: Any) -> NDArray[Any]:
+    """A column of 64 bits as an array, NaN where there is nothing; `to_numpy` loads pandas."""
+    if column.null_count:
+        column = column.fill_null(np.nan)
+    empty = np.empty(0, np.int64 if pa.types.is_integer(column.type) else np.float64)
+    return np.concatenate([empty, *map(np.from_dlpack, column.chunks)])
+
+
 READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
-
-
-def read_run(path: Path) -> dict[str, Any] | None:
-    """The facts of a run; None if there is no such file. Raises UsageError for other content."""
-    return _facts(path) if path.is_file() or path.is_dir() else None
 
 
 def _facts(path: Path) -> dict[str, Any]:
@@ -250,4 +267,4 @@ def _is_measured(row: Any) -> bool:
     if not isinstance(row, dict):
         return False
     time = row.get("relative_time")
-    return isinstance(row.get("way"), str) and isinstance(time, int | float | None)
+    return isinstance(row.get("method"), str) and isinstance(time, int | float | None)

@@ -1,7 +1,4 @@
-"""States as Parquet: the only writer of tables.
-
-Arrays become columns without a copy; `pyarrow.array` is avoided, since it imports pandas.
-"""
+"""Record batches as Parquet: the only writer of tables."""
 
 import hashlib
 import json
@@ -13,60 +10,16 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from dpgcli import __version__
-from dpgcli.arrays import Columns
+from dpgcli.code import versions_of_libraries
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, whole_file
-from dpgcli.files.scene_file import spelled
 from dpgcli.files.seal import KEY, UNSEALED, seal
-from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Kind
 from dpgcli.states.costs import rows_at_once
-from dpgcli.states.plan import Plan
-from dpgcli.states.predict import Prediction
 
 SCHEMA_VERSION = 1
 DISTINCT = ("pattern", "reached_pattern")  # text that a dictionary would not shorten
-TYPES = {
-    Kind.PATTERN: pa.string(),
-    Kind.STATUS: pa.string(),
-    Kind.TEXT: pa.string(),
-    Kind.COUNT: pa.int64(),
-    Kind.NUMBER: pa.float64(),
-    Kind.FLAG: pa.bool_(),
-}
-
-
-def record_batch(columns: tuple[Column, ...], rows: Columns) -> Any:
-    """Rows as a pyarrow RecordBatch."""
-    arrays = [_array(column, rows[column.name]) for column in columns]
-    return pa.RecordBatch.from_arrays(arrays, schema=schema(columns))
-
-
-def schema(columns: tuple[Column, ...]) -> Any:
-    """Names, types, units and descriptions."""
-    return pa.schema(
-        [
-            pa.field(
-                column.name,
-                TYPES[column.kind],
-                metadata={"unit": column.unit, "description": column.description},
-            )
-            for column in columns
-        ]
-    )
-
-
-def write_states(
-    prediction: Prediction, path: Path, spec_json: str, blocks: Iterable[Columns] | None = None
-) -> None:
-    """Write all states of a prediction, as they come; see `write_table`."""
-    columns = prediction.plan.columns
-    rows = prediction.blocks() if blocks is None else blocks
-    batches = (record_batch(columns, block) for block in rows)
-    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
 
 
 def write_table(
@@ -124,7 +77,8 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 def versions() -> str:
     """Versions of what makes the numbers and the files, as JSON."""
-    return json.dumps({"dpg": __version__, "numpy": np.__version__, "pyarrow": pa.__version__})
+    libraries = versions_of_libraries()
+    return json.dumps({"dpg": __version__, **libraries, "pyarrow": pa.__version__})
 
 
 def write_run(path: Path, facts: dict[str, Any]) -> None:
@@ -132,24 +86,6 @@ def write_run(path: Path, facts: dict[str, Any]) -> None:
     text = json.dumps({"written_by": f"dpg {__version__}", **facts}, indent=2)
     with whole_file(path, Mark.FACTS) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
-    request = plan.request
-    return {
-        "dpg.schema_version": str(SCHEMA_VERSION),
-        "dpg.spec": spec_json,
-        "dpg.spec_sha256": hashlib.sha256(spec_json.encode()).hexdigest(),
-        "dpg.patterns": json.dumps(request.patterns),
-        "dpg.formulation": request.formulation,
-        "dpg.method": plan.method,
-        "dpg.tolerance": repr(request.tolerance),
-        "dpg.law": plan.scene.finger.law.description,
-        "dpg.sources": json.dumps(
-            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
-        ),
-        "dpg.versions": versions(),
-    }
 
 
 def _row_groups(batches: Iterable[Any], described: Any) -> Iterator[Any]:
@@ -200,36 +136,3 @@ def _hash(digest: Any, column: Any) -> None:
         digest.update(bits[start:stop].tobytes())
     else:
         digest.update(np.frombuffer(buffers[1], np.uint64)[start:stop].tobytes())
-
-
-def _array(column: Column, values: NDArray[Any]) -> Any:
-    if column.kind in (Kind.PATTERN, Kind.TEXT):
-        return _strings(values if values.dtype.kind == "S" else np.char.encode(values, "utf-8"))
-    if column.kind is Kind.STATUS:
-        return _statuses(values)
-    if column.kind is Kind.FLAG:
-        bits = np.packbits(values, bitorder="little")
-        return pa.Array.from_buffers(pa.bool_(), len(values), [None, pa.py_buffer(bits)])
-    dtype = np.int64 if column.kind is Kind.COUNT else np.float64
-    buffer = pa.py_buffer(np.ascontiguousarray(values, dtype))
-    return pa.Array.from_buffers(TYPES[column.kind], len(values), [None, buffer])
-
-
-def _strings(values: NDArray[Any]) -> Any:
-    """Byte strings, padded to one length in the array, as text."""
-    content = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), values.itemsize)
-    ends = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.itemsize)
-    if not content.all():  # the padding is zeros
-        lengths = np.char.str_len(values)
-        ends = np.concatenate(([0], np.cumsum(lengths))).astype(np.int32)
-        content = content[np.arange(content.shape[1]) < lengths[:, None]]
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(content)]
-    return pa.Array.from_buffers(pa.string(), len(values), buffers)
-
-
-def _statuses(codes: NDArray[Any]) -> Any:
-    found = np.unique(codes)
-    texts = np.array(
-        [list(Status)[code].text.encode() for code in found], "S"
-    )  # as long as need be
-    return _strings(texts[np.searchsorted(found, codes)])

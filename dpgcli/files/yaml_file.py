@@ -23,6 +23,7 @@ from dpgcli.text import MAX_SHOWN, KeyPath, dotted, shortened
 MAX_NODES = 10_000
 MAX_DEPTH = 20
 
+FREE = "x-"  # begins keys of the top level that are the user's, such as those for anchors
 _TAG = "tag:yaml.org,2002:"
 _MERGE = f"{_TAG}merge"
 _TYPED = frozenset(_TAG + name for name in ("null", "bool", "int", "float"))
@@ -100,7 +101,17 @@ def parse_document(file: str, text: str) -> Document:
     if not isinstance(data, dict):
         wrong = located(start, "document", "a mapping of keys to values", shown(data))
         raise SpecError(in_order([*walk.problems, wrong]))
-    return Document(file, data, {(): start, **walk.places}, in_order(walk.problems))
+    own = without_free_keys(data)
+    return Document(file, own, {(): start, **walk.places}, in_order(walk.problems))
+
+
+def without_free_keys(data: dict[str, Any]) -> dict[str, Any]:
+    """The top level without the keys that are the user's own, as in Compose files.
+
+    >>> without_free_keys({"x-soft": {"elastic_modulus_MPa": 1}, "finger": {}})
+    {'finger': {}}
+    """
+    return {key: value for key, value in data.items() if not key.startswith(FREE)}
 
 
 def parse_value(text: str, place: Location) -> Any:

@@ -23,6 +23,7 @@ N_GRADED = 4  # units
 LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
 FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
+WALL_RATIOS = (1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6)  # c_w k_b
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
 FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
     "straight": ((0.0, 0.0), "0"),
@@ -274,6 +275,18 @@ def _crossed(base: Finger) -> Iterator[Variant]:
         yield Variant(f"{side}, k_L = ∞", rigid(near))
 
 
+def _walls(base: Finger) -> Iterator[Variant]:
+    """Walls from nearly rigid to without stiffness, of all units and of the first alone."""
+    finger = repeated(base, N_GRADED)
+    softness = 1.0 / float(base.bistable_stiffness.min())
+    for ratio in WALL_RATIOS:
+        label = f"c_w k_b = {ratio:g}"
+        yield from _both(label, changed(finger, wall_compliance=ratio * softness))
+        first = np.zeros(N_GRADED)
+        first[0] = ratio * softness
+        yield from _both(f"{label}, first unit", changed(finger, wall_compliance=first))
+
+
 def _mirror(base: Finger) -> Iterator[Variant]:
     """One unit from impossible shapes, each next to a minimum of the equations."""
     unit = base.with_units([0])
@@ -294,5 +307,6 @@ FAMILIES = (
     Family("guess", _guess),  # searches that begin at 0.5 to 2 strokes
     Family("fold", _fold),  # α, k_θ and d at the loss of bistability, to 1e-12 of it
     Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
+    Family("walls", _walls),  # c_w k_b from 1e-9 to 1e6, of all units or one
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

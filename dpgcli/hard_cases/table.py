@@ -26,7 +26,7 @@ STRESS_COLUMNS = (
     _column("fails", "", "the verdict makes the command fail", Kind.FLAG),
     _column("status", "", "stable where certified, else why not", Kind.STATUS),
     _column("reached_pattern", "", "the pattern whose wells the units are in", Kind.PATTERN),
-    _column("residual_N", "N", "largest unbalanced force; moments over the lever H"),
+    _column("residual_N", "N", "largest unbalanced force; moments over the segment height H"),
     _column("residual_floor_N", "N", "what rounding the coordinates leaves of it: ε |H| |q|"),
     _column("condition", "", "of the Hessian scaled to a unit diagonal, 2-norm, at most 1/ε"),
     _column("numerical_error_mm", "mm", "stated numerical error of the tip position"),

@@ -142,6 +142,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
     arrays = finger.arrays()
     changes = {name: arrays[name] * scale for name in lengths}
     changes |= {name: arrays[name] / scale for name in ("bistable_stiffness", "linear_stiffness")}
+    changes["wall_compliance"] = arrays["wall_compliance"] * scale
     return finger.changed(**changes)
 
 

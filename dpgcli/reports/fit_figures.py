@@ -32,7 +32,8 @@ class FitFigure:
 
 def draw_fit(figure: FitFigure, path: Path) -> None:
     """Draw a fit to an SVG or PNG file, the same bytes each time."""
-    with figure_to(path, 8.0, 6.5) as drawn:
+    text = f"{figure.y_label} over {figure.x_label}: {len(figure.x)} points of data, the fitted law"
+    with figure_to(path, 8.0, 6.5, figure.title, text) as drawn:
         above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3, 1))
         above.plot(*figure.line, color="#440154", lw=1.5, label="fitted law", zorder=4)
         above.plot(figure.x, figure.observed, ".", color="#21918c", ms=5, label="data", zorder=3)

@@ -101,6 +101,13 @@ def bistable_summary(found: BistableFit, choice: BistableOptions) -> Iterator[st
     yield f"opening = {found.factor:.5g} travel, {how} (assumed, not fitted)"
     if wells:
         yield f"travel at the inverted well: {', '.join(wells)}"
+    if choice.opening.rule is Rule.STROKE and not math.isnan(well):
+        linearity, stroke = found.fit.values[1:]
+        yield (
+            f"stroke_mm {stroke:.4g} is the law's d, no place of rest: with a force linearity of "
+            f"{linearity:.3g} its inverted dome rests at {well / stroke:.3f} d = {well:.4g} mm; "
+            f"the {choice.opening.amount:g} mm asked for are where that of the data does"
+        )
 
 
 def hinge_summary(found: HingeFit) -> Iterator[str]:
@@ -121,7 +128,7 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
                 f"tips {what}: {np.nanmax(relative):.3g} % of the deflection at worst, "
                 f"{np.nanmean(relative):.3g} % in the mean"
             )
-    left_out = 100.0 * study.left_out()
+    left_out = 100.0 * study.left_out
     if np.isfinite(left_out).any():
         yield (
             f"each state from the others alone: {np.nanmax(left_out):.3g} % at worst, "

@@ -1,13 +1,8 @@
 """A design space on one page, as Markdown or as HTML that needs no other file."""
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-import pandas as pd
-from markdown_it import MarkdownIt
-
-from dpgcli.reports.maps import figures
 from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
 from dpgcli.sweeps.gate import RequirementVerdict
 from dpgcli.text import printable
@@ -32,22 +27,24 @@ svg { max-width: 100%; height: auto; }
 """
 
 
-def markdown(
-    designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None
-) -> str:
-    """A design space as GitHub-flavored Markdown; `facts` are those of the run that made it."""
-    return _markdown(sections(DesignSpace(designs, units), facts))
+def markdown(space: DesignSpace) -> str:
+    """A design space as GitHub-flavored Markdown."""
+    return _markdown(sections(space))
 
 
-def html(designs: pd.DataFrame, units: Mapping[str, str], facts: Mapping[str, Any] | None) -> str:
-    """The same as a page of HTML that needs no other file, with figures if Matplotlib is there."""
-    space = DesignSpace(designs, units)
-    body = _html(_markdown(sections(space, facts)))
+def html(space: DesignSpace) -> str:
+    """The same as a page of HTML that needs no other file, with figures if Matplotlib is there.
+
+    The best designs come first, then the figures.
+    """
+    from dpgcli.reports.maps import figures
+
+    parts = _html(_markdown(sections(space))).split("<h2>", 2)
+    body = "<h2>".join((*parts[:2], f"Figures</h2>\n{figures(space)}\n", *parts[2:]))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width">\n<title>Design space</title>\n'
-        f"<style>{STYLE}</style>\n</head>\n<body>\n{body}"
-        f"<h2>Figures</h2>\n{figures(space)}\n</body>\n</html>\n"
+        f"<style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
 
 
@@ -85,6 +82,8 @@ def _escaped(text: str) -> str:
 
 def _html(text: str) -> str:
     """Markdown as HTML; whatever looks like a tag in the text is none in the page."""
+    from markdown_it import MarkdownIt
+
     page: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     for tag, instead in TAGS.items():
         page = page.replace(tag, instead)

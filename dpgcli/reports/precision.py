@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.files.study_tables import json_value
-from dpgcli.reports.drawing import drawn_to, titled
+from dpgcli.reports.drawing import drawn_to
 
 Row = dict[str, Any]
 
 WIDTH, HEIGHT = 64, 18
 ZERO_DRAWN_AT = 0.1  # of the smallest error
+NEAR = (0.05, 0.03)  # shares of the axes within which numbers would overlap
 SLOWDOWN = 2.0  # of its recorded ratio: more than the noise of a shared machine
 MARKS = "abcdefghijklmnopqrstuvwxyz"
 COLORS = {"ladder": "#0072B2", "one finger": "#56B4E9", "peer": "#D55E00"}  # Okabe and Ito
@@ -49,10 +50,10 @@ def cheapest_way(rows: Sequence[Row], target: float) -> str:
         if row["group"] == "ladder" and row["max_tip_error_mm"] <= target and not row["n_missing"]
     ]
     if not meets:
-        return f"no way is below {target:g} mm"
+        return f"no method is below {target:g} mm"
     best = min(meets, key=lambda row: float(row["seconds_per_state"]))
     return (
-        f"cheapest below {target:g} mm: {best['way']}, "
+        f"cheapest below {target:g} mm: {best['method']}, "
         f"{best['seconds_per_state'] * 1e6:.3g} µs a state, error {best['max_tip_error_mm']:.1e} mm"
     )
 
@@ -81,7 +82,7 @@ def text_figure(rows: Sequence[Row]) -> list[str]:
     axis = f"1e{left:+03d}".ljust(WIDTH - 6) + f"1e{right:+03d}"
     lines.append(f"{'':>7}{axis}  s a state")
     lines += [
-        f"{'':>7}{mark}  {row['way']} ({LABELS[row['group']]})"
+        f"{'':>7}{mark}  {row['method']} ({LABELS[row['group']]})"
         for mark, row in zip(MARKS, shown, strict=False)
     ]
     if model is not None:
@@ -106,9 +107,14 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
     words = {
         "xlabel": "wall time per state (s)",
         "ylabel": "largest tip error (mm)",
-        "title": titled(name),
+        "xscale": "log",
+        "yscale": "log",
     }
-    with drawn_to(path, 9.0, 5.5, xscale="log", yscale="log", **words) as axes:
+    text = "\n".join(
+        f"{_named(number, row)}: {row['seconds_per_state']:.2e} s, {row['max_tip_error_mm']:.1e} mm"
+        for number, row in enumerate(points(rows), start=1)
+    )
+    with drawn_to(path, 9.0, 5.5, name, text, **words) as axes:
         _draw_points(axes, points(rows))
         model = model_error(rows)
         if model is not None:
@@ -120,6 +126,7 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
 def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
     """Numbered marks, named in the legend: names beside them would overlap."""
     least = _least_drawn(shown)
+    places = []
     for number, row in enumerate(shown, start=1):
         x, y = row["seconds_per_state"], max(row["max_tip_error_mm"], least)
         group = row["group"]
@@ -133,9 +140,36 @@ def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
             fmt=MARKERS[group],
             color=COLORS[group],
             ms=6,
-            label=f"{number}  {row['way']} ({LABELS[group]})",
+            label=_named(number, row),
         )
-        axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(5, 5), fontsize=8)
+        places.append((x, y))
+    axes.margins(0.08)
+    for (x, y), numbers in _near(axes, places):
+        text = ", ".join(map(str, numbers))
+        axes.annotate(text, (x, y), textcoords="offset points", xytext=(5, 5), fontsize=8)
+
+
+def _near(
+    axes: Any, places: Sequence[tuple[float, float]]
+) -> list[tuple[tuple[float, float], list[int]]]:
+    """Marks, numbered from 1, that share a number's room; the place is that of the first."""
+    axes.autoscale_view()
+    to_shares = axes.transScale + axes.transLimits
+    found: list[tuple[tuple[float, float], list[int]]] = []
+    for number, place in enumerate(places, start=1):
+        share = to_shares.transform(place)
+        for other, numbers in found:
+            dx, dy = abs(share - to_shares.transform(other))
+            if dx < NEAR[0] and dy < NEAR[1]:
+                numbers.append(number)
+                break
+        else:
+            found.append((place, [number]))
+    return found
+
+
+def _named(number: int, row: Row) -> str:
+    return f"{number}  {row['method']} ({LABELS[row['group']]})"
 
 
 def _which(row: Row) -> str:
@@ -146,7 +180,7 @@ def _which(row: Row) -> str:
 
 def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
     """Slowdowns against a record, by times relative to the NumPy kernel's, in words."""
-    key = ("group", "way", "n_units", "n_designs", "stiffness_ratio")
+    key = ("group", "method", "n_units", "n_designs", "stiffness_ratio")
     before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}
     slower, n_compared = [], 0
     for row in now:
@@ -156,6 +190,6 @@ def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
         n_compared += 1
         ratio = row["relative_time"] / old
         if ratio > SLOWDOWN:
-            slower.append(f"{ratio:.2f} times: {row['group']}, {row['way']}, {_which(row)}")
+            slower.append(f"{ratio:.2f} times: {row['group']}, {row['method']}, {_which(row)}")
     verdict = f"{n_compared} compared with the record, {len(slower)} slower by more than {SLOWDOWN}"
     return [verdict, *slower]

@@ -1,19 +1,21 @@
 """The summary of a design space: sections of text and tables, which `page` renders.
 
-Same table and facts, same sections: what differs between runs comes from the facts alone.
+Same table, same sections: what differs between runs is in run.json alone.
 """
 
 import re
-import shlex
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
+from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.design.scene import Origin
+from dpgcli.reports.base import bar_stiffness, base_lines
 from dpgcli.sweeps.gate import swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero
@@ -27,6 +29,8 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "aperture_max_mm": True,
     "aperture_min_mm": False,
 }
+SHORT_HEAD = ("metric", "best", "of design (best)", "worst", "of design (worst)")
+STIFFEST = "stiffness_max_N_per_mm"
 ERRORS = ("max_residual_N", "max_numerical_error_mm")
 STATUSES = ("stable", "partly_stable", "invalid", "excluded", "failed")
 BOUNDARY_STATUSES = ("stable", "partly_stable", "invalid")
@@ -36,7 +40,7 @@ WITHOUT_REASON = {
 }
 RELATIVE_EQUALITY = 1e-9  # relative
 MOST_ROWS = 30
-LONGEST_LIST = 500  # characters
+BARS_ALONE = 0.01  # relative: how close to k_L/n a stiffness shows nothing but the bars
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -56,46 +60,60 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """A table of designs with the units of its columns, and its numbers as text."""
+    """A table of designs with the units of its columns, its metadata, and its numbers as text."""
 
-    designs: pd.DataFrame
+    designs: Columns
     units: Mapping[str, str]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.designs["design"])
 
     @property
     def swept(self) -> list[str]:
         return swept_names(self.designs)
 
-    @property
-    def usable(self) -> pd.DataFrame:
-        """Designs that have a state, thus metrics."""
-        return self.designs[self.designs["n_stable"] > 0]
+    @cached_property
+    def usable(self) -> Indices:
+        """Rows of designs that have a state, thus metrics."""
+        return np.flatnonzero(self.designs["n_stable"] > 0)
 
-    def of_status(self, *statuses: str) -> pd.DataFrame:
-        return self.designs[self.designs["status"].isin(statuses)]
+    def of_status(self, *statuses: str) -> Indices:
+        """Rows of designs that are any of these."""
+        found = self.designs["status"]
+        return np.flatnonzero(np.any([found == status for status in statuses], axis=0))
+
+    def known(self, name: str, rows: Indices) -> Indices:
+        """Those of the rows in which a column has a value."""
+        return rows[~np.isnan(self.designs[name][rows])]
+
+    def n_values(self, name: str, rows: Indices) -> int:
+        """How many values a column has in some rows."""
+        return len(distinct(self.designs[name][self.known(name, rows)]))
 
     def shown(self, name: str, value: float) -> str:
         """A value of a column with its unit."""
         text = str(value) if isinstance(value, int | np.integer) else f"{value:.5g}"
         return f"{text} {self.units.get(name, '')}".rstrip()
 
-    def span(self, name: str, designs: pd.DataFrame) -> str:
-        """Smallest to largest value of a column."""
-        column: Any = designs[name]
-        low, high = column.min(), column.max()
+    def span(self, name: str, rows: Indices) -> str:
+        """Smallest to largest value of a column in some rows."""
+        values = self.designs[name][self.known(name, rows)]
+        low, high = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
         return self.shown(name, low) if low == high else f"{low:.5g} … {self.shown(name, high)}"
 
-    def number(self, row: Any) -> str:
+    def number(self, row: int) -> str:
         """The number of the design in a row."""
-        return str(self.designs.at[row, "design"])
+        return str(self.designs["design"][row])
 
-    def point(self, row: Any) -> list[str]:
+    def point(self, row: int) -> list[str]:
         """The swept values of the design in a row."""
         return [self.shown(name, self.designs[name][row]) for name in self.swept]
 
     def label(self, name: str) -> str:
         """A column in words, for an axis.
 
-        >>> DesignSpace(pd.DataFrame(), {"dome_height_mm": "mm"}).label("dome_height_mm")
+        >>> DesignSpace({}, {"dome_height_mm": "mm"}).label("dome_height_mm")
         'dome height (mm)'
         """
         unit = self.units.get(name, "")
@@ -104,67 +122,127 @@ class DesignSpace:
         return f"{words} ({unit})" if unit else words
 
 
-def sections(space: DesignSpace, facts: Mapping[str, Any] | None) -> list[Section]:
-    """All sections about a space; `facts` are those of the run that made it."""
-    counted = Section("Design space", [_extent(space)])
-    if not len(space.designs):
-        return [counted, *_times(facts)]
+def sections(space: DesignSpace) -> list[Section]:
+    """All sections about a space, the best designs first."""
+    counted = Section("Design space", [_extent(space), *base_lines(space.metadata)])
+    if not len(space):
+        return [counted]
     return [
         counted,
-        Section("Designs by status and calibration", [_counts(space)]),
         Section("Best and worst designs", _extremes(space)),
+        Section("Designs by status and calibration", [_counts(space)]),
         Section("What failed and why", _failures(space)),
         Section("Where bistability ends", _bistability(space)),
         Section("Largest numerical error", _errors(space)),
-        *_times(facts),
     ]
 
 
 def _extent(space: DesignSpace) -> str:
-    n_designs = len(space.designs)
-    if not n_designs:
+    if not len(space):
         return "0 designs."
+    rows = np.arange(len(space))
     spans = [
-        f"{name} ({space.span(name, space.designs)}, {space.designs[name].nunique():,} values)"
+        f"{name} ({space.span(name, rows)}, {space.n_values(name, rows):,} values)"
         for name in space.swept
     ]
-    return f"{n_designs:,} designs over {', '.join(spans)}."
+    return f"{len(space):,} designs over {', '.join(spans)}."
 
 
 def _counts(space: DesignSpace) -> Table:
-    counts = pd.crosstab(space.designs["status"], space.designs["calibration"])
-    kinds = [*(o.value for o in Origin if o.value in counts), *(k for k in counts if k == "")]
+    columns = (space.designs[name].tolist() for name in ("status", "calibration"))
+    counts = Counter(zip(*columns, strict=True))
+    found = {kind for _, kind in counts}
+    kinds = [kind for kind in (*(origin.value for origin in Origin), "") if kind in found]
     head = ["status", "designs", *(kind or "not solved" for kind in kinds)]
+    totals = {s: sum(n for (of, _), n in counts.items() if of == s) for s in STATUSES}
     rows = [
-        [status, *(f"{n:,}" for n in (counts.loc[status].sum(), *counts.loc[status, kinds]))]
-        for status in STATUSES
-        if status in counts.index
+        [status, *(f"{n:,}" for n in (total, *(counts[status, kind] for kind in kinds)))]
+        for status, total in totals.items()
+        if total
     ]
     return Table(head, rows)
 
 
-def _extremes(space: DesignSpace) -> list[str | Table]:
+class Extreme(NamedTuple):
+    """The best or the worst of a metric: which of both, the row, and how many more are alike."""
+
+    metric: str
+    word: str
+    row: int
+    n_more: int
+
+
+def extremes(space: DesignSpace) -> list[Extreme]:
+    """Best and worst designs by metric."""
     metrics = {name: order for name, order in METRICS.items() if name in space.designs}
-    rows = [row for name, order in metrics.items() for row in _extreme_rows(space, name, order)]
-    small = [name for name, is_largest_best in metrics.items() if not is_largest_best]
-    text = "The largest value counts as best"
-    text += f", of {' and '.join(small)} the one nearest zero." if small else "."
-    return [text, Table(["metric", "", "value", "design", *space.swept], rows)]
+    return [found for name, order in metrics.items() for found in _extremes_of(space, name, order)]
 
 
-def _extreme_rows(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[list[str]]:
-    values = space.usable[name].dropna()
-    if values.empty:
+def _extremes_of(space: DesignSpace, name: str, is_largest_best: bool) -> Iterator[Extreme]:
+    rows = space.known(name, space.usable)
+    if name == STIFFEST:
+        rows = rows[~bars_alone(space, rows)]
+    if not len(rows):
         return
-    merit = values if is_largest_best else -values.abs()
+    values = space.designs[name][rows]
+    merit = values if is_largest_best else -np.abs(values)
     ends = {"best": merit.max(), "worst": merit.min()}
     if is_alike(merit):
         ends = {"all alike": merit.max()}
     for word, end in ends.items():
-        alike = values.index[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
-        others = f" and {len(alike) - 1:,} more" if len(alike) > 1 else ""
-        value = space.shown(name, values[alike[0]])
-        yield [name, word, value, space.number(alike[0]) + others, *space.point(alike[0])]
+        first, *others = rows[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
+        yield Extreme(name, word, int(first), len(others))
+
+
+def bars_alone(space: DesignSpace, rows: Indices) -> Flags:
+    """Rows whose largest stiffness is that of the straight finger's bars in series, k_L/n.
+
+    It says what was assumed of the bars, and nothing of the design.
+    """
+    bars = space.designs.get(LINEAR_STIFFNESS)
+    stiffness = bar_stiffness(space.metadata) if bars is None else bars[rows]
+    in_series = stiffness / space.designs["n_units"][rows]
+    return np.isclose(space.designs[STIFFEST][rows], in_series, rtol=BARS_ALONE, atol=0)
+
+
+def in_short(space: DesignSpace) -> tuple[str, Table]:
+    """How many designs there are of each status, and the best and the worst of each metric."""
+    counts = {status: len(space.of_status(status)) for status in STATUSES}
+    listed = ", ".join(f"{n:,} {status}" for status, n in counts.items() if n)
+    rows: dict[str, list[str]] = {}
+    for name, _, row, n_more in extremes(space):
+        more = f" and {n_more:,} more" if n_more else ""
+        cells = (space.shown(name, space.designs[name][row]), space.number(row) + more)
+        rows.setdefault(name, [name]).extend(cells)
+    filled = [[*cells, "all alike", ""][: len(SHORT_HEAD)] for cells in rows.values()]
+    return f"{len(space):,} designs: {listed or 'none'}", Table(SHORT_HEAD, filled)
+
+
+def _extremes(space: DesignSpace) -> list[str | Table]:
+    rows = []
+    for name, word, row, n_more in extremes(space):
+        more = f" and {n_more:,} more" if n_more else ""
+        value = space.shown(name, space.designs[name][row])
+        rows.append([name, word, value, space.number(row) + more, *space.point(row)])
+    small = [name for name, largest in METRICS.items() if not largest and name in space.designs]
+    text = "The largest value counts as best"
+    text += f", of {' and '.join(small)} the one nearest zero." if small else "."
+    return [
+        text,
+        *_left_out(space),
+        Table(["metric", "", "value", "design", *space.swept], rows),
+    ]
+
+
+def _left_out(space: DesignSpace) -> Iterator[str]:
+    """What is not ranked, since it only shows an assumption."""
+    rows = space.known(STIFFEST, space.usable) if STIFFEST in space.designs else np.zeros(0, int)
+    if len(rows) and (n_alone := int(bars_alone(space, rows).sum())):
+        which = "any design" if n_alone == len(rows) else f"{n_alone:,} designs"
+        yield (
+            f"{STIFFEST} is not ranked for {which}: it is that of the straight finger's bars, "
+            "k_L/n, whose stiffness is assumed unless it was measured."
+        )
 
 
 def is_alike(values: Any) -> bool:
@@ -175,13 +253,16 @@ def is_alike(values: Any) -> bool:
 def _failures(space: DesignSpace) -> list[str | Table]:
     """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
     others = space.of_status(*STATUSES[1:])
-    if others.empty:
+    if not len(others):
         return ["Every design is stable."]
-    masked = others["reason"].map(lambda reason: NUMBER.sub("#", reason))
-    groups = [(len(g), g.index[0]) for _, g in others.groupby([others["status"], masked])]
+    statuses, reasons = (space.designs[name] for name in ("status", "reason"))
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row in others.tolist():
+        groups.setdefault((statuses[row], NUMBER.sub("#", reasons[row])), []).append(row)
     rows = []
-    for count, row in sorted(groups, key=lambda group: (-group[0], group[1])):
-        status, reason = others.loc[row, ["status", "reason"]]
+    for found in sorted(groups.values(), key=lambda found: (-len(found), found[0])):
+        count, row = len(found), found[0]
+        status, reason = statuses[row], reasons[row]
         why = reason or WITHOUT_REASON.get(status, "")
         rows.append([status, f"{count:,}", why, space.number(row), *space.point(row)])
     head = ["status", "designs", "reason, as of the example", "example", *space.swept]
@@ -190,30 +271,31 @@ def _failures(space: DesignSpace) -> list[str | Table]:
 
 def _bistability(space: DesignSpace) -> list[str | Table]:
     judged = space.of_status(*BOUNDARY_STATUSES)
-    found = [status for status in BOUNDARY_STATUSES if (judged["status"] == status).any()]
+    by_status = {status: space.of_status(status) for status in BOUNDARY_STATUSES}
+    found = [status for status, rows in by_status.items() if len(rows)]
     if found == ["stable"]:
         return ["Nowhere in this space: every design in it is stable."]
     if "stable" not in found:
         return ["No design in this space is stable."]
     rows = [
-        [name, *(space.span(name, judged[judged["status"] == status]) for status in found)]
-        for name in space.swept
+        [name, *(space.span(name, by_status[status]) for status in found)] for name in space.swept
     ]
     return [Table(["range of", *found], rows), *_boundary(space, judged)]
 
 
-def _boundary(space: DesignSpace, judged: pd.DataFrame) -> list[str | Table]:
+def _boundary(space: DesignSpace, judged: Indices) -> list[str | Table]:
     """Runs of stable designs along one swept value, for each value of the other."""
     if not 1 <= len(space.swept) <= 2:
         return []
-    *fixed, along = sorted(space.swept, key=lambda name: judged[name].nunique())
-    if fixed and judged[fixed[0]].nunique() > MOST_ROWS:
+    *fixed, along = sorted(space.swept, key=lambda name: space.n_values(name, judged))
+    if fixed and space.n_values(fixed[0], judged) > MOST_ROWS:
         return []
+    values = space.designs[along]
     rows = []
-    for line in (g for _, g in judged.groupby(fixed)) if fixed else [judged]:
-        line = line.sort_values(along, kind="stable")
+    for line in _lines(space, fixed[0], judged) if fixed else [judged]:
+        line = line[np.argsort(values[line], kind="stable")]
         at = [space.span(name, line) for name in fixed]
-        runs = list(_stable_runs(line[along].to_numpy(), (line["status"] == "stable").to_numpy()))
+        runs = list(_stable_runs(values[line], space.designs["status"][line] == "stable"))
         rows += [
             [*at, *("–" if value is None else space.shown(along, value) for value in run)]
             for run in runs or [(None, None, None, None)]
@@ -221,6 +303,13 @@ def _boundary(space: DesignSpace, judged: pd.DataFrame) -> list[str | Table]:
     head = [*fixed, "not stable up to", "stable from", "stable to", "not stable from"]
     text = f"Along {along}; – where the space ends first or nothing is stable."
     return [text, *shortened(Table(head, rows[:MOST_ROWS]), len(rows))]
+
+
+def _lines(space: DesignSpace, name: str, rows: Indices) -> Iterator[Indices]:
+    """Those of the rows that share a value of a column, value by value."""
+    rows = space.known(name, rows)
+    values = space.designs[name][rows]
+    return (rows[values == value] for value in distinct(values))
 
 
 def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None, ...]]:
@@ -234,27 +323,13 @@ def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None
 def _errors(space: DesignSpace) -> list[str | Table]:
     rows = []
     for name in ERRORS:
-        values: Any = space.usable[name].dropna() if name in space.designs else ()
-        if len(values):
-            row = values.idxmax()
+        known = space.known(name, space.usable) if name in space.designs else ()
+        if len(known):
+            values = space.designs[name]
+            row = known[np.argmax(values[known])]
             value = space.shown(name, values[row])
             rows.append([name, value, space.number(row), *space.point(row)])
     return [Table(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]
-
-
-def _times(facts: Mapping[str, Any] | None) -> list[Section]:
-    rows = [[key.replace("_", " "), _fact(key, value)] for key, value in (facts or {}).items()]
-    return [Section("The run", [Table(["", "value"], rows)])] if rows else []
-
-
-def _fact(key: str, value: Any) -> str:
-    if isinstance(value, list):
-        text = shlex.join(map(str, value)) or "none"
-        return text if len(text) < LONGEST_LIST else f"{text[:LONGEST_LIST]} …"
-    if isinstance(value, dict):
-        return ", ".join(f"{name}: {_fact(name, part)}" for name, part in value.items())
-    unit = " s" if key.endswith("seconds") else "/s" if key.endswith("_per_second") else ""
-    return (f"{value:.5g}" if isinstance(value, float) else str(value)) + unit
 
 
 def shortened(table: Table, n_rows: int) -> list[str | Table]:

@@ -1,4 +1,4 @@
-"""Accuracy levels: ways to the same states, from cheap to exact, each with an error bound.
+"""Accuracy levels of the same states, from cheap to exact, each with an error bound.
 
 The bounds are known before any pattern is solved, and hold for all of them. Each is a sum over
 units of how far the unit may turn, times the length of the finger (our derivation):
@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Indices, distinct
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
@@ -120,7 +120,7 @@ def exactnesses(
     if needs_bars:
         bounds[0] = np.inf
     chosen = cheapest(bounds, target_error)
-    for index in np.unique(chosen):
+    for index in distinct(chosen):
         places = np.flatnonzero(chosen == index)
         some = units if len(places) == len(chosen) else units.take_lanes(places)
         yield places, Exactness(some, ACCURACY_LEVELS[index].tolerance, ACCURACY_LEVELS[index])

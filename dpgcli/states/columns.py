@@ -25,6 +25,7 @@ class Group(StrEnum):
     OPENINGS = "openings"
     GRIPPER = "gripper"
     UNCERTAINTY = "uncertainty"
+    SHARES = "uncertainty_shares"
     NODES = "nodes"
 
 

@@ -24,6 +24,8 @@ def omissions(
     finger = units.finger
     n = finger.n_units
     left_out = [Omission("loads, pressure and contact", "the spec has none")]
+    if not finger.has_walls:
+        left_out.append(Omission(f"walls and {n} unknowns of them", "the walls are rigid"))
     if finger.is_rigid:
         why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
         left_out.append(

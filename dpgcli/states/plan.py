@@ -27,7 +27,7 @@ from dpgcli.states.omissions import Omission, omissions
 from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
-from dpgcli.states.quantities import ALWAYS, Quantity, declared
+from dpgcli.states.quantities import ALWAYS, Quantity, declared, shares
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
@@ -114,8 +114,21 @@ class Plan:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities to compute: those of its columns, and those that judge every state."""
-        return (*ALWAYS, *(column for column in self.columns if column not in ALWAYS))
+        """The quantities to compute: those of its columns, those that judge every state, shares."""
+        wanted = dict.fromkeys((*ALWAYS, *self.columns, *self.shares.values()))
+        return tuple(wanted)
+
+    @property
+    def covers(self) -> str:
+        """What the uncertainties that are asked for count in, if they are."""
+        known = self.scene.uncertainty
+        return known.covers if known is not None and Group.UNCERTAINTY in self.groups else ""
+
+    @property
+    def shares(self) -> dict[str, Quantity]:
+        """By cause, if uncertainties are asked for."""
+        known = self.scene.uncertainty
+        return shares(known) if known is not None and Group.UNCERTAINTY in self.groups else {}
 
     @property
     def rows(self) -> RowRequest:
@@ -148,8 +161,8 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         raise UsageError(too_many(n, "the finger has"))
     potential = FORMULATIONS[request.formulation](units.finger)
     terms = potential.kinds
-    is_fitted = scene.uncertainty is not None and request.formulation == "chain"
-    available = declared(n, terms, scene.gripper is not None, is_fitted=is_fitted)
+    uncertainty = scene.uncertainty if request.formulation == "chain" else None
+    available = declared(n, terms, scene.gripper is not None, uncertainty=uncertainty)
     has_bars = not exactness.drops_bars
     columns, left_out = chosen_columns(available, request.columns, n_states, has_bars=has_bars)
     groups = {column.group for column in columns}
@@ -196,12 +209,14 @@ def _check(scene: Scene, request: Request) -> None:
             " lattice needs a finite finger.linear_stiffness_N_per_mm: "
             "node coordinates cannot drop rigid bars; use the chain",
         )
-    if Group.UNCERTAINTY in request.columns:
+    if {Group.UNCERTAINTY, Group.SHARES} & {*request.columns}:
         _check_uncertainty(scene, request)
     check_exactness(request.tolerance, request.target_error)
     if request.target_error is not None and request.formulation != "chain":
         raise UsageError(
-            Field("target_error"), " chooses among ways of the chain: drop ", Field("formulation")
+            Field("target_error"),
+            " chooses among accuracy levels of the chain: drop ",
+            Field("formulation"),
         )
 
 
@@ -210,8 +225,8 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
         cancels = " (those of the curve's own k_b and d cancel)" if scene.finger.law.curve else ""
         raise UsageError(
             Field("uncertainty"),
-            f": no value of the spec has a standard error{cancels}; "
-            "calibrate it by a file of dpg fit",
+            f": no value of the spec has a standard error{cancels}; calibrate it by a file of "
+            "dpg fit, or say uncertainty (tolerances by key) or model_error in the spec",
         )
     if request.formulation != "chain":
         raise UsageError(
@@ -239,6 +254,8 @@ def _split(
     n_units = units.finger.n_units
     if not (is_whole and fits and 2**n_units >= FEWEST_PAIRED_STATES):
         return None
+    if units.finger.has_walls and not units.finger.wall_compliance.all():
+        return None  # a half may have no walls, and other coordinates then
     n_inner = n_units // 2
     cut = n_inner * potential.coordinates.size // n_units
     shared = slice(cut if units.finger.is_rigid else cut - 1, cut)  # a strut

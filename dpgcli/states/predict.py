@@ -1,12 +1,12 @@
 """Carry out a plan: every state asked for, certified, as blocks of columns."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter, process_time
 
 import numpy as np
 
-from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.arrays import Codes, Columns, Flags, keep_freed_memory
 from dpgcli.design.scene import Scene
 from dpgcli.states.certify import Status
 from dpgcli.states.pairs.compose import paired_states
@@ -17,11 +17,21 @@ from dpgcli.states.rows import as_text, solved_rows
 from dpgcli.states.settle import lanes_at_once
 
 
+@dataclass(frozen=True)
+class Breakdown:
+    """The largest standard uncertainty of a tip's place (mm), the state's pattern, its causes."""
+
+    total: float
+    pattern: str
+    shares: Mapping[str, float]
+
+
 @dataclass
 class Summary:
     """Summary of the states solved so far; errors and residuals are the largest of stable states.
 
-    Residual in N, tip error in mm, times in seconds spent on the states alone.
+    Residual in N, tip error in mm, times in seconds spent on the states alone. `breakdown` is of
+    the least certain state, by the columns of `shares`, if there are any.
     """
 
     n_finger_solves: int = 0
@@ -30,6 +40,8 @@ class Summary:
     tip_error: float = 0.0
     seconds: float = 0.0
     cpu_seconds: float = 0.0
+    shares: Mapping[str, str] = field(default_factory=dict)
+    breakdown: Breakdown | None = None
 
     @property
     def n_states(self) -> int:
@@ -43,6 +55,18 @@ class Summary:
         if stable.any():
             self.residual = max(self.residual, float(block["residual_N"][stable].max()))
             self.tip_error = max(self.tip_error, float(block["numerical_error_mm"][stable].max()))
+            self._break_down(block, stable)
+
+    def _break_down(self, block: Columns, stable: Flags) -> None:
+        if not self.shares:
+            return
+        parts = np.stack([block[column] for column in self.shares.values()])
+        totals = np.where(stable, np.sqrt((parts**2).sum(axis=0)), -1.0)
+        worst = int(totals.argmax())
+        if self.breakdown is None or totals[worst] > self.breakdown.total:
+            own = dict(zip(self.shares, parts[:, worst].tolist(), strict=True))
+            pattern = block["pattern"][worst].decode()
+            self.breakdown = Breakdown(float(totals[worst]), pattern, own)
 
 
 @dataclass(frozen=True)
@@ -88,7 +112,9 @@ def predict(scene: Scene, request: Request | None = None) -> Prediction:
     >>> rows["pattern"][5], rows["status"][5], rows["tip_x_mm"][5].round(8)
     (np.str_('101'), np.str_('stable'), np.float64(38.35981703))
     """
-    return Prediction(explain(scene, request), Summary())
+    plan = explain(scene, request)
+    shares = {cause: column.name for cause, column in plan.shares.items()}
+    return Prediction(plan, Summary(shares=shares))
 
 
 def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:

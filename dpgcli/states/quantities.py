@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Columns
+from dpgcli.design.dimensions import without_unit
+from dpgcli.design.scene import Uncertainty
 from dpgcli.errors import Field, UsageError
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
@@ -50,7 +52,11 @@ def rows(solved: SolvedStates, quantities: Sequence[Quantity]) -> Columns:
 
 
 def declared(
-    n_units: int, energy_kinds: Sequence[str], is_gripper: bool, *, is_fitted: bool = False
+    n_units: int,
+    energy_kinds: Sequence[str],
+    is_gripper: bool,
+    *,
+    uncertainty: Uncertainty | None = None,
 ) -> tuple[Quantity, ...]:
     """All quantities that a scene can have, in the order of every table.
 
@@ -65,7 +71,7 @@ def declared(
         *(_energy(kind) for kind in _ENERGY_KINDS if kind in energy_kinds),
         *(_opening(unit) for unit in range(n_units)),
         *(_GRIPPER if is_gripper else ()),
-        *(_UNCERTAINTY if is_fitted else ()),
+        *(() if uncertainty is None else _uncertain(uncertainty, is_gripper)),
         *(_nodes(n_units, "upper_", "lower_") if is_gripper else _nodes(n_units, "")),
     )
 
@@ -131,7 +137,7 @@ _NUMERICS = (
     Quantity(
         "residual_N",
         "N",
-        "largest unbalanced force; moments over the lever H",
+        "largest unbalanced force; moments over the segment height H",
         of=lambda s: s.residual,
         is_always=True,
     ),
@@ -179,7 +185,12 @@ _STIFFNESS = (
     _compliance(4, "y_angle_rad_per_N", "rad/N", "tip angle by a force along y"),
     _compliance(5, "angle_rad_per_N_mm", "rad/(N mm)", "tip angle by a moment at the tip"),
 )
-_ENERGY_KINDS = {"bistable": "bistable springs", "hinge": "hinges", "bar": "bars"}
+_ENERGY_KINDS = {
+    "bistable": "bistable springs",
+    "wall": "walls",
+    "hinge": "hinges",
+    "bar": "bars",
+}
 
 
 def _energy(kind: str) -> Quantity:
@@ -247,21 +258,55 @@ _GRIPPER = (
 )
 
 
-def _uncertainty(place: int, name: str, unit: str, what: str) -> Quantity:
-    return Quantity(
-        f"tip_{name}",
-        unit,
-        f"standard uncertainty of the tip's {what} by the errors of fitted values, to first order",
+def _uncertain(known: Uncertainty, is_gripper: bool) -> tuple[Quantity, ...]:
+    """Standard uncertainties, what they cover, and each cause's share."""
+    covers = Quantity(
+        "uncertainty_covers",
+        "",
+        "what the standard uncertainties count in",
         Group.UNCERTAINTY,
-        of=lambda s: s.uncertainty[place],
+        Kind.TEXT,
+        of=lambda s: np.full(s.status.shape, known.covers),
+        is_always=True,
     )
+    return (*_UNCERTAINTY, *((_APERTURE,) if is_gripper else ()), covers, *shares(known).values())
+
+
+def _uncertainty(name: str, unit: str, what: str, of: Of) -> Quantity:
+    description = (
+        f"standard uncertainty of the {what}, to first order; uncertainty_covers says of what"
+    )
+    return Quantity(name, unit, description, Group.UNCERTAINTY, of=of)
 
 
 _UNCERTAINTY = (
-    _uncertainty(0, "x_uncertainty_mm", "mm", "x"),
-    _uncertainty(1, "y_uncertainty_mm", "mm", "y"),
-    _uncertainty(2, "angle_uncertainty_rad", "rad", "angle"),
+    _uncertainty("tip_x_uncertainty_mm", "mm", "tip's x", lambda s: s.spread.pose[0]),
+    _uncertainty("tip_y_uncertainty_mm", "mm", "tip's y", lambda s: s.spread.pose[1]),
+    _uncertainty("tip_angle_uncertainty_rad", "rad", "tip's angle", lambda s: s.spread.pose[2]),
 )
+_APERTURE = _uncertainty("aperture_uncertainty_mm", "mm", "aperture", lambda s: s.spread.aperture)
+
+
+def shares(known: Uncertainty) -> dict[str, Quantity]:
+    """The uncertainty of the tip's place by each cause alone; the squares of all add up.
+
+    >>> from dpgcli.design.scene import Step
+    >>> [q.name for q in shares(Uncertainty((Step("stroke_mm", {}),), np.eye(1))).values()]
+    ['tip_uncertainty_by_stroke_mm']
+    """
+    return {cause: _share(cause) for cause in known.causes}
+
+
+def _share(cause: str) -> Quantity:
+    return Quantity(
+        f"tip_uncertainty_by_{without_unit(cause)}_mm",
+        "mm",
+        f"standard uncertainty of the tip's place by {cause} alone",
+        Group.SHARES,
+        of=lambda s: s.spread.shares[cause],
+    )
+
+
 _FINGERS = {"": "", "upper_": "the upper finger's ", "lower_": "the lower finger's "}
 _LAYERS = {"B": "limiting-layer node", "T": "dome-axis node"}
 

@@ -12,14 +12,13 @@ from typing import cast
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.equilibrium.banded import backward, forward
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 
-COMPLEX_STEP = 1e-100
 Direction = Mapping[str, Array]
 
 

@@ -6,13 +6,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Flags, total
+from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
-from dpgcli.states.sensitivities import sensitivities
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
+from dpgcli.states.uncertainty import Spread, spread
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class SolvedStates:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A finger's gripper, if any, layer thickness (mm) and uncertainty of fitted values.
+    """A finger's gripper, if any, layer thickness (mm) and uncertainty.
 
     Numbers, or arrays by state.
     """
@@ -133,17 +133,11 @@ class SolvedFingers(SolvedStates):
         return self.tip.stiffness
 
     @cached_property
-    def uncertainty(self) -> Array:
-        """Standard uncertainty of the pose: σ² = s C sᵀ, C the covariance of fitted values.
-
-        s are the tip's derivatives by these; mm and rad.
-        """
-        known = self.around.uncertainty
-        if known is None:
-            raise ValueError("no value of the fingers was fitted")
-        slopes = sensitivities(self.settled, known.directions).pose
-        terms = [
-            covariance * slopes[:, k] * slopes[:, m]
-            for (k, m), covariance in np.ndenumerate(known.covariance)
-        ]
-        return np.sqrt(np.maximum(total(np.stack(terms)), 0.0))
+    def spread(self) -> Spread:
+        """Standard uncertainties of pose and aperture, by what the scene says may be off."""
+        around = self.around
+        if around.uncertainty is None:
+            raise ValueError("no value of the fingers may be off")
+        return spread(
+            self.settled, self.pose, around.uncertainty, around.gripper, around.layer_thickness
+        )

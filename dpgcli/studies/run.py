@@ -94,7 +94,7 @@ def run_facts(
 ) -> dict[str, Any]:
     """The content of run.json; shares are of the wall time of all workers.
 
-    By their fingerprint a report knows whether they are those of the tables beside them.
+    The fingerprint says which tables they are about.
     """
     core, writing, pool = _shares(progress)
     return {

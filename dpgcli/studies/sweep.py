@@ -11,14 +11,14 @@ from time import perf_counter
 
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
-from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint
-from dpgcli.files.scene_file import reason_against, scene_of, spelled
+from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
+from dpgcli.files.scene_file import scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
-from dpgcli.studies.work import ChunkTask
+from dpgcli.studies.work import ChunkTask, reason_against
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
@@ -92,13 +92,13 @@ class Study:
         said = {
             "dpg.sweep": self.sweep.canonical_json(),
             **self._exactness,
-            "dpg.designs": str(self.sweep.space.size),
+            N_DESIGNS: str(self.sweep.space.size),
             "dpg.schema_version": str(SCHEMA_VERSION),
             "dpg.law": scene_of(self.sweep.base).finger.law.description,
             "dpg.versions": versions(),
             "dpg.code": HERE.code,
         }
-        return {**said, FINGERPRINT: fingerprint(said)}
+        return {**said, BASE: self.sweep.base_path.name, FINGERPRINT: fingerprint(said)}
 
     @property
     def _exactness(self) -> dict[str, str]:
@@ -246,10 +246,11 @@ class Study:
         self.drop_unfinished()
 
 
-def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
+def assemble(parts_of: Sequence[PartStore], folder: Path) -> str:
     """Join the parts of one sweep from one or more stores into its two tables, whole or not.
 
-    Raises UsageError for damage, parts of different sweeps, gaps and overlaps.
+    Gives the fingerprint of the sweep. Raises UsageError for damage, parts of different sweeps,
+    gaps and overlaps.
     """
     metadata = parts_of[0].said()
     for store in parts_of:
@@ -264,7 +265,7 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     parts = sorted(part for store in parts_of for part in store.parts())
     covered = 0
     for part in [*parts, None]:
-        start = part.start if part else int(metadata["dpg.designs"])
+        start = part.start if part else int(metadata[N_DESIGNS])
         if start != covered:
             what = "lack" if start > covered else "share"
             first, last = sorted((start, covered))
@@ -273,6 +274,7 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> None:
     for which, name in enumerate((STATES, DESIGNS)):
         batches = (batch for part in parts for batch in part.batches(which))
         write_table(folder / name, parts[0].schema(which), batches, metadata, in_thread=True)
+    return metadata[FINGERPRINT]
 
 
 def outputs(folder: Path) -> tuple[tuple[Path, Mark], ...]:

@@ -1,10 +1,10 @@
 """A worker's task: evaluate a chunk of designs, store its part, send back counts."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from time import process_time
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
 from dpgcli.sweeps.evaluation import Evaluation, Tables, Values
@@ -54,6 +54,13 @@ class ChunkTask:
     def _write(self, sink: IO[bytes], blocks: Iterable[Tables]) -> int:
         evaluation = self.evaluation
         return write_part(sink, evaluation.state_columns, evaluation.design_columns, blocks)
+
+
+def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
+    """What is wrong with a design; the reader of specs is loaded by workers that meet one."""
+    from dpgcli.files import scene_file
+
+    return scene_file.reason_against(data, changes)
 
 
 @dataclass

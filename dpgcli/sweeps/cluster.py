@@ -1,18 +1,27 @@
 """The workers of a Dask cluster, and what to do while none of them answers."""
 
 import logging
+import re
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from dataclasses import dataclass, field
+from socket import getaddrinfo
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from dpgcli.errors import Field, Message, NoWorkerError
+from dpgcli.errors import Field, Message, NoWorkerError, UsageError
 from dpgcli.sweeps.executors import GO_ON, PERIOD, Backend
 
 PATIENCE = 10  # s, for an answer of the scheduler
 SILENCE = 10  # s after which a word is said
+SCHEMES = ("tcp", "tls", "ws", "wss")  # of Dask's schedulers
+SECRET = ("tls", "wss")
+USUAL_PORT, LARGEST_PORT = 8786, 65535
+ADDRESS = re.compile(
+    r"(?:(?P<scheme>\w+)://)?(?P<host>\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+)(?::(?P<port>[0-9]{1,5}))?/?"
+)
+KEYS = "DASK_DISTRIBUTED__COMM__TLS__"  # of the environment; files in ~/.config/dask do, too
 
 
 @dataclass
@@ -50,18 +59,38 @@ class Watch:
         return f"{self.name}: nothing from {who} for {silence:.0f} s; waiting"
 
 
+def check_address(address: str) -> None:
+    """Raise UsageError for what is no address of a scheduler, with the form that works.
+
+    >>> check_address("tcp://[::1]:8786")
+    >>> check_address("localhost")
+    Traceback (most recent call last):
+        ...
+    dpgcli.errors.UsageError: scheduler localhost: expected tcp://host:port, such as tcp://localhost:8786
+    """
+    found = ADDRESS.fullmatch(address)
+    scheme = (found and found["scheme"]) or SCHEMES[0]
+    if found and found["port"] and scheme in SCHEMES and 0 < int(found["port"]) <= LARGEST_PORT:
+        return
+    known = scheme if scheme in SCHEMES else SCHEMES[0]
+    example = f", such as {known}://{found['host']}:{USUAL_PORT}" if found else ""
+    raise UsageError(Field("scheduler"), f" {address}: expected {known}://host:port{example}")
+
+
 def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Backend:
     """The workers of a Dask cluster.
 
-    Raises OSError where no scheduler answers, NoWorkerError where no worker comes within `limit`
-    seconds.
+    Raises UsageError for keys that are missing, OSError where no scheduler answers, NoWorkerError
+    where no worker comes within `limit` seconds.
     """
+    check_address(scheduler)
     from distributed import KilledWorker
     from distributed.comm.core import CommClosedError
 
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is raised
     name = f"the Dask cluster at {scheduler}"
+    _check_reachable(scheduler)
     client = _client(scheduler)
     watch = Watch(name, lambda: len(_threads(client)), limit, say)
     while not _threads(client):
@@ -77,6 +106,22 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Ba
         ask=lambda question: _answers(client, question),
         watch=watch,
     )
+
+
+def _check_reachable(scheduler: str) -> None:
+    """What can be known without waiting: that the host has an address, and keys are there."""
+    from distributed.security import Security
+
+    found = ADDRESS.fullmatch(scheduler)
+    assert found is not None, "checked before"
+    getaddrinfo(found["host"].strip("[]"), int(found["port"]))
+    try:
+        keys = Security().get_connection_args("client").get("ssl_context")
+    except OSError as error:
+        raise UsageError(Field("scheduler"), f" {scheduler}: Dask's keys: {error}") from error
+    if found["scheme"] in SECRET and keys is None:
+        names = ", ".join(KEYS + name for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
+        raise UsageError(Field("scheduler"), f" {scheduler}: expected keys of Dask in {names}")
 
 
 def _client(scheduler: str) -> Any:

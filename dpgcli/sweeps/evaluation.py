@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Columns, Flags, Indices, keep_freed_memory
+from dpgcli.arrays import Columns, Flags, Indices, distinct, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
@@ -135,7 +135,7 @@ class Evaluation:
         """The designs at some places, by their number of units."""
         columns = {key: column[places] for key, column in values.items()}
         units = columns.pop(UNITS, np.full(len(places), self.base.units))
-        for n_units in np.unique(units).tolist():
+        for n_units in distinct(units).tolist():
             here = np.flatnonzero(units == n_units)
             own = {key: column[here] for key, column in columns.items()}
             base = replace(self.base, units=int(n_units), n_designs=len(here))

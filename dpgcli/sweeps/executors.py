@@ -7,11 +7,7 @@ failed, and everything else goes on. If nothing but failures comes back, it is n
 the run gives up.
 """
 
-import atexit
 import os
-import signal
-import tempfile
-import threading
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import (
@@ -19,19 +15,14 @@ from concurrent.futures import (
     BrokenExecutor,
     Executor,
     Future,
-    ProcessPoolExecutor,
     wait,
 )
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from dpgcli.errors import Field, WorkplaceError
-from dpgcli.signals import STOP_SIGNALS
-from dpgcli.temporary import temporary_folder
+from dpgcli.errors import WorkplaceError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -42,7 +33,6 @@ UNDER_WAY_PER_WORKER = 2  # keeps workers busy and memory bounded
 TRIALS = 3  # workers that must fail to do nothing before none is believed to start
 MOST_FAILURES_IN_A_ROW = 16  # more than that, and the workplace is to blame
 PERIOD = 1.0  # s, of looking after a workplace while nothing comes back
-LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
 GO_ON = "What is done is kept, and the same command goes on from there."
 
 
@@ -223,11 +213,6 @@ def serial() -> Backend:
     return Backend("this process", lambda _: SerialExecutor(), 1)
 
 
-def processes(n_workers: int) -> Backend:
-    """A pool of processes on this machine."""
-    return Backend("the pool of processes", process_pool, n_workers)
-
-
 class SerialExecutor(Executor):
     """Runs what is submitted at once, in this process."""
 
@@ -239,129 +224,3 @@ class SerialExecutor(Executor):
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-def process_pool(n_workers: int) -> Executor:
-    """A pool of fresh processes: BLAS on one thread, deaf to Ctrl-C, gone with their parent."""
-    from multiprocessing import get_context
-
-    method = "forkserver" if _has_fork_server() else "spawn"
-    start_fork_server()
-    return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
-
-
-def start_fork_server(*modules: str) -> None:
-    """Start the process that workers are forked from; it imports these modules once for all.
-
-    Called early, it does so while this process is still busy with imports of its own. On Windows
-    there is none, and every worker imports for itself.
-    """
-    if not _has_fork_server():
-        return
-    from multiprocessing import forkserver, resource_tracker
-
-    _own_temporary_folder()
-    if modules:
-        forkserver.set_forkserver_preload(list(modules))
-    # what a terminal sends to all its processes is for this one to answer: the others inherit
-    # that it is blocked; the tracker comes first, since starting it unblocks Ctrl-C
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGHUP])
-    try:
-        resource_tracker.ensure_running()
-        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _has_fork_server() -> bool:
-    from multiprocessing import get_all_start_methods
-
-    return "forkserver" in get_all_start_methods()
-
-
-@cache
-def _own_temporary_folder() -> None:
-    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
-
-    Raises WorkplaceError where there can be no temporary files.
-    """
-    from multiprocessing import current_process
-
-    try:
-        place = tempfile.gettempdir()
-        place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
-        held = ExitStack()
-        folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
-    except OSError as error:
-        raise WorkplaceError(f"no folder for temporary files: {error}") from error
-    atexit.register(held.close)
-    vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
-
-
-class _Pool(ProcessPoolExecutor):
-    """A pool that no signal stops halfway through starting or ending its processes."""
-
-    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """Submit as the base does; without a fork server the pool is broken.
-
-        Raises WorkplaceError where the system allows no more processes.
-        """
-        with _held_signals():
-            try:
-                future = super().submit(fn, *args, **kwargs)
-            except (ConnectionError, FileNotFoundError, EOFError) as error:
-                raise BrokenExecutor("the fork server is gone") from error
-            except OSError as error:
-                if self._broken:  # its pipes are closed meanwhile
-                    raise BrokenExecutor("a worker died while another was started") from error
-                why = f"cannot start a process: {error.strerror}. Take fewer "
-                raise WorkplaceError(why, Field("jobs"), f". {GO_ON}") from error
-        if self._broken:
-            # of a broken pool all processes are ended and waited for: one that was just being
-            # started escapes the first, and would be waited for without end (seen in CPython 3.11)
-            for process in list((self._processes or {}).values()):
-                process.terminate()
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Shut down as the base does."""
-        with _held_signals():
-            super().shutdown(wait, cancel_futures=cancel_futures)
-
-
-@contextmanager
-def _held_signals() -> Iterator[None]:
-    """Hold back signals to the main thread until the end of the block."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda caught, _: held.append(caught))
-        for number in STOP_SIGNALS
-    }
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler or signal.SIG_DFL)
-        for caught in held[:1]:
-            signal.raise_signal(caught)
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End with the parent: a killed one cannot end its workers, which would wait forever."""
-    from multiprocessing import parent_process
-    from multiprocessing.connection import wait as wait_for
-
-    parent = parent_process()
-    if parent is not None:
-        wait_for([parent.sentinel])
-        os._exit(1)

@@ -43,6 +43,24 @@ _UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {
     ast.UAdd: operator.pos,
     ast.Not: np.logical_not,
 }
+# what other languages and keyboards write, by how it looks in a text
+_INSTEAD = {
+    r"\^": "a power is **",
+    r"&&?": "both is: and",
+    r"\|\|?": "either is: or",
+    r"!(?!=)|~": "the opposite is: not",
+    r"//": "division is /",
+    r"(?<![<>=!])=(?![=<>])": "equal is ==",
+    r"<>|≠": "unequal is !=",
+    r"[≤⩽]|=<": "at most is <=",
+    r"[≥⩾]|=>": "at least is >=",
+    r"[×·⋅]": "times is *",
+    r"÷": "division is /",
+    r"[−–]": "minus is -",
+    r"[²³]": "a power is **",
+    r"\d,\d": "a decimal point is .",
+    r"\d\s*(mm|MPa|mJ|N|rad|deg)\b": "numbers have no unit",
+}
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": np.abs,
     "sqrt": np.sqrt,
@@ -92,12 +110,27 @@ def expression(text: str) -> Expression:
         raise ExpressionError(f"longer than {MOST_CHARACTERS} characters")
     try:
         body = ast.parse(_without_digits(text.strip()), mode="eval").body
+        names = frozenset(_names(body, MOST_LEVELS))
+    except ExpressionError:
+        raise
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ExpressionError(f"not an expression: {text!r}") from error
+        raise ExpressionError(f"not an expression: {text!r}{_hint(text)}") from error
     is_comparison = isinstance(body, ast.Compare | ast.BoolOp) or (
         isinstance(body, ast.UnaryOp) and isinstance(body.op, ast.Not)
     )
-    return Expression(text.strip(), frozenset(_names(body, MOST_LEVELS)), is_comparison)
+    return Expression(text.strip(), names, is_comparison)
+
+
+def _hint(text: str) -> str:
+    """How what is not of this language is written here, as far as one sees it.
+
+    >>> _hint("x^2 > 1"), _hint("a > 1 && b > 2"), _hint("x >= 1")
+    (' (a power is **)', ' (both is: and)', '')
+    """
+    for pattern, instead in _INSTEAD.items():
+        if re.search(pattern, text):
+            return f" ({instead})"
+    return ""
 
 
 def _without_digits(text: str) -> str:
@@ -140,7 +173,7 @@ def _parts(node: ast.expr) -> list[ast.expr]:
         raise ExpressionError(f"unknown function {node.func.id}; known: {', '.join(_FUNCTIONS)}")
     if isinstance(node, ast.Constant):
         raise ExpressionError(f"only numbers can be compared, not {node.value!r}")
-    raise ExpressionError(f"not allowed here: {type(node).__name__}")
+    raise SyntaxError(f"{type(node).__name__} is not of this language")
 
 
 def _constant(node: ast.expr) -> int | float | None:
@@ -169,7 +202,10 @@ def _dotted(node: ast.expr) -> str:
 
 
 def _as_number(value: Any) -> Any:
-    """Truths count as 0 and 1, and whole numbers do not overflow."""
+    """Truths count as 0 and 1, and whole numbers do not overflow.
+
+    Of a truth NumPy would find functions in half precision.
+    """
     return np.multiply(value, 1.0)
 
 
@@ -180,8 +216,9 @@ def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
     if name := _dotted(node):
         return values[name]
     parts = [_value(part, values, undefined) for part in _parts(node)]
-    if isinstance(node, ast.BinOp):
+    if isinstance(node, ast.BinOp | ast.Call):
         parts = list(map(_as_number, parts))
+    if isinstance(node, ast.BinOp):
         return _defined(_ARITHMETIC[type(node.op)](*parts), parts, undefined)
     if isinstance(node, ast.UnaryOp):
         operand = parts[0] if isinstance(node.op, ast.Not) else _as_number(parts[0])

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
-import pandas as pd
 
-from dpgcli.arrays import Flags, Indices
+from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.text import printable
@@ -34,7 +33,7 @@ class Failure:
 class RequirementVerdict:
     """One requirement held against the designs; `rows` are those that fail it."""
 
-    designs: pd.DataFrame
+    designs: Columns
     requirement: Expression
     n_checked: int
     rows: Indices
@@ -56,15 +55,17 @@ class RequirementVerdict:
         """The designs that fail, in the order of the table; at most `limit`."""
         swept = swept_names(self.designs)
         needed = [name for name in self.designs if name in self.requirement.names]
+        shown = {name: column[self.rows[:limit]].tolist() for name, column in self.designs.items()}
+        rows = (dict(zip(shown, row, strict=True)) for row in zip(*shown.values(), strict=True))
         return [
             Failure(
-                int(row["design"]),
+                row["design"],
                 {name: row[name] for name in swept},
                 {name: row[name] for name in needed},
                 row["status"],
                 row["reason"] or ("" if row["n_stable"] else "no stable state"),
             )
-            for row in self.designs.iloc[self.rows[:limit]].to_dict("records")
+            for row in rows
         ]
 
 
@@ -91,39 +92,39 @@ def requirement(text: str, columns: Collection[str]) -> Expression:
     return rule
 
 
-def number_columns(designs: pd.DataFrame) -> list[str]:
+def number_columns(designs: Columns) -> list[str]:
     """Columns that a requirement can name."""
-    return list(designs.select_dtypes(include=["number", "bool"]).columns)
+    return [name for name, column in designs.items() if column.dtype.kind in "biuf"]
 
 
-def swept_names(designs: pd.DataFrame) -> list[str]:
+def swept_names(designs: Columns) -> list[str]:
     """Columns of the swept values: those between the design's number and its calibration."""
-    names = list(designs.columns)
+    names = list(designs)
     return names[names.index("design") + 1 : names.index("calibration")]
 
 
-def failing(designs: pd.DataFrame, rule: Expression) -> Indices:
+def failing(designs: Columns, rule: Expression) -> Indices:
     """Numbers of the rows that do not meet a requirement; excluded designs are left aside.
 
     A design without a stable state meets none, nor does one where a value is NaN or has none.
     """
-    values = {name: designs[name].to_numpy() for name in rule.names}
-    met = designs["n_stable"].to_numpy() > 0
+    values = {name: designs[name] for name in rule.names}
+    met = designs["n_stable"] > 0
     for column in values.values():
         met &= ~np.isnan(column)
-    truth = np.broadcast_to(np.asarray(rule(values), float), len(designs))
+    truth = np.broadcast_to(np.asarray(rule(values), float), len(met))
     met &= np.isfinite(truth) & (truth != 0.0)
     return np.flatnonzero(~met & _in_question(designs))
 
 
-def check_designs(designs: pd.DataFrame, texts: Sequence[str]) -> tuple[RequirementVerdict, ...]:
+def check_designs(designs: Columns, texts: Sequence[str]) -> tuple[RequirementVerdict, ...]:
     """Hold every design against requirements in words; see `check_requirements`."""
     columns = number_columns(designs)
     return check_requirements(designs, [requirement(text, columns) for text in texts])
 
 
 def check_requirements(
-    designs: pd.DataFrame, requirements: Sequence[Expression]
+    designs: Columns, requirements: Sequence[Expression]
 ) -> tuple[RequirementVerdict, ...]:
     """Hold every requirement against every design that is not excluded.
 
@@ -132,7 +133,7 @@ def check_requirements(
     n_checked = int(_in_question(designs).sum())
     if not n_checked:
         raise NothingSelectedError(
-            f"no design to check: the table has {len(designs):,}, all of them excluded"
+            f"no design to check: the table has {len(designs['status']):,}, all of them excluded"
         )
     return tuple(
         RequirementVerdict(designs, rule, n_checked, failing(designs, rule))
@@ -140,8 +141,8 @@ def check_requirements(
     )
 
 
-def _in_question(designs: pd.DataFrame) -> Flags:
-    return (designs["status"] != "excluded").to_numpy(bool)
+def _in_question(designs: Columns) -> Flags:
+    return np.asarray(designs["status"] != "excluded", bool)
 
 
 def _listed(values: dict[str, float]) -> str:

@@ -8,10 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 import dpgcli
-from dpgcli.code import PACKAGE, sha256_of_code
+from dpgcli.code import PACKAGE, sha256_of_code, versions_of_libraries
 from dpgcli.errors import WorkplaceError
 from dpgcli.sweeps.executors import Backend
 
@@ -26,14 +24,17 @@ NO_NUMBERS = (
 
 
 class Maker(NamedTuple):
-    """Versions of the package and of NumPy, and the SHA-256 of the package's code."""
+    """Versions of the package and of its libraries, and the SHA-256 of the package's code."""
 
     dpg: str
     numpy: str
+    scipy: str
+    shapely: str
     code: str
 
     def __str__(self) -> str:
-        return f"dpg {self.dpg}, NumPy {self.numpy}, code {self.code[:8]}"
+        libraries = f"NumPy {self.numpy}, SciPy {self.scipy}, Shapely {self.shapely}"
+        return f"dpg {self.dpg}, {libraries}, code {self.code[:8]}"
 
 
 def code_of(package: Path) -> str:
@@ -45,7 +46,7 @@ def code_of(package: Path) -> str:
 
 
 # who works in this process, found when it began to: its files may have changed since
-HERE = Maker(dpgcli.__version__, np.__version__, code_of(PACKAGE))
+HERE = Maker(dpgcli.__version__, **versions_of_libraries(), code=code_of(PACKAGE))
 # asked with a function that every Python has: one of this package would end a worker without it
 WHO = partial(pkgutil.resolve_name, f"{__name__}:HERE")
 

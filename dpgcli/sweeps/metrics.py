@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.arrays import Array, Columns, Flags, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
@@ -169,7 +169,7 @@ class _Distinct:
         """Tips (tip, 2) in steps of the grid, and the design of each."""
         most = 2.0 ** (CELL_BITS - 1) - 1
         x, y = np.clip(np.rint(tips.T), -most, most).astype(np.int64) + int(most)
-        self.waiting.append(np.unique((((owner << CELL_BITS) | x) << CELL_BITS) | y))
+        self.waiting.append(distinct((((owner << CELL_BITS) | x) << CELL_BITS) | y))
         if sum(map(len, self.waiting)) > max(CELLS_AT_ONCE, len(self.known)):
             self._join()
 
@@ -181,7 +181,7 @@ class _Distinct:
     def _join(self) -> None:
         parts = [part for part in (self.known, *self.waiting) if len(part)]
         if parts:
-            self.known = parts[0] if len(parts) == 1 else np.unique(np.concatenate(parts))
+            self.known = parts[0] if len(parts) == 1 else distinct(np.concatenate(parts))
         self.waiting.clear()
 
 

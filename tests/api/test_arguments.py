@@ -1,11 +1,13 @@
 """Arguments of a wrong type are the user's mistake: they are named, with what was expected."""
 
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
@@ -79,6 +81,10 @@ def test_a_data_frame_is_an_axis() -> None:
     frame = dpg.sweep({"base": BASE, "space": [{"table": pd.DataFrame(STROKES)}]}, jobs=1)
     paired = dpg.sweep(SWEEP, jobs=1)
     pd.testing.assert_frame_equal(frame.designs.to_pandas(), paired.designs.to_pandas())
+    decimals = {key: [Decimal(str(value)) for value in values] for key, values in STROKES.items()}
+    for table in (pa.table(decimals), pd.DataFrame(decimals)):  # of a database
+        found = dpg.sweep({"base": BASE, "space": [{"table": table}]}, jobs=1)
+        pd.testing.assert_frame_equal(found.designs.to_pandas(), paired.designs.to_pandas())
     assert frame.designs["n_states"].tolist() == [2, 4]
 
 

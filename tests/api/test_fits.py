@@ -134,7 +134,7 @@ def test_wrong_data_are_named_by_row(folder: Path) -> None:
         ({"fix": {"force_linearity": 2.0}}, "^fix force_linearity=2: expected a number from 0 to"),
         ({"fix": {"stroke": 2.0}}, "^fix stroke: no value of the law .did you mean stroke_mm"),
         ({"free": ["stroke_mm"]}, "is not free: give its value, fix bistable_stiffness_N_per_mm"),
-        ({"branches": "some"}, "^branches 'some': expected all, quasi-static"),
+        ({"branches": "some"}, "^branches 'some': expected both, loading, unloading, quasi-static"),
         ({"loss": "square"}, "^loss 'square': expected linear, soft_l1, huber, cauchy"),
     ],
 )
@@ -170,3 +170,37 @@ def test_warnings_name_fields_and_in_the_shell_options(folder: Path) -> None:
 def test_nothing_of_others_is_replaced(folder: Path) -> None:
     with pytest.raises(dpg.OutputError, match=r"study.yaml: it is there and not of dpg"):
         dpg.fit_hinge(HINGE).save("study.yaml")
+
+
+def test_an_export_is_read_as_by_its_command(tmp_path: Path) -> None:
+    frame = pd.read_csv(DOME, comment="#")
+    path = tmp_path / "export.csv"
+    renamed = frame.rename(columns={"pole_travel_mm": "Weg", "energy_mJ": "Arbeit (J)"})
+    renamed["Arbeit (J)"] /= 1e3
+    renamed["Weg"] *= -1.0
+    path.write_text("Titel\n" + renamed.to_csv(index=False, sep=";", decimal=","))
+    column = {"pole_travel_mm": "-Weg", "energy_mJ": "Arbeit"}
+    found = dpg.fit_bistable(path, travel_to_opening="equal", column=column, skip=1)
+    whole = dpg.fit_bistable(DOME, travel_to_opening="equal")
+    assert found.values == pytest.approx(whole.values, rel=1e-9)
+    assert found.warnings[0] == "Arbeit (J) times 1000 is energy_mJ"
+    of_frame = dpg.fit_bistable(
+        renamed, travel_to_opening="equal", column=["pole_travel_mm=-Weg", "energy_mJ=Arbeit (J)"]
+    )
+    assert of_frame.values == pytest.approx(whole.values, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("choices", "message"),
+    [
+        ({"skip": -1}, "^skip -1: expected a number of lines"),
+        ({"skip": 1.5}, "^skip 1.5: expected a whole number"),
+        ({"column": "Weg"}, "^column Weg: expected NAME=TITLE"),
+        ({"column": 3}, "^column 3: expected a text or several"),
+        ({"units": {"energy": "kWh"}}, "^units energy=kWh: expected a unit of energy: mJ, J"),
+        ({"branches": "up"}, "^branches 'up': expected both, loading, unloading, quasi-static"),
+    ],
+)
+def test_choices_of_an_export_are_checked(choices: dict[str, Any], message: str) -> None:
+    with pytest.raises(dpg.UsageError, match=message):
+        dpg.fit_bistable(DOME, travel_to_opening="equal", **choices)

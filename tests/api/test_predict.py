@@ -75,6 +75,20 @@ def test_a_figure_has_at_most_64_states(folder: Path) -> None:
     many = dpg.predict("study.yaml", settings={"finger.units": 7}, columns="states")
     with pytest.raises(dpg.UsageError, match=r"^plot draws at most 64 states, not 128: .* patt"):
         many.draw("many.svg")
+    with pytest.raises(dpg.UsageError, match=r"^sketch draws at most 64 states, not 128: .* patt"):
+        many.sketch()
+
+
+def test_figures_and_sketches_are_those_of_the_command(folder: Path) -> None:
+    run = CliRunner().invoke
+    options = ("--plot", "command.svg", "--overlay", "--sketch", "-q")
+    result = run(app, ["predict", "study.yaml", *options], env={"COLUMNS": "60"})
+    found = dpg.predict("study.yaml")
+    found.draw("function.svg", overlay=True)
+    assert Path("function.svg").read_bytes() == Path("command.svg").read_bytes()
+    assert result.stdout.endswith(f"\n\n{found.sketch(60)}\n")
+    found.draw("panels.svg")
+    assert Path("panels.svg").read_bytes() != Path("command.svg").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
 """`sweep`, `merge` and `report`: from files and data, into folders and values."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -139,3 +142,53 @@ def test_another_sweep_in_the_folder_is_named(space: Path) -> None:
     dpg.sweep("sweep.yaml", "out", shard="1/2", **SERIAL)
     with pytest.raises(dpg.UsageError, match="take another output, or drop it with restart"):
         dpg.sweep("sweep.yaml", "out", tolerance=1e-6, **SERIAL)
+
+
+def test_tables_of_the_next_sweep_are_not_those_of_this_one(space: Path) -> None:
+    first = dpg.sweep("sweep.yaml", "out", **SERIAL)
+    second = dpg.sweep("sweep.yaml", "out", tolerance=1e-9, **SERIAL)
+    for table in ("designs", "states"):
+        with pytest.raises(dpg.UsageError, match=r"out/\w+.parquet is of another sweep by now"):
+            getattr(first, table)
+    assert len(second.designs) == 4
+
+
+def test_tables_that_were_read_stay(space: Path) -> None:
+    first = dpg.sweep("sweep.yaml", "out", **SERIAL)
+    before = first.designs.to_pandas()
+    dpg.sweep("sweep.yaml", "out", settings={"finger.lattice.force_linearity": 0.2}, **SERIAL)
+    assert first.designs.to_pandas().equals(before)
+
+
+def test_a_merge_knows_its_tables(space: Path) -> None:
+    for number in (1, 2):
+        dpg.sweep("sweep.yaml", f"part{number}", shard=f"{number}/2", **SERIAL)
+    merged = dpg.merge(["part1", "part2"], "whole")
+    assert len(merged.designs) == 4
+    dpg.sweep("sweep.yaml", "whole", settings={"finger.lattice.force_linearity": 0.2}, **SERIAL)
+    with pytest.raises(dpg.UsageError, match=r"states.parquet is of another sweep"):
+        _ = merged.states
+
+
+def test_a_shard_beside_the_tables_of_another_sweep(space: Path) -> None:
+    dpg.sweep("sweep.yaml", "out", settings={"finger.lattice.force_linearity": 0.2}, **SERIAL)
+    shard = dpg.sweep("sweep.yaml", "out", shard="1/2", **SERIAL)
+    with pytest.raises(dpg.UsageError, match=r"designs.parquet is of another sweep"):
+        _ = shard.designs
+
+
+@pytest.mark.skipif(not hasattr(os, "O_NONBLOCK"), reason="orphans stay on Windows")
+def test_what_a_killed_sweep_without_a_folder_leaves_goes_with_the_next(space: Path) -> None:
+    (space / "temporary").mkdir()
+    program = (
+        "import os, dpgcli as dpg; dpg.sweep('sweep.yaml', executor='serial', watch=lambda _: {})"
+    )
+    left = []
+    for watch in ("os.kill(os.getpid(), 9)", "None"):
+        subprocess.run(
+            [sys.executable, "-c", program.format(watch)],
+            env={**os.environ, "TMPDIR": str(space / "temporary")},
+            check=watch == "None",
+        )
+        left.append(len(list((space / "temporary").iterdir())))
+    assert left == [1, 0]

@@ -14,7 +14,7 @@ from dpgcli.benchmark.methods import BenchmarkResult
 from dpgcli.calibration.known import KnownStates
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.errors import UsageError
-from dpgcli.files.table_writer import write_states
+from dpgcli.files.prediction import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.plan import Request, explain
@@ -49,8 +49,8 @@ def test_every_row_has_every_column_and_sound_times() -> None:
         assert row["seconds_per_state"] == pytest.approx(row["seconds"] / row["n_states"])
         assert row["relative_time"] > 0.0
         assert row["certified"] == (
-            row["group"] in ("ladder", "one finger", "stiffness") and row["way"][0] == "c"
-        ) or row["way"].startswith("lattice")
+            row["group"] in ("ladder", "one finger", "stiffness") and row["method"][0] == "c"
+        ) or row["method"].startswith("lattice")
 
 
 @pytest.mark.usefixtures("quick")
@@ -177,5 +177,5 @@ def test_the_growth_goes_through_the_plan(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(module, "GROWTH_UNITS", (2, 13))
     monkeypatch.setattr("dpgcli.benchmark.timing.SHORTEST_ROUND", 0.0)
     rows: list[Any] = list(Bench(Scene(finger(2), ()), 1)._by_units())
-    assert [row["way"] for row in rows] == ["direct", "pairs of half-fingers"]
+    assert [row["method"] for row in rows] == ["direct", "pairs of half-fingers"]
     assert rows[1]["n_states"] == 2**13

@@ -1,4 +1,4 @@
-"""Every way to the states, against extended precision."""
+"""Every method to the states, against extended precision."""
 
 import numpy as np
 import pytest
@@ -30,20 +30,20 @@ def finger(linear_stiffness: float, force_linearity: float = 0.043) -> Finger:
 def test_errors_of_the_ladder() -> None:
     reference = extended_states(finger(1e4), PATTERNS)
     seen = {}
-    for way in package_methods(finger(1e4), PATTERNS):
-        found = way.run()
+    for method in package_methods(finger(1e4), PATTERNS):
+        found = method.run()
         error = np.hypot(*(found.pose[:2] - reference.pose[:2]))
         energy = np.abs(found.energy - reference.energy)
-        assert error.max() <= WORST[way.name], way.name
-        assert energy.max() <= 1e3 * WORST[way.name], way.name
-        seen[way.name] = float(error.max())
+        assert error.max() <= WORST[method.name], method.name
+        assert energy.max() <= 1e3 * WORST[method.name], method.name
+        seen[method.name] = float(error.max())
     assert list(seen) == list(WORST)
     assert seen["rigid bars, unit by unit"] > 1e-4, "dropping the bars must be seen"
     assert seen["units looked up, poses composed"] > 1e-10, "and what is of second order"
 
 
 def test_rigid_bars_have_fewer_ways() -> None:
-    names = [way.name for way in package_methods(finger(np.inf), PATTERNS)]
+    names = [method.name for method in package_methods(finger(np.inf), PATTERNS)]
     assert names == ["rigid bars, unit by unit", *(n for n in WORST if n.startswith("chain, ")
                                                    and "rigid" not in n)]  # fmt: skip
 
@@ -51,12 +51,12 @@ def test_rigid_bars_have_fewer_ways() -> None:
 def test_a_pattern_without_a_state_is_missing_from_every_way() -> None:
     impossible = finger(1e4, force_linearity=0.5)
     every = list(package_methods(impossible, PATTERNS))
-    assert [way.name for way in every] == list(WORST)
-    for way in every:
-        found = way.run()
-        assert np.isfinite(found.pose[:, 0]).all(), way.name
-        assert np.isnan(found.pose[:, 1:]).all(), way.name
-        assert np.isnan(found.energy[1:]).all(), way.name
+    assert [method.name for method in every] == list(WORST)
+    for method in every:
+        found = method.run()
+        assert np.isfinite(found.pose[:, 0]).all(), method.name
+        assert np.isnan(found.pose[:, 1:]).all(), method.name
+        assert np.isnan(found.energy[1:]).all(), method.name
 
 
 def test_others_find_the_same_states() -> None:
@@ -64,11 +64,11 @@ def test_others_find_the_same_states() -> None:
     reference = extended_states(finger(1e4), few)
     others = list(third_party_methods(finger(1e4), few))
     assert len(others) >= 3
-    for way in others:
-        found = way.run()
-        assert np.hypot(*(found.pose[:2] - reference.pose[:2])).max() < 1e-3, way.name
-        assert np.abs(found.pose[2] - reference.pose[2]).max() < 1e-4, way.name
-        assert np.abs(found.energy - reference.energy).max() < 1e-6, way.name
+    for method in others:
+        found = method.run()
+        assert np.hypot(*(found.pose[:2] - reference.pose[:2])).max() < 1e-3, method.name
+        assert np.abs(found.pose[2] - reference.pose[2]).max() < 1e-4, method.name
+        assert np.abs(found.energy - reference.energy).max() < 1e-6, method.name
 
 
 def test_times_are_ordered_and_of_one_call() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from dpgcli.arrays import keep_freed_memory
 from dpgcli.design.scene import Scene
-from dpgcli.files.table_writer import write_states
+from dpgcli.files.prediction import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify

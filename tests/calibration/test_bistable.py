@@ -15,7 +15,7 @@ from dpgcli.calibration.bistable import (
     rests,
     slopes,
 )
-from dpgcli.calibration.choices import Quantity, Rule
+from dpgcli.calibration.choices import Branches, Quantity, Rule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 from dpgcli.files.measured import read_curve
@@ -264,7 +264,7 @@ def test_the_dynamic_dome_rings_and_drifts() -> None:
 
 def test_its_quasi_static_pieces_are_near_the_static_dome() -> None:
     record = read_curve(DATA / "dome_dynamic_h6.5_t0.75.csv").curve
-    found = fitted(record, is_quasi_static=True)
+    found = fitted(record, branches=Branches.QUASI_STATIC)
     assert warned(
         found, "quasi-static pieces, time 0.001 to 0.08925, 0.09866 to 0.22: dropped 1194"
     )
@@ -277,3 +277,31 @@ def test_its_quasi_static_pieces_are_near_the_static_dome() -> None:
     assert 1.04 < linearity < 1.17, "the inverted energy has drifted by 4 to 17 %"
     assert found.fit.r_squared > 0.998
     assert found.curve is not None
+
+
+@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
+@pytest.mark.parametrize("largest", [3.6, 4.2, 9.0, 12.0])
+def test_a_well_is_found_however_far_the_travel_goes_on(quantity: Quantity, largest: float) -> None:
+    found = fitted(curve(quantity, 0, np.linspace(0.0, largest, 300)), quantity)
+    assert found.well == pytest.approx(3.325, abs=0.05)
+    assert not warned(found, "the inverted well")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_on_the_way_to_the_barrier_is_no_well(seed: int) -> None:
+    found = fitted(curve(Quantity.ENERGY, seed, np.linspace(0.0, 2.6, 300)))
+    assert found.well is None
+    assert warned(found, "the inverted well is not sampled (travel up to 2.6 mm)")
+
+
+def test_a_well_within_the_data_is_no_extrapolation() -> None:
+    found = fitted(curve(Quantity.ENERGY, travel=np.linspace(0.0, 4.2, 10)))
+    assert found.well is None, "three points are near it"
+    (said,) = found.warnings
+    assert said.startswith("the data alone do not show where the inverted dome rests")
+    assert said.endswith("the law has it at 3.325 mm, within the data")
+
+
+def test_a_well_in_a_gap_is_an_extrapolation() -> None:
+    found = fitted(curve(Quantity.ENERGY, travel=TRAVEL[(TRAVEL < 2.8) | (TRAVEL > 3.9)]))
+    assert warned(found, "the inverted well is not sampled (nothing from 2.75 to 3.9 mm)")

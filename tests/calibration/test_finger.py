@@ -136,7 +136,7 @@ def test_each_state_from_the_others() -> None:
     """By hand for one of them: the last state is predicted by a fit without it."""
     finger, known = finite_elements()
     study = FingerFit(finger, known, FRAME, ("segment_height_mm",))
-    errors = study.left_out()
+    errors = study.left_out
     assert np.isnan(errors[0]), "the straight finger has no deflection"
     rest = replace(study, known=known.chosen(np.arange(4)))
     assert errors[4] == pytest.approx(study.compared(rest.fit()).relative[4])

@@ -49,7 +49,7 @@ def surroundings(changes: Mapping[str, str] | None = None) -> dict[str, str]:
         for name, value in os.environ.items()
         if name not in AMBIENT and not name.startswith(("PYTHONIO", "PYTHONUNB", "PYTHONUTF8"))
     }
-    return {**kept, **(changes or {})}
+    return {**kept, "PYTHONWARNINGS": "error", **(changes or {})}  # as in the tests themselves
 
 
 @pytest.fixture
@@ -94,10 +94,8 @@ def start(folder: Path) -> Iterator[Start]:
     started: list[subprocess.Popen[bytes]] = []
 
     def launch(*arguments: str, **options: Any) -> "subprocess.Popen[bytes]":
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        process = subprocess.Popen(
-            [*PROGRAM, *arguments], cwd=folder, env=surroundings(), **{**pipes, **options}
-        )
+        usual = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": surroundings()}
+        process = subprocess.Popen([*PROGRAM, *arguments], cwd=folder, **{**usual, **options})
         started.append(process)
         return process
 

@@ -29,7 +29,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_tables_a_figure_in_text_and_the_cheapest_way(call: Any) -> None:
     result = call(*BENCH, "--target-error", "1um", "--keep", "every-unit")
     assert result.exit_code == ExitCode.DONE
-    for title in ("Ways to the states", "state by state", "Softer and stiffer bars", "put back"):
+    for title in ("Methods, with a batch", "state by state", "Softer and stiffer bars", "put back"):
         assert title in result.stdout
     assert "largest tip error, mm" in result.stdout
     assert result.stdout.splitlines()[-1].startswith("cheapest below 0.001 mm: ")
@@ -45,7 +45,7 @@ def test_all_rows_in_files(call: Any, folder: Path) -> None:
     assert list(table) == [column.name for column in module.COLUMNS]
     assert len(record["rows"]) == len(table) == len(result.stdout.splitlines()) - 1
     assert record["numpy"] == np.__version__
-    ladder = table[table["group"] == "ladder"].set_index("way")
+    ladder = table[table["group"] == "ladder"].set_index("method")
     assert ladder.loc["chain, 1e-12", "max_tip_error_mm"] < 1e-12
     figure = (folder / "b.svg").read_text()
     assert "largest tip error (mm)" in figure
@@ -56,7 +56,7 @@ def test_what_got_slower_is_said(call: Any, folder: Path) -> None:
     assert call(*BENCH, "--json", "b.json", "-q").exit_code == ExitCode.DONE
     record = json.loads((folder / "b.json").read_text())
     for row in record["rows"]:
-        row["relative_time"] *= 1e-3 if row["way"] == "chain, 1e-09" else 1e3
+        row["relative_time"] *= 1e-3 if row["method"] == "chain, 1e-09" else 1e3
     (folder / "b.json").write_text(json.dumps(record))
     result = call(*BENCH, "--compare", "b.json", "--format", "json")
     assert json.loads(result.stdout)
@@ -71,7 +71,7 @@ def test_a_record_of_another_finger_or_of_nothing_is_refused(call: Any, folder: 
     result = call(*BENCH, *other)
     assert result.exit_code == ExitCode.USAGE
     assert "of another finger, differs in spec.finger.geometry.chamber_length_mm" in result.stderr
-    for rows in ([{"group": []}], [{"way": "chain", "relative_time": "1"}], [3], {}):
+    for rows in ([{"group": []}], [{"method": "chain", "relative_time": "1"}], [3], {}):
         (folder / "b.json").write_text(json.dumps({"rows": rows}))
         result = call(*BENCH, "--compare", "b.json")
         assert result.exit_code == ExitCode.USAGE

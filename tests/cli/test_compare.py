@@ -90,7 +90,7 @@ def test_states_that_do_not_exist_are_said(call: Any, arguments: tuple[str, ...]
         (("--first-station", "nan,0"), "--first-station nan,0: expected two numbers in mm"),
         (("--plot", "c.pdf"), "expected a name that ends in .svg or .png"),
         (("--plot", "none/c.svg"), "cannot write none/c.svg"),
-        (("-s", "finger.units=2"), "three_gap_finger.csv:9: pattern: expected 2 digits 0 and 1"),
+        (("-s", "finger.units=2"), "three_gap_finger.csv:11: pattern: expected 2 digits 0 and 1"),
     ],
 )
 def test_what_makes_no_sense(
@@ -326,3 +326,82 @@ def test_the_law_is_named(call: Any, published: tuple[str, ...], law: str) -> No
     result = call(*published, "-s", f"finger.law={law}")
     description = {"published": "published law", "push_only": "push-only law"}[law]
     assert f"errors of the model ({description}" in result.stderr
+
+
+@pytest.fixture
+def bare(folder: Path, arguments: tuple[str, ...]) -> Path:
+    """The data of the examples without the frame in their header."""
+    path = folder / NAMES[1]
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if "_mm:" not in line), encoding="utf-8")
+    return path
+
+
+def test_a_frame_that_does_not_fit_is_said_with_what_would(call: Any, bare: Path) -> None:
+    result = call("compare", *NAMES[:2])
+    said = "warning: the frame does not fit: the straight state is off by 10.75 mm; --first-station"
+    assert f"{said} 10.75,-0.00817 would bring that to zero, as would --tip-offset" in result.stderr
+    mended = call("compare", *NAMES[:2], "--first-station", "10.75,-0.00817", "--format", "json")
+    assert "does not fit" not in mended.stderr
+    assert rows(mended.stdout)["000"]["error_mm"] < 1e-3
+    part = call("compare", *NAMES[:2], "--first-station", "5,0", "--tip-offset", "2,0")
+    assert "--first-station 8.75,-0.00817 would" in part.stderr
+    assert "--tip-offset 5.75,-0.00817" in part.stderr
+
+
+def test_tips_that_are_all_off_in_one_way_tell_of_the_frame(call: Any, bare: Path) -> None:
+    lines = bare.read_text(encoding="utf-8").splitlines(keepends=True)
+    bare.write_text("".join(line for line in lines if line[:3] != "000"), encoding="utf-8")
+    result = call("compare", *NAMES[:2])
+    assert "the frame does not fit: all tips are off in the same way, by 10.68 mm" in result.stderr
+    assert "does not fit" not in call("compare", *NAMES[:2], *FRAME).stderr
+
+
+def test_a_curl_that_is_wrong_is_not_blamed_on_the_frame(
+    call: Any, arguments: tuple[str, ...]
+) -> None:
+    assert "does not fit" not in call(*arguments).stderr
+    stroke = ("-s", "finger.lattice.stroke_mm=2")
+    assert "does not fit" not in call(*arguments, *stroke).stderr
+
+
+def test_the_frame_stands_in_the_header_of_the_data(
+    call: Any, arguments: tuple[str, ...], folder: Path
+) -> None:
+    given, read = call(*arguments), call("compare", *NAMES[:2])
+    assert read.stdout == given.stdout
+    assert "first station 5.375,0.75 mm (from the data's header)" in read.stderr
+    assert "first station 5.375,0.75 mm (as given)" in given.stderr
+    other = call("compare", *NAMES[:2], "--first-station", "1,2")
+    assert "first station 1,2 mm (as given), tip offset 5.375,-0.75 mm (from the" in other.stderr
+
+
+def test_the_frame_stands_in_the_spec(call: Any, arguments: tuple[str, ...], bare: Path) -> None:
+    spec = bare.parent / NAMES[0]
+    frame = "data:\n  first_station_mm: [5.375, 0.75]\n  tip_offset_mm: [5.375, -0.75]\n"
+    given = call(*arguments)
+    spec.write_text(spec.read_text(encoding="utf-8") + frame, encoding="utf-8")
+    read = call("compare", *NAMES[:2])
+    assert read.stdout == given.stdout
+    assert "tip offset 5.375,-0.75 mm (from the spec)" in read.stderr
+    text = bare.read_text(encoding="utf-8")
+    bare.write_text(f"# first_station_mm: 5, 1\n{text}", encoding="utf-8")
+    assert "first station 5,1 mm (from the data's header)" in call("compare", *NAMES[:2]).stderr
+    fit = ("fit", "finger", *NAMES[:2], "--format", "csv")
+    assert call(*fit, *FRAME).stdout == call(*fit, "--first-station", "5.375,0.75").stdout
+
+
+@pytest.mark.parametrize("said", ["5.375", "5.375, up", "5,3,1", "", "[5.375; 0.75]"])
+def test_a_frame_that_is_none(call: Any, bare: Path, said: str) -> None:
+    text = bare.read_text(encoding="utf-8")
+    bare.write_text(f"# first_station_mm: {said}\n{text}", encoding="utf-8")
+    result = call("compare", *NAMES[:2])
+    assert result.exit_code == ExitCode.USAGE
+    place = f"{bare.name}:1: first_station_mm: expected two numbers in mm, such as 5.375, -0.75"
+    assert place in result.stderr
+
+
+def test_a_fit_in_a_wrong_frame_says_so(call: Any, bare: Path) -> None:
+    result = call("fit", "finger", *NAMES[:2])
+    assert "warning: the frame does not fit: the straight state is off by 10.75 mm" in result.stderr
+    assert "does not fit" not in call("fit", "finger", *NAMES[:2], *FRAME).stderr

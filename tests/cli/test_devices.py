@@ -13,7 +13,7 @@ from dpgcli.cli.exits import ExitCode
 from dpgcli.errors import UsageError
 from dpgcli.files import table_reader
 from dpgcli.files.parts import SAID, PartStore
-from dpgcli.files.table_reader import read_record, read_run, read_undamaged
+from dpgcli.files.table_reader import read_record, read_undamaged
 from dpgcli.files.table_writer import read_metadata
 
 Call = Callable[..., Any]
@@ -158,7 +158,7 @@ def test_a_substituted_process_is_named_a_pipe(out: Path, run: Any) -> None:
     assert result.stderr == f"dpg: cannot read {name}: {SPECIAL}\n"
 
 
-@pytest.mark.parametrize("reader", [read_undamaged, read_record, read_run, read_metadata])
+@pytest.mark.parametrize("reader", [read_undamaged, read_record, read_metadata])
 def test_a_folder_is_no_file_either(tmp_path: Path, reader: Callable[[Path], Any]) -> None:
     if reader is read_metadata:
         assert reader(tmp_path) == {}
@@ -167,17 +167,14 @@ def test_a_folder_is_no_file_either(tmp_path: Path, reader: Callable[[Path], Any
         reader(tmp_path)
 
 
-@pytest.mark.parametrize("reader", [read_record, read_run])
-def test_facts_have_a_bound(
-    tmp_path: Path, reader: Callable[[Path], Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_facts_have_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.json"
     path.write_text('{"rows": []}')
     monkeypatch.setattr(table_reader, "MOST_FACTS", 12)
-    assert reader(path) == {"rows": []}
+    assert read_record(path) == {"rows": []}
     monkeypatch.setattr(table_reader, "MOST_FACTS", 11)
     with pytest.raises(UsageError, match="larger than"):
-        reader(path)
+        read_record(path)
 
 
 def test_what_a_sweep_is_about_cannot_be_a_folder(tmp_path: Path) -> None:

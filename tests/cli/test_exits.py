@@ -1,5 +1,6 @@
 """Every way to end: the exit code, the message, and no traceback."""
 
+import errno
 import os
 import subprocess
 from collections.abc import Callable
@@ -254,3 +255,53 @@ def test_times(text: str, expected: float) -> None:
 def test_what_is_no_time(text: str) -> None:
     with pytest.raises(UsageError, match="expected a time in s, m or h: 5m"):
         seconds("--wait", text)
+
+
+def test_warnings_of_libraries_reach_only_those_who_ask(run: Callable[..., Any]) -> None:
+    before = (
+        "import warnings, dpgcli.api.inputs as inputs; read = inputs.read_scene\n"
+        "def warned(*given): warnings.warn('of a library', RuntimeWarning); return read(*given)\n"
+        "inputs.read_scene = warned"
+    )
+    usual = run("predict", "three_unit.yaml", "-q", env={"PYTHONWARNINGS": ""}, before=before)
+    assert (usual.returncode, usual.stderr) == (0, "")
+    asked = run("predict", "three_unit.yaml", env={"PYTHONWARNINGS": "default"}, before=before)
+    assert "RuntimeWarning: of a library" in asked.stderr
+    strict = run("predict", "three_unit.yaml", before=before)
+    assert strict.returncode == ExitCode.INTERNAL, "tests take it for an error"
+
+
+GONE = "import os; os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone')"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("predict", "{0}/three_unit.yaml", "-o", "states.parquet"),
+        ("sweep", "{0}/sweep.yaml", "-o", "{0}/out", "-j", "2"),
+        ("init",),
+    ],
+)
+def test_a_working_folder_that_was_deleted_is_named(
+    run: Callable[..., Any], folder: Path, arguments: tuple[str, ...]
+) -> None:
+    (folder / "sweep.yaml").write_text(
+        "base: three_unit.yaml\nspace: [{key: finger.units, values: [2, 3]}]\n"
+    )
+    done = run(*(text.format(folder) for text in arguments), before=GONE)
+    assert done.returncode == ExitCode.USAGE
+    assert "the working folder was deleted" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("code", [errno.EMFILE, errno.ENOSPC, errno.EROFS, errno.ENOMEM])
+def test_a_system_that_has_no_more_is_no_bug(
+    call: Call, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr("dpgcli.api.inputs.read_scene", refused)
+    result = call("predict", "three_unit.yaml")
+    assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
+    assert result.stderr == f"dpg: the system refuses: [Errno {code}] {os.strerror(code)}\n"

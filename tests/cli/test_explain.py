@@ -106,10 +106,11 @@ def test_uncertainty_is_left_out_until_it_is_asked_for(call: Call, folder: Path)
     assert not [name for name in plan["columns"] if "uncertainty" in name]
     assert any("--uncertainty" in part["why"] for part in plan["left_out"])
     asked = facts(call, *BY_FILE, "--uncertainty")
-    assert asked["columns"][-3:] == [
+    assert asked["columns"][-4:] == [
         "tip_x_uncertainty_mm",
         "tip_y_uncertainty_mm",
         "tip_angle_uncertainty_rad",
+        "uncertainty_covers",
     ]
     nothing = facts(call, "three_unit.yaml")
     assert not any("--uncertainty" in part["why"] for part in nothing["left_out"])

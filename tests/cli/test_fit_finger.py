@@ -63,6 +63,18 @@ def test_the_example_with_the_push_that_it_has(call: Any, folder: Path) -> None:
     assert result.exit_code == ExitCode.DONE
     assert value(read_calibration(folder / "lever.yaml"), LEVER) == pytest.approx(13.18, abs=0.01)
     by_file = ("-s", "finger.calibration=[lever.yaml, push_3.5mm.yaml]")
+    left_out = read_calibration(folder / "lever.yaml").quality.leave_one_out
+    worst = f"each state from the others alone: {100.0 * left_out[1]:.3g} % at worst"
+    assert worst in result.stderr
+    assert 0.0 < left_out[0] < left_out[1] < 0.2
+    counted = ("--uncertainty", "-s", "model_error=leave_one_out", "--pattern", "11?")
+    predicted = call("predict", spec, *by_file, *counted)
+    percent = f"{100.0 * left_out[0]:.2g} % of the deflection (rms)"
+    assert predicted.stderr.splitlines()[-1].startswith(
+        f"the model's own error: states that lever.yaml was not fitted to are off by {percent}"
+    )
+    covers = f"uncertainties cover: fitted values, model error of {100.0 * left_out[0]:.3g} %\n"
+    assert covers in predicted.stderr
     rest = ("three_gap_finger_rest.csv", *FRAME, "--format", "csv", "-q")
     errors = []
     for settings in ((), by_file):

@@ -43,7 +43,7 @@ def test_a_pipe_gets_the_page_as_it_is(topic: str) -> None:
         ("sweep", "a command: dpg sweep --help"),
         ("predict", "a command: dpg predict --help"),
         ("swepes", "did you mean sweeps?"),
-        ("Laws", "did you mean laws?"),
+        ("LAWS", "did you mean laws?"),
         ("calibrate", "did you mean calibration?"),
         ("zzz", "there are tutorial, spec, columns"),
     ],

@@ -1,6 +1,7 @@
 """The spec to start from, and the schema for editors."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,11 @@ import pytest
 from ruamel.yaml import YAML
 
 Call = Callable[..., Any]
-CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+SHIPPED = sorted(
+    [*(ROOT / "configs").rglob("*.yaml"), ROOT / "dpgcli/files/scene_file/starter.yaml"]
+)
 
 
 def test_a_new_spec_is_sound_and_commented(call: Call, folder: Path) -> None:
@@ -75,10 +80,13 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str
     if isinstance(value, dict):
         known = schema.get("properties", {})
         others = schema.get("additionalProperties", True)
+        patterns = schema.get("patternProperties", {})
         wrong += [f"{key} is missing" for key in schema.get("required", []) if key not in value]
         for key, item in value.items():
             if key in known:
                 wrong += faults(item, known[key], root)
+            elif free := [part for pattern, part in patterns.items() if re.search(pattern, key)]:
+                wrong += faults(item, free[0], root)
             elif isinstance(others, dict):
                 wrong += faults(item, others, root)
             elif not others:
@@ -110,7 +118,7 @@ def test_the_schema_accepts_every_example(call: Call, path: Path) -> None:
     "spec",
     [
         {},
-        {"finger": {"units": 3}},
+        {"finger": {"linear_stiffness_N_per_mm": 1e4}},
         {"finger": {"units": 0, "linear_stiffness_N_per_mm": 1e4}},
         {"finger": {"units": 3, "linear_stiffness_N_per_mm": "1e4"}},
         {"finger": {"units": 3, "linear_stiffness_N_per_mm": 1e4, "bogus": 1}},
@@ -136,3 +144,74 @@ def test_every_key_of_the_schema_is_described(call: Call) -> None:
         if "description" not in value
     ]
     assert bare == []
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_other_readers_of_yaml_find_the_same(path: Path) -> None:
+    """By the rules of YAML 1.1, 1e4 and 1.0e4 are text: editors would then refuse our own specs."""
+    yaml = pytest.importorskip("yaml")
+    text = path.read_text(encoding="utf-8")
+    theirs = yaml.safe_load(text)
+    assert plain(theirs) == plain(YAML(typ="safe", pure=True).load(text))
+
+
+def plain(value: Any) -> Any:
+    """Data with keys as text, each value with its type."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return type(value).__name__, value
+
+
+def test_other_readers_find_the_same_in_the_manual_and_in_calibrations(
+    call: Call, folder: Path
+) -> None:
+    yaml = pytest.importorskip("yaml")
+    pages = [*(ROOT / "dpgcli" / "manual").glob("*.md"), ROOT / "README.md"]
+    texts = [page.read_text(encoding="utf-8") for page in pages]
+    blocks = [b for text in texts for b in re.findall(r"^```yaml\n(.*?)^```$", text, re.M | re.S)]
+    assert len(blocks) > 1
+    (folder / "hinge.csv").write_text("moment_N_mm,rotation_rad\n0,0\n2.4,0.1\n4.800001,0.2\n")
+    assert call("fit", "hinge", "hinge.csv", "-o", "hinge.yaml").exit_code == 0
+    made = (folder / "hinge.yaml").read_text(encoding="utf-8")
+    assert "e-0" in made
+    for text in (*blocks, made):
+        assert plain(yaml.safe_load(text)) == plain(YAML(typ="safe", pure=True).load(text))
+
+
+@pytest.mark.parametrize("number", ["1e4", "1.0e4", "1.0e+4", "1E+4", "10000"])
+def test_all_forms_of_a_number_are_read(call: Call, folder: Path, number: str) -> None:
+    text = (folder / "three_unit.yaml").read_text()
+    (folder / "other.yaml").write_text(text.replace("1.0e+4", number, 1))
+    assert number in (folder / "other.yaml").read_text()
+    assert call("predict", "other.yaml").stdout == call("predict", "three_unit.yaml").stdout
+
+
+SHARED = """\
+x-soft: &soft {dome_height_mm: 6.5, dome_thickness_mm: 0.75}
+x-anything: [1, {2: 3}]
+"""
+
+
+def test_keys_of_the_user_hold_anchors(call: Call, folder: Path) -> None:
+    text = (folder / "three_unit.yaml").read_text()
+    shared = re.sub("    dome_height_mm: .*\n    dome_thickness_mm: .*\n", "    <<: *soft\n", text)
+    assert "<<" in shared
+    (folder / "three.yaml").write_text(SHARED + shared)
+    assert call("predict", "three.yaml").stdout == call("predict", "three_unit.yaml").stdout
+    schema = json.loads(call("schema").stdout)
+    assert faults(YAML(typ="safe", pure=True).load(SHARED + shared), schema, schema) == []
+    (folder / "sweep.yaml").write_text(
+        "x-heights: &heights [6.0, 6.5]\nbase: three.yaml\n"
+        "space: [{key: finger.geometry.dome_height_mm, values: *heights}]\n"
+    )
+    swept = call("sweep", "sweep.yaml", "-o", "out", "--executor", "serial")
+    assert (swept.exit_code, "2 designs" in swept.stderr) == (0, True)
+
+
+def test_only_the_top_level_has_keys_of_the_user(call: Call, folder: Path) -> None:
+    text = (folder / "three_unit.yaml").read_text()
+    (folder / "three.yaml").write_text(text.replace("finger:", "finger:\n  x-soft: 1", 1))
+    refused = call("predict", "three.yaml")
+    assert (refused.exit_code, "x-soft" in refused.stderr) == (2, True)

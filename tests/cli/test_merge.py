@@ -1,11 +1,13 @@
 """`dpg merge`: shards into the tables of one run, or a plain refusal."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.files.parts import fingerprint
 from dpgcli.studies import sweep as studies
 
 SWEEP = """base: three_unit.yaml
@@ -36,10 +38,15 @@ def tables(folder: Path) -> dict[str, bytes]:
 def test_shards_in_any_order_are_one_run(call: Any, folder: Path, shard: Any) -> None:
     result = call("merge", *shard(3, 1, 2), "-o", "all")
     assert result.exit_code == ExitCode.DONE
-    written = result.stdout + "\n<!-- written by dpg -->\n"
-    assert (folder / "all" / "report.md").read_text() == written
-    assert result.stdout.startswith("# Design space")
-    assert call("sweep", "sweep.yaml", "--executor", "serial", "-o", "one").exit_code == 0
+    assert result.stdout.startswith(
+        "all: 23 designs: 20 stable, 3 invalid; more in all/report.md\n"
+    )
+    one = call("sweep", "sweep.yaml", "--executor", "serial", "-o", "one")
+    assert one.exit_code == 0
+    assert one.stdout == result.stdout.replace("all: ", "one: ").replace("all/", "one/")
+    reports = [(folder / name / "report.md").read_text() for name in ("all", "one")]
+    assert reports[0] == reports[1]
+    assert reports[0].startswith("# Design space")
     assert tables(folder / "all") == tables(folder / "one")
     assert len(tables(folder / "all")) == 2
     again = call("sweep", "sweep.yaml", "--executor", "serial", "-o", "all")
@@ -51,6 +58,29 @@ def test_a_gap(call: Any, folder: Path, shard: Any) -> None:
     assert result.exit_code == ExitCode.USAGE
     assert "lack designs 4 to 7" in result.stderr
     assert not tables(folder / "all")
+
+
+def test_a_part_under_the_name_of_other_designs(call: Any, folder: Path, shard: Any) -> None:
+    shards = shard(1, 2, 3)
+    first = next((folder / "s1").glob(".parts/*/0000000000-*.part"))
+    first.rename(first.with_name(first.name.replace("0000000000-", "0000000001-")))
+    result = call("merge", *shards, "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "part is damaged, or of another sweep" in result.stderr
+    assert not tables(folder / "all")
+
+
+def test_a_description_without_its_designs(call: Any, folder: Path, shard: Any) -> None:
+    (shard_folder,) = shard(1)
+    (path,) = (folder / shard_folder).glob(".parts/*/sweep.json")
+    said = json.loads(path.read_text())
+    del said["dpg.designs"]
+    said["dpg.fingerprint"] = fingerprint(said)
+    path.write_text(json.dumps(said))
+    path.parent.rename(path.parent.with_name(said["dpg.fingerprint"][:16]))
+    result = call("merge", shard_folder, "-o", "all")
+    assert result.exit_code == ExitCode.USAGE
+    assert "sweep.json is damaged: run its sweep again" in result.stderr
 
 
 def test_an_overlap(call: Any, folder: Path, shard: Any) -> None:
@@ -143,28 +173,6 @@ def test_the_shards_stay_as_they_are(call: Any, folder: Path, shard: Any) -> Non
     call("merge", *shards, "-o", "all")
     after = {p: p.read_bytes() for s in shards for p in (folder / s).rglob("*") if p.is_file()}
     assert after == before
-
-
-def test_the_facts_of_another_sweep_are_not_reported(call: Any, folder: Path, shard: Any) -> None:
-    one = ("sweep", "sweep.yaml", "-s", "finger.units=2", "--executor", "serial", "-o", "all")
-    assert call(*one).exit_code == ExitCode.DONE
-    result = call("merge", *shard(1, 2, 3), "-o", "all")
-    assert (result.exit_code, "The run" in result.stdout) == (ExitCode.DONE, False)
-    assert "all/run.json is not of the run that made these tables" in result.stderr
-
-
-@pytest.mark.parametrize("content", ["notes", "[1]", ""])
-def test_what_is_in_the_place_of_facts_is_found_before_the_work(
-    call: Any, folder: Path, shard: Any, content: str
-) -> None:
-    shards = shard(1, 2, 3)
-    (folder / "s1" / "run.json").write_text(content)
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    result = call("merge", *shards, "-o", "s1")
-    assert (result.exit_code, "s1/run.json" in result.stderr) == (ExitCode.USAGE, True)
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    (folder / "s1" / "run.json").unlink()
-    assert call("merge", *shards, "-o", "s1").exit_code == ExitCode.DONE
 
 
 def test_shards_stay_until_all_is_written(

@@ -1,12 +1,13 @@
 """Progress: a bar on a terminal, plain lines elsewhere, nothing where it is not wanted."""
 
 import io
+import time
 from collections.abc import Callable
 
 import pytest
 
 from dpgcli.cli import progress
-from dpgcli.cli.progress import ProgressLine
+from dpgcli.cli.progress import ProgressLine, under_way
 
 Line = Callable[..., tuple[ProgressLine, io.StringIO]]
 
@@ -73,3 +74,47 @@ def test_what_is_over_soon_needs_no_progress(line: Line, monkeypatch: pytest.Mon
     shown.show(500)
     shown.clear()
     assert terminal.getvalue() == ""
+
+
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_work_that_counts_nothing_says_that_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, stream: Callable[[], io.StringIO]
+) -> None:
+    monkeypatch.setattr(progress, "FIRST_SHOWN", 0.01)
+    monkeypatch.setattr(progress, "ELAPSED_PERIOD", 0.01)
+    shown = stream()
+    monkeypatch.setattr("sys.stderr", shown)
+
+    def wait_for(text: str) -> None:
+        end = time.monotonic() + 20.0
+        while text not in shown.getvalue():
+            assert time.monotonic() < end
+            time.sleep(0.005)
+
+    with pytest.raises(KeyError), under_way("a fit", quiet=False) as say_that:
+        wait_for("a fit, 0 s")
+        say_that("another")
+        wait_for("another, 0 s")
+        raise KeyError
+    said = shown.getvalue()
+    assert said.endswith(" \r" if shown.isatty() else "\n"), "on a terminal the line is erased"
+    time.sleep(0.05)
+    assert shown.getvalue() == said, "it ends with the work"
+
+
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_quiet_work_and_work_that_is_soon_over_say_nothing(
+    monkeypatch: pytest.MonkeyPatch, stream: Callable[[], io.StringIO]
+) -> None:
+    shown = stream()
+    monkeypatch.setattr("sys.stderr", shown)
+    with under_way("a fit", quiet=False):
+        pass
+    monkeypatch.setattr(progress, "FIRST_SHOWN", 0.001)
+    with under_way("a fit", quiet=True):
+        time.sleep(0.05)
+    assert shown.getvalue().strip() == ""
+
+
+def test_the_first_word_comes_within_two_seconds() -> None:
+    assert progress.FIRST_SHOWN <= 1.0

@@ -203,3 +203,13 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_else(
     assert (folder / name).read_bytes() == b"old"
     assert [p.name for p in folder.glob("*states*")] == [name]
     assert not list(folder.glob(".states*"))
+
+
+def test_ctrl_c_while_typer_is_at_work_is_said() -> None:
+    """It makes an exit code of the interrupt, without a word."""
+    program = (
+        "import os, signal, typer; from dpgcli.cli.exits import run_and_exit; app = typer.Typer(); "
+        "app.command()(lambda: os.kill(os.getpid(), signal.SIGINT)); run_and_exit(app)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.split(";")[0]) == (130, "dpg: interrupted")

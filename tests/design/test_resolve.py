@@ -1,5 +1,6 @@
 """Designs become lattices: many at once as each by itself, differentiable, wrong ones masked."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -206,3 +207,13 @@ def test_a_key_can_have_the_values_that_a_spec_takes(section: Any, needed: Any) 
         every = np.append(values, np.inf)
         assert are_possible(key, every).tolist() == [takes(key, v) for v in every.tolist()], key
     assert numbers
+
+
+def test_assumed_bars_count_as_given() -> None:
+    """They are the gravest assumption by name, and the one that matters least."""
+    base = DESIGNS["published"]
+    for bars, origin in ((None, "assumed"), (np.array([1e4]), "given")):
+        found = resolve(replace(base, linear_stiffness=bars))
+        ((_, value),) = found.values["linear_stiffness_N_per_mm"]
+        assert (ORIGINS[value.origin.item()], value.numbers.item()) == (origin, 1e4)
+        assert [ORIGINS[place].value for place in found.gravest_origins] == ["calibrated"]

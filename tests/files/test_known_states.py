@@ -16,7 +16,6 @@ push2_N,pattern,tip_x_mm,tip_y_mm,chamber2_angle_rad,chamber3_angle_rad,opening1
 1.1,01,27,-3,-0.002,-0.26,0.03,3.4,0.1,23.5
 0.2,10,26,-6,-0.25,-0.27,3.5,0.04,1.2,
 """
-SEMICOLONS = '1: header: expected columns separated by commas, found ";" (and write decimal points)'
 HEAD = "pattern,x_mm,y_mm\n"
 SHAPES = """\
 pattern,x_mm,y_mm
@@ -133,12 +132,8 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
             ["header: expected a column pattern, found patern, tip_x_mm, tip_y_mm (is it patern?)"],
         ),
         (
-            "pattern;tip_x_mm;tip_y_mm\n10;1,5;2\n",
-            [SEMICOLONS],
-        ),
-        (
-            "pattern;tip_x_mm;tip_y_mm\n10;1;2\n",
-            [SEMICOLONS],
+            "pattern;tip_x_mm;tip_y_mm\n10;1.5;2\n01;1,5;2\n",
+            ['3: tip_x_mm: expected a number, found "1,5" (write a decimal point)'],
         ),
         ("pattern\n10\n", [f"header: expected a column {TIPS}, found pattern"]),
         (

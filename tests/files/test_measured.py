@@ -116,10 +116,7 @@ def test_windows_line_ends(path: Path) -> None:
             "travel_mm,pole_travel_mm,force_N\n0,0,0\n",
             "header: expected one of pole_travel_mm, travel_mm, found pole_travel_mm and travel_mm",
         ),
-        (
-            "travel_mm;energy_mJ\n0;1\n",
-            '1: header: expected columns separated by commas, found ";" (and write decimal points)',
-        ),
+        ("travel_mm;energy_mJ\n0;1\n1.5;2;5\n", "3: row: expected 2 cells, found 3"),
         (
             "travel_mm,energy_mJ,energy_mJ\n0,1,1\n",
             '1: header: expected each column once, found "energy_mJ" again',
@@ -143,7 +140,8 @@ def test_windows_line_ends(path: Path) -> None:
         (GOOD + "\uff11\uff14,1\n", '5: travel_mm: expected a number, found "\uff11\uff14"'),
         (
             "travel_mm,energy_mJ\n0,0\n-1,20\n-13,68\n",
-            "travel_mm: expected travels that are positive towards inversion, found -13 to 0",
+            "travel_mm: expected travels that are positive towards inversion, found -13 to 0 "
+            "(column travel_mm=-travel_mm reverses it)",
         ),
     ],
 )

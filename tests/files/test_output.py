@@ -1,5 +1,6 @@
 """Files appear whole or not at all."""
 
+import errno
 import os
 import stat
 from pathlib import Path
@@ -304,3 +305,56 @@ def test_outputs_have_names_of_their_own(tmp_path: Path) -> None:
         check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (plot, Mark.FIGURE))
     check_outputs((), (table, Mark.TABLE), (None, Mark.FACTS), (None, Mark.FIGURE))
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("code", [errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP])
+@pytest.mark.parametrize("name", ["fchmod", "fchown", "fsync"])
+@pytest.mark.parametrize("old", [b"", None], ids=["replaced", "new"])
+def test_what_a_file_system_cannot_do_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, old: bytes | None
+) -> None:
+    """Windows drives in WSL have no permissions; some network drives no answer to fsync."""
+    called = []
+
+    def refused(*_: object) -> None:
+        called.append(name)
+        raise OSError(code, os.strerror(code))
+
+    path = tmp_path / "table.txt"
+    if old is not None:
+        path.write_bytes(old)
+    monkeypatch.setattr(os, name, refused)
+    check_writable(path)
+    with whole_file(path) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == "new"
+    assert called or (name == "fchown" and old is None)
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.ENOSPC, errno.EDQUOT])
+def test_what_may_be_lost_is_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    def lost(_: int) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, "fsync", lost)
+    with pytest.raises(OutputError), whole_file(tmp_path / "table.txt") as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert names(tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_listed_takes_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = os.open
+
+    def refused(path: Path, flags: int, *mode: int) -> int:
+        if Path(path) == tmp_path:
+            raise PermissionError(errno.EACCES, "no")
+        return opened(path, flags, *mode)
+
+    monkeypatch.setattr(os, "open", refused)
+    with whole_file(tmp_path / "table.txt") as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert names(tmp_path) == ["table.txt"]

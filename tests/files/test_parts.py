@@ -1,14 +1,15 @@
 """Parts of a sweep: whole or not there, whatever happens to who writes them."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
+import pyarrow as pa
 import pytest
 
-from dpgcli.files.parts import PartStore, write_part
-from dpgcli.files.table_writer import record_batch, schema
+from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint, write_part
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.states.columns import Column, Group, Kind
 
 
@@ -37,7 +38,17 @@ def test_a_part_that_is_there_is_made_again(tmp_path: Path) -> None:
     assert part.read_bytes() == b"whole"
 
 
-def test_a_part_is_a_parquet_file_whose_blocks_come_back_one_by_one(tmp_path: Path) -> None:
+def test_a_part_within_another_is_not_needed(tmp_path: Path) -> None:
+    """As of a chunk that was halved though a worker had stored it before it was killed."""
+    store = PartStore(tmp_path)
+    for start, stop in ((8, 12), (0, 4), (0, 8), (4, 8), (10, 14)):
+        with store.part(start, stop) as file:
+            file.write(b"whole")
+    assert [(part.start, part.stop) for part in store.parts()] == [(0, 8), (8, 12), (10, 14)]
+    assert store.missing([(0, 16)]) == [(14, 16)]
+
+
+def test_a_part_is_an_arrow_file_whose_blocks_come_back_one_by_one(tmp_path: Path) -> None:
     """As few at a time in memory as when they were made, with units and descriptions."""
     states = (
         Column("x_mm", "mm", "place", Group.STATES, Kind.NUMBER),
@@ -51,7 +62,8 @@ def test_a_part_is_a_parquet_file_whose_blocks_come_back_one_by_one(tmp_path: Pa
     with PartStore(tmp_path).part(0, 3) as file:
         assert write_part(file, states, designs, blocks) == 5
     (part,) = PartStore(tmp_path).parts()
-    assert pq.read_table(part.path).num_rows == len(blocks)
+    with part.path.open("rb") as stream:
+        assert pa.ipc.open_file(stream).read_all().num_rows == len(blocks)
     assert part.schema(0).equals(schema(states), check_metadata=True)
     for which, columns in enumerate((states, designs)):
         found = list(part.batches(which))
@@ -60,3 +72,32 @@ def test_a_part_is_a_parquet_file_whose_blocks_come_back_one_by_one(tmp_path: Pa
         ]
         for batch, block in zip(found, blocks, strict=True):
             assert batch.equals(record_batch(columns, block[which]), check_metadata=True)
+
+
+def test_a_part_of_other_designs_is_none(tmp_path: Path) -> None:
+    """Its range is what says which designs are there, and which are missing."""
+    store = PartStore(tmp_path)
+    with store.part(0, 4) as file:
+        file.write(b"whole")
+    (part,) = store.parts()
+    assert not part.is_damaged
+    part.path.rename(part.path.with_name(part.path.name.replace("0000000000-", "0000000001-")))
+    assert [part.start for part in store.damaged()] == [1]
+
+
+@pytest.mark.parametrize(
+    "said", [{}, {"dpg.designs": "0"}, {"dpg.designs": 3}, {"dpg.designs": "3", "dpg.x": 1}, [1]]
+)
+def test_a_description_by_hand_is_none(tmp_path: Path, said: Any) -> None:
+    """Also one whose fingerprint is right."""
+    if isinstance(said, dict):
+        said = {**said, FINGERPRINT: fingerprint(said)}
+    (tmp_path / SAID).write_text(json.dumps(said))
+    assert PartStore(tmp_path).said() == {}
+
+
+def test_a_description_with_its_designs_is_one(tmp_path: Path) -> None:
+    said = {"dpg.designs": "3"}
+    said |= {FINGERPRINT: fingerprint(said)}
+    (tmp_path / SAID).write_text(json.dumps(said))
+    assert PartStore(tmp_path).said() == said

@@ -12,9 +12,10 @@ import pytest
 
 from dpgcli.errors import UsageError
 from dpgcli.files import table_writer
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.seal import HEAD, KEY, UNSEALED, is_whole, is_whole_in
 from dpgcli.files.table_reader import read_designs, read_undamaged
-from dpgcli.files.table_writer import record_batch, schema, write_table
+from dpgcli.files.table_writer import write_table
 from dpgcli.states.columns import Column, Group, Kind
 
 N_FLIPS = 1500

@@ -9,8 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dpgcli.files.prediction import write_states
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import canonical_json, read_spec, scene_of
-from dpgcli.files.table_writer import record_batch, schema, write_states, write_table
+from dpgcli.files.table_writer import write_table
 from dpgcli.states.columns import Column, Group
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
@@ -48,7 +50,7 @@ def test_metadata_says_what_it_was_made_from(tmp_path: Path) -> None:
     spec = json.loads(facts["dpg.spec"])
     assert spec["finger"]["units"] == 3
     assert facts["dpg.spec_sha256"] == hashlib.sha256(facts["dpg.spec"].encode()).hexdigest()
-    assert set(json.loads(facts["dpg.versions"])) == {"dpg", "numpy", "pyarrow"}
+    assert set(json.loads(facts["dpg.versions"])) == {"dpg", "numpy", "scipy", "shapely", "pyarrow"}
     assert json.loads(facts["dpg.patterns"]) == ["1*"]
     assert float(facts["dpg.tolerance"]) == 1e-11
     assert facts["dpg.formulation"] == "chain"

@@ -162,6 +162,20 @@ def workflow() -> dict[str, Any]:
     return loaded
 
 
+@pytest.mark.parametrize("job", ["sweep", "gate"])
+def test_the_workflow_installs_dpg_wherever_it_was_copied_to(tmp_path: Path, job: str) -> None:
+    """`pip install .` in a repository with specs installs something else, or nothing."""
+    steps = [step["run"] for step in workflow()["jobs"][job]["steps"] if "run" in step]
+    guard, install = steps[:2]
+    assert (install, workflow()["env"]["DPG"]) == ('pip install "$DPG"', ".")
+    assert shell(guard, ROOT, ROOT, DPG=".").returncode == 0
+    refused = shell(guard, ROOT, tmp_path, DPG=".")
+    assert (refused.returncode, refused.stdout[:9]) == (2, "::error::")
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "gripper-study"\n')
+    assert shell(guard, ROOT, tmp_path, DPG=".").returncode == 2
+    assert shell(guard, ROOT, tmp_path, DPG="git+https://example.org/dpg").returncode == 0
+
+
 def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
     jobs, sweep = workflow()["jobs"], workflow()["env"]["SWEEP"]
     summary = checkout / "summary.md"
@@ -175,6 +189,7 @@ def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
     for step in steps:
         if not step.startswith("pip "):
             env = {"SWEEP": sweep, "GITHUB_STEP_SUMMARY": str(summary), "GITHUB_ACTIONS": "true"}
+            env["DPG"] = "git+https://example.org/dpg"
             result = shell(step, checkout, checkout, **env)
             assert result.returncode == 0, (step, result.stderr)
     assert "|" in summary.read_text(encoding="utf-8")

@@ -9,10 +9,10 @@ import pytest
 from dpgcli.reports.precision import cheapest_way, draw_precision, text_figure
 
 
-def row(way: str, error: float, seconds: float, group: str = "ladder") -> dict[str, Any]:
+def row(method: str, error: float, seconds: float, group: str = "ladder") -> dict[str, Any]:
     return {
         "group": group,
-        "way": way,
+        "method": method,
         "n_states": 10,
         "n_missing": 0,
         "max_tip_error_mm": error,
@@ -34,9 +34,9 @@ ROWS = [
 def test_the_cheapest_way_that_is_exact_enough() -> None:
     assert cheapest_way(ROWS, 0.1).startswith("cheapest below 0.1 mm: rough, 1 µs a state")
     assert cheapest_way(ROWS, 1e-3).startswith("cheapest below 0.001 mm: fine, 10 µs a state")
-    assert cheapest_way(ROWS, 1e-15) == "no way is below 1e-15 mm"
+    assert cheapest_way(ROWS, 1e-15) == "no method is below 1e-15 mm"
     incomplete = [{**ROWS[0], "n_missing": 1}]
-    assert cheapest_way(incomplete, 1.0) == "no way is below 1 mm"
+    assert cheapest_way(incomplete, 1.0) == "no method is below 1 mm"
 
 
 def test_places_in_the_text_figure() -> None:

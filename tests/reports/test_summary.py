@@ -1,5 +1,6 @@
 """The summary of a space, line by line, and the same as a page."""
 
+import json
 import re
 import sys
 import xml.etree.ElementTree as ET
@@ -14,8 +15,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dpgcli.reports.page import _html, _markdown, html, markdown, verdicts_markdown
-from dpgcli.reports.summary import Section, Table
+from dpgcli.arrays import Columns
+from dpgcli.reports.page import _html, _markdown, verdicts_markdown
+from dpgcli.reports.page import html as html_of
+from dpgcli.reports.page import markdown as markdown_of
+from dpgcli.reports.summary import DesignSpace, Section, Table, in_short
 from dpgcli.sweeps.gate import check_requirements, requirement
 from dpgcli.text import printable
 
@@ -26,6 +30,7 @@ UNITS = {
     "aperture_min_mm": "mm",
     "max_residual_N": "N",
 }
+KINDS = dict.fromkeys(("calibration", "status", "reason"), object)
 
 
 def space(**changes: Any) -> pd.DataFrame:
@@ -53,11 +58,24 @@ def space(**changes: Any) -> pd.DataFrame:
     return designs
 
 
-def section(title: str, designs: pd.DataFrame | None = None, facts: Any = None) -> list[str]:
+def columns(designs: pd.DataFrame) -> Columns:
+    """As they are read from a table."""
+    return {name: np.array(designs[name].tolist(), KINDS.get(name)) for name in designs}
+
+
+def markdown(designs: pd.DataFrame, **metadata: str) -> str:
+    return markdown_of(DesignSpace(columns(designs), UNITS, metadata))
+
+
+def html(designs: pd.DataFrame, **metadata: str) -> str:
+    return html_of(DesignSpace(columns(designs), UNITS, metadata))
+
+
+def section(title: str, designs: pd.DataFrame | None = None) -> list[str]:
     """Lines of a section that are not empty."""
-    page = markdown(space() if designs is None else designs, UNITS, facts)
-    found = re.search(rf"^##? {title}\n(.*?)(?=^#|\Z)", page, re.MULTILINE | re.DOTALL)
-    assert found, page
+    text = markdown(space() if designs is None else designs)
+    found = re.search(rf"^##? {title}\n(.*?)(?=^#|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert found, text
     return [line for line in found[1].splitlines() if line]
 
 
@@ -165,35 +183,16 @@ def test_the_largest_numerical_error() -> None:
     assert section("Largest numerical error")[2:] == [row]
 
 
-def test_facts_of_the_run_and_nothing_without_them() -> None:
-    facts = {
-        "seconds": 1.23456789,
-        "states_per_second": 98765.4321,
-        "failed_designs": [],
-        "host": "a|b",
-        "command": ["dpg", "sweep", "a b.yaml"],
-    }
-    assert section("The run", facts=facts)[2:] == [
-        "| seconds | 1.2346 s |",
-        "| states per second | 98765/s |",
-        "| failed designs | none |",
-        "| host | a\\|b |",
-        "| command | dpg sweep 'a b.yaml' |",
-    ]
-    assert "The run" not in markdown(space(), UNITS, None)
-
-
-@pytest.mark.parametrize("facts", [None, {}])
-def test_an_empty_table_has_a_summary(facts: Any) -> None:
-    assert markdown(space().head(0), UNITS, facts) == "# Design space\n\n0 designs.\n"
-    assert "0 designs." in html(space().head(0), UNITS, facts)
+def test_an_empty_table_has_a_summary() -> None:
+    assert markdown(space().head(0)) == "# Design space\n\n0 designs.\n"
+    assert "0 designs." in html(space().head(0))
 
 
 def test_nothing_of_a_cell_is_taken_for_markup() -> None:
     designs = space()
     designs.loc[0, "reason"] = "a <b>|*`c`\n[d](e)"
-    assert r"| a \<b\>\|\*\`c\` \[d\](e) |" in markdown(designs, UNITS, None)
-    assert "a &lt;b&gt;|*`c`" in html(designs, UNITS, None)
+    assert r"| a \<b\>\|\*\`c\` \[d\](e) |" in markdown(designs)
+    assert "a &lt;b&gt;|*`c`" in html(designs)
 
 
 class Cells(HTMLParser):
@@ -223,14 +222,14 @@ class Cells(HTMLParser):
 
 
 def test_the_page_has_the_same_cells_and_needs_no_other_file() -> None:
-    page = html(space(), UNITS, {"seconds": 2.0})
+    page = html(space())
     reader = Cells()
     reader.feed(page)
     assert reader.open == []
-    lines = markdown(space(), UNITS, {"seconds": 2.0}).splitlines()
+    lines = markdown(space()).splitlines()
     cells = [cell for line in lines if line[:2] == "| " for cell in line[2:-2].split(" | ")]
     assert reader.cells == [cell for cell in cells if cell != "---"]
-    assert (page.count("<h1>"), page.count("<h2>")) == (1, 7)
+    assert (page.count("<h1>"), page.count("<h2>")) == (1, 6)
     assert "prefers-color-scheme: dark" in page
     assert not re.search(r"url\((?!#)|@import|<script|<link", page)
 
@@ -249,14 +248,14 @@ def test_whatever_a_cell_says_the_page_says_the_same(text: str) -> None:
 
 
 def svg_texts(designs: pd.DataFrame) -> list[str]:
-    page = html(designs, UNITS, None)
+    page = html(designs)
     root = ET.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
     return [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
 
 
 def test_figures_have_axes_with_units() -> None:
     texts = svg_texts(space())
-    assert texts.count("height (mm)") == texts.count("gap (mm)") == 1
+    assert texts.count("height (mm)") == texts.count("gap (mm)") == 2  # two maps
     assert texts.count("workspace area (mm²)") == 1
     assert "distinct tips" not in texts  # it does not vary
 
@@ -270,7 +269,7 @@ def test_points_off_a_grid_and_single_values_are_drawn_too() -> None:
 
 def test_many_points_are_drawn_as_pixels() -> None:
     many = pd.concat([space()] * 300, ignore_index=True)
-    page = html(many.assign(height_mm=np.linspace(1, 9, len(many))), UNITS, None)
+    page = html(many.assign(height_mm=np.linspace(1, 9, len(many))))
     assert 'href="data:image/png' in page
     assert len(page) < 300_000
     assert "One design in" not in page
@@ -279,19 +278,19 @@ def test_many_points_are_drawn_as_pixels() -> None:
 def test_of_too_many_points_some_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dpgcli.reports.maps.MOST_POINTS", 10)
     many = pd.concat([space()] * 5, ignore_index=True)
-    assert "One design in" not in html(many, UNITS, None)  # a grid is drawn whole
+    assert "One design in" not in html(many)  # a grid is drawn whole
     scattered = many.assign(height_mm=np.linspace(1, 9, len(many)))
-    assert "One design in 5 is drawn." in html(scattered, UNITS, None)
+    assert "One design in 5 is drawn." in html(scattered)
 
 
 def test_the_same_table_gives_the_same_page() -> None:
-    assert html(space(), UNITS, None) == html(space(), UNITS, None)
-    assert markdown(space(), UNITS, None) == markdown(space(), UNITS, None)
+    assert html(space()) == html(space())
+    assert markdown(space()) == markdown(space())
 
 
 def test_without_matplotlib_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    page = html(space(), UNITS, None)
+    page = html(space())
     assert "No figures: they need Matplotlib" in page
     assert "<svg" not in page
     assert "370.37 mm²" in page
@@ -299,9 +298,115 @@ def test_without_matplotlib_the_page_says_so(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_verdicts_in_markdown() -> None:
     rules = [requirement(text, ["gap_mm", "n_stable"]) for text in ("gap_mm < 9", "n_stable > 5")]
-    text = verdicts_markdown(check_requirements(space().tail(4), rules))
+    text = verdicts_markdown(check_requirements(columns(space().tail(4)), rules))
     assert text == (
         "# Requirements\n\nmet: gap\\_mm \\< 9: all 4 designs\n\n"
         "not met: n\\_stable \\> 5: 1 of 4 designs\n\n| first that fail |\n| --- |\n"
         "| design 4 (height\\_mm = 3, gap\\_mm = 1): n\\_stable = 5 |\n"
     ).replace("\\_", "_")
+
+
+BASE = {
+    "dpg.base": "base.yaml",
+    "dpg.law": "published law",
+    "dpg.sweep": json.dumps(
+        {
+            "base": json.dumps(
+                {
+                    "finger": {
+                        "units": 3,
+                        "calibration": [{"file": "dome.yaml", "values": {}}, "published"],
+                        "geometry": {"elastic_modulus_MPa": 26.0},
+                    }
+                }
+            )
+        }
+    ),
+}
+
+
+def test_base_law_and_calibration_are_named() -> None:
+    lines = markdown(space(), **BASE).splitlines()
+    assert "Base spec: base.yaml (units 3, elastic_modulus_MPa 26)." in lines
+    assert "Law: published law. Calibration: dome.yaml, published." in lines
+    for wrong in ("", "{", "[]", '{"base": 1}', '{"base": "[1]"}', '{"base": "{}"}'):
+        assert "Base spec" not in markdown(space(), **{**BASE, "dpg.sweep": wrong})
+
+
+def test_the_best_designs_come_first_then_the_figures() -> None:
+    titles = re.findall(r"<h2>([^<]*)", html(space()))
+    assert titles[:3] == ["Best and worst designs", "Figures", "Designs by status and calibration"]
+    assert re.findall(r"^## (.*)", markdown(space()), re.MULTILINE)[0] == titles[0]
+
+
+def with_bars(stiffest: Any, **more: Any) -> pd.DataFrame:
+    return space(n_units=np.full(8, 4), stiffness_max_N_per_mm=stiffest, **more)
+
+
+@pytest.mark.parametrize(
+    ("given", "alone"),
+    [(None, 2500.0), (4000.0, 1000.0), (".inf", None), ("dome.yaml", 100.0)],
+)
+def test_a_stiffness_that_only_shows_the_bars_is_not_ranked(given: Any, alone: Any) -> None:
+    """k_L/n of 4 units: assumed, given, or from a calibration; of rigid bars there is none."""
+    finger: dict[str, Any] = {"units": 4, "calibration": "published"}
+    if given == "dome.yaml":
+        bars = {"linear_stiffness_N_per_mm": {"value": 400.0}}
+        finger["calibration"] = [{"file": given, "values": bars}]
+    elif given is not None:
+        finger["linear_stiffness_N_per_mm"] = given
+    said = {"dpg.sweep": json.dumps({"base": json.dumps({"finger": finger})})}
+    growing = np.linspace(1.0, 1.0005, 8) * (alone or 2500.0)
+    text = markdown(with_bars(growing), **said)
+    assert ("| stiffness_max_N_per_mm | best |" in text) == (alone is None)
+    assert ("is not ranked for any design: it is that of the straight" in text) == bool(alone)
+    assert ("stiffness max" in html(with_bars(growing), **said)) == (alone is None)
+    if alone:
+        softer = growing * np.where(np.isin(np.arange(8), (2, 4)), 0.5, 1.0)
+        assert "| stiffness_max_N_per_mm | best | " in markdown(with_bars(softer), **said)
+        assert "is not ranked for 3 designs" in markdown(with_bars(softer), **said)
+
+
+def test_bars_that_vary_are_judged_design_by_design() -> None:
+    bars = np.linspace(1e3, 1e4, 8)
+    designs = with_bars(bars / 4.0)
+    designs.insert(3, "linear_stiffness_N_per_mm", bars)
+    assert "is not ranked for any design" in markdown(designs, **BASE)
+
+
+def test_a_table_that_says_nothing_of_its_base_is_ranked_as_it_is() -> None:
+    assert "| stiffness_max_N_per_mm | best |" in markdown(with_bars(np.linspace(2500, 2501, 8)))
+
+
+@pytest.mark.parametrize("metric", ["aperture_min_mm", "reach_min_mm", "n_stable"])
+def test_every_metric_that_varies_has_a_map(metric: str) -> None:
+    texts = svg_texts(space(**{metric: np.arange(1, 9)}))
+    words = {"aperture_min_mm": "aperture min (mm)", "n_stable": "stable"}
+    assert words.get(metric, "reach min mm") in texts
+    constant = space(**{metric: np.full(8, 8)})
+    constant.loc[4, "status"] = "stable"
+    constant["n_stable"] = 8
+    assert words.get(metric, "reach min mm") not in svg_texts(constant)
+
+
+def test_a_map_over_hidden_axes_says_what_it_shows() -> None:
+    """Of designs that share a place the best one: the largest, or the one nearest zero."""
+    both = pd.concat([space(), space()], ignore_index=True)
+    both.insert(3, "width_mm", np.repeat([1.0, 2.0], 8))
+    both["aperture_min_mm"] = np.tile([np.arange(8) - 3.0], 2)[0] * np.repeat([2.0, 1.0], 8)
+    page = html(both)
+    assert "A place stands for all designs there, of every width mm 1 … 2" in page
+    texts = svg_texts(both)
+    assert "workspace area (mm²), largest over width mm" in texts
+    assert "aperture min (mm), nearest zero over width mm" in texts
+    assert not [text for text in svg_texts(space()) if "over" in text]
+
+
+def test_in_short_there_are_counts_and_the_best_and_the_worst() -> None:
+    line, table = in_short(DesignSpace(columns(space()), UNITS))
+    assert line == "8 designs: 4 stable, 1 partly_stable, 3 invalid"
+    rows = {row[0]: list(row[1:]) for row in table.rows}
+    assert rows["workspace_area_mm2"] == ["370.37 mm²", "6", "123.46 mm²", "2 and 1 more"]
+    assert rows["n_distinct_tips"] == ["8", "2 and 4 more", "all alike", ""]
+    assert {len(row) for row in table.rows} == {5}
+    assert in_short(DesignSpace(columns(space().head(0)), UNITS))[0] == "0 designs: none"

@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 
 import dpgcli
+from dpgcli.code import versions_of_libraries
 from dpgcli.errors import UsageError, WorkplaceError
+from dpgcli.files import table_writer
 from dpgcli.studies import sweep as studies
-from dpgcli.sweeps.executors import Backend, processes, serial
-from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, Maker, check_workers, code_of
+from dpgcli.sweeps.executors import Backend, serial
+from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, check_workers, code_of
+from dpgcli.sweeps.pool import processes
 
 PACKAGE = Path(dpgcli.__file__).parent
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7, 7.5]}"
@@ -77,6 +80,18 @@ def test_parts_of_other_code_are_refused_by_that_name(
     assert study(HEIGHTS).store.parts() == []
 
 
+@pytest.mark.parametrize("library", ["numpy", "scipy", "shapely"])
+def test_parts_of_another_library_are_refused_by_its_name(
+    study: Any, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
+    """Samples come from SciPy, curves too, and areas from Shapely."""
+    study(HEIGHTS).compute(serial(), lambda _: None)
+    others = {**versions_of_libraries(), library: "0.1"}
+    monkeypatch.setattr(table_writer, "versions_of_libraries", lambda: others)
+    with pytest.raises(UsageError, match=rf"differs in versions.{library}: "):
+        study(HEIGHTS).check_unfinished()
+
+
 def test_tables_of_other_code_are_not_up_to_date(
     study: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -104,8 +119,10 @@ def test_a_worker_of_other_code_evaluates_nothing(
 @pytest.mark.parametrize(
     ("answer", "named"),
     [
-        (Maker("0.0.1", HERE.numpy, HERE.code), "has dpg 0.0.1, NumPy"),
-        (HERE._replace(numpy="1.0"), "NumPy 1.0, code"),
+        (HERE._replace(dpg="0.0.1"), "has dpg 0.0.1, NumPy"),
+        (HERE._replace(numpy="1.0"), "NumPy 1.0, SciPy"),
+        (HERE._replace(scipy="1.0"), "SciPy 1.0, Shapely"),
+        (HERE._replace(shapely="1.0"), "Shapely 1.0, code"),
         (OTHER, "code ffffffff, but"),
         (ModuleNotFoundError("No module named 'dpgcli'"), "No module named"),
     ],

@@ -12,8 +12,9 @@ import pytest
 from dpgcli.errors import UsageError
 from dpgcli.studies import sweep as studies
 from dpgcli.studies.sweep import Progress, Shard, Study, assemble, stores
-from dpgcli.sweeps.executors import Backend, processes, serial
+from dpgcli.sweeps.executors import Backend, serial
 from dpgcli.sweeps.extent import BYTES_PER_STATE
+from dpgcli.sweeps.pool import processes
 
 AXES = (
     "{key: finger.geometry.dome_height_mm, linear: {from: 2.5, to: 7, count: 19}}",

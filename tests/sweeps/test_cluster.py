@@ -1,10 +1,12 @@
 """Waiting for the workers of a cluster: a word in time, an end in time, and never too early."""
 
+import time
+
 import pytest
 
-from dpgcli.errors import NoWorkerError
+from dpgcli.errors import NoWorkerError, UsageError
 from dpgcli.sweeps import cluster
-from dpgcli.sweeps.cluster import Watch
+from dpgcli.sweeps.cluster import Watch, check_address, dask_cluster
 
 
 class Scene:
@@ -59,3 +61,67 @@ def test_one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     scene.n_workers = 1
     scene.wait(12)
     assert scene.said == ["Dask: nothing from its worker for 10 s; waiting"]
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "tcp://127.0.0.1:8786",
+        "localhost:8786",
+        "tls://a.b-c:1/",
+        "tcp://[::1]:8786",
+        "wss://a:65535",
+    ],
+)
+def test_an_address_of_a_scheduler(address: str) -> None:
+    check_address(address)
+
+
+@pytest.mark.parametrize(
+    ("address", "form"),
+    [
+        ("localhost", "tcp://host:port, such as tcp://localhost:8786"),
+        ("tcp://localhost", "tcp://host:port, such as tcp://localhost:8786"),
+        ("tls://node7", "tls://host:port, such as tls://node7:8786"),
+        ("http://localhost:8787", "tcp://host:port, such as tcp://localhost:8786"),
+        ("ucx://node7:8786", "tcp://host:port, such as tcp://node7:8786"),
+        ("tcp://localhost:0", "tcp://host:port, such as tcp://localhost:8786"),
+        ("tcp://localhost:65536", "tcp://host:port, such as tcp://localhost:8786"),
+        ("localhost:8787/status", "tcp://host:port"),
+        ("tcp://:8786", "tcp://host:port"),
+        ("two words:8786", "tcp://host:port"),
+        ("", "tcp://host:port"),
+    ],
+)
+def test_what_is_none_is_told_the_form_that_works(address: str, form: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        check_address(address)
+    assert str(refused.value) == f"scheduler {address}: expected {form}"
+
+
+@pytest.mark.parametrize("scheme", ["tls", "wss"])
+def test_secret_schemes_need_keys(monkeypatch: pytest.MonkeyPatch, scheme: str) -> None:
+    pytest.importorskip("distributed")
+    began = time.monotonic()
+    with pytest.raises(
+        UsageError, match="expected keys of Dask in DASK_DISTRIBUTED__COMM__TLS__CA"
+    ):
+        dask_cluster(f"{scheme}://127.0.0.1:8786", 1.0, print)
+    import dask
+
+    names = ("ca-file", "client.cert", "client.key")
+    keys = {f"distributed.comm.tls.{name}": "/nowhere/k.pem" for name in names}
+    with (
+        dask.config.set(keys),
+        pytest.raises(UsageError, match=r"Dask's keys: .*No such file"),
+    ):
+        dask_cluster(f"{scheme}://127.0.0.1:8786", 1.0, print)
+    assert time.monotonic() - began < cluster.PATIENCE, "nothing was waited for"
+
+
+def test_a_host_without_an_address_is_not_waited_for() -> None:
+    pytest.importorskip("distributed")
+    began = time.monotonic()
+    with pytest.raises(OSError, match=r"\[Errno"):
+        dask_cluster("tcp://nohost.invalid:8786", 1.0, print)
+    assert time.monotonic() - began < cluster.PATIENCE

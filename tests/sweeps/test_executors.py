@@ -1,5 +1,6 @@
 """Chunks at a workplace: every case once, whatever dies."""
 
+import errno
 import importlib
 import os
 import resource
@@ -18,15 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.errors import WorkplaceError
-from dpgcli.sweeps.executors import (
-    Backend,
-    Chunk,
-    Runner,
-    chunked,
-    process_pool,
-    processes,
-    serial,
-)
+from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked, serial
+from dpgcli.sweeps.pool import _own_temporary_folder, process_pool, processes
 
 
 @pytest.fixture
@@ -261,3 +255,38 @@ def test_a_system_that_allows_no_more_processes(deadly: Any, tmp_path: Path) -> 
             list(runner.run(chunked([(0, 12)], 3)))
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(errno.EROFS, "Read-only file system"),
+        PermissionError(errno.EACCES, "Permission denied"),
+        ImportError("This platform lacks a functioning sem_open implementation"),
+        NotImplementedError("system provides too few semaphores"),
+    ],
+)
+def test_a_system_without_semaphores_is_named(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("multiprocessing.synchronize._multiprocessing.SemLock", refused)
+    why = getattr(error, "strerror", None) or str(error)
+    with pytest.raises(WorkplaceError) as said:
+        processes(2).make(2)
+    assert str(said.value) == (
+        f"workers cannot be started: {why}, for semaphores (/dev/shm on Linux). "
+        "Without workers: jobs 1"
+    )
+
+
+def test_a_system_without_a_place_for_sockets_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> str:
+        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found")
+
+    _own_temporary_folder.cache_clear()
+    monkeypatch.setattr("tempfile.gettempdir", refused)
+    with pytest.raises(WorkplaceError, match=r"No usable temporary directory found\. Without work"):
+        processes(2).make(2)

@@ -15,7 +15,15 @@ from dpgcli.api.fits.result import (
     sizes,
     warned,
 )
-from dpgcli.api.inputs import as_texts, check_positive, check_resampling, chosen
+from dpgcli.api.inputs import (
+    Texts,
+    as_texts,
+    check_positive,
+    check_resampling,
+    chosen,
+    files_of,
+    table_choice,
+)
 from dpgcli.calibration import bistable
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity
@@ -38,7 +46,7 @@ def fit_bistable(
     travel_to_opening: str | Opening,
     quantity: str | None = None,
     area: float | None = None,
-    branches: str = "all",
+    branches: str | None = None,
     fix: Mapping[str, float] | None = None,
     free: str | Sequence[str] | None = None,
     geometry: GeometryInput = None,
@@ -47,13 +55,20 @@ def fit_bistable(
     loss_scale: float | None = None,
     bootstrap: int = 0,
     seed: int = 0,
+    column: Texts = (),
+    skip: int | None = None,
+    units: Texts = (),
 ) -> FitResult[BistableFit]:
     """Fit k_b, α and d of the bistable law to a dome's curve; see `calibration.bistable`.
 
     `curve` has `travel_mm` and any of `energy_mJ`, `force_N`, `pressure_MPa`; for pressure `area`
     is its effective area (mm²). `travel_to_opening` is "equal", "proportional:FACTOR" or
-    "stroke:MM". `fix` holds values by key; `free` names those that are fitted, by default all
-    others. Dimensions (`geometry`, or those of a `spec`) say where the values hold.
+    "stroke:MM". `branches` is "loading", "unloading", "both" or "quasi-static"; without it both are
+    fitted, unless they are two curves. `fix` holds values by key; `free` names those that are
+    fitted, by default all others. Dimensions (`geometry`, or those of a `spec`) say where the
+    values hold. Of a machine's export `column` has titles by our names ("-Extension" reverses
+    signs), `skip` is the number of lines above its table, `units` has units by quantity, such as
+    {"force": "kN"}.
     Raises SpecError for wrong data, UsageError for wrong choices, FitError for a fit that fails.
 
     >>> opening = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]  # of a law with k_b = 2 N/mm, α = 0, d = 2 mm
@@ -68,12 +83,12 @@ def fit_bistable(
     held = _held(fix or {}, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
-    measured = read_curve(curve, sizes(where))
+    measured = read_curve(curve, sizes(where), table_choice(column, skip, units))
     fitted_to = _quantity(measured.curve, quantity)
     choice = BistableOptions(
         opening,
         fitted_to,
-        is_quasi_static=chosen(Branches, "branches", branches) is Branches.QUASI_STATIC,
+        branches=None if branches is None else chosen(Branches, "branches", branches),
         area=_area(fitted_to, area),
         fixed=held,
         loss=chosen(Loss, "loss", loss),
@@ -83,7 +98,7 @@ def fit_bistable(
     )
     check_loss(choice.loss, loss_scale)
     found = bistable.fit_bistable(measured.curve, choice)
-    return _result(found, choice, where, measured, name_of(curve))
+    return _result(found, choice, where, measured, name_of(curve), files_of(curve, spec))
 
 
 def _result(
@@ -92,6 +107,7 @@ def _result(
     where: Geometry | None,
     measured: Measured,
     name: str,
+    files: tuple[Path, ...],
 ) -> FitResult[BistableFit]:
     source = DataFile(file=name, sha256=measured.sha256, rows=found.fit.n_points)
     return fit_result(
@@ -104,8 +120,9 @@ def _result(
         },
         value_rows(found.fit),
         partial(bistable_summary, found, choice),
-        warned(found.warnings, where, measured.ignored),
+        warned((*measured.notes, *found.warnings), where, measured.ignored),
         partial(draw_fit, bistable_figure(found, choice, name)),
+        files=files,
     )
 
 

@@ -12,21 +12,22 @@ from dpgcli.api.fits.result import (
     with_geometry,
 )
 from dpgcli.api.inputs import (
+    Place,
     Settings,
     SpecInput,
     as_texts,
     check_resampling,
     chosen,
-    point,
+    files_of,
+    frame_of,
     scene_input,
 )
-from dpgcli.calibration.choices import LEVER, Loss, Target
+from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted
+from dpgcli.files.calibration.results import finger_method, fitted, judged, quality_of
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
@@ -37,11 +38,11 @@ def fit_finger(
     spec: SpecInput,
     states: Tabular,
     *,
-    free: str | Sequence[str] = (LEVER,),
+    free: str | Sequence[str] = (FITTED_BY_DEFAULT,),
     target: str = "tips",
     settings: Settings = (),
-    first_station: tuple[float, float] = (0.0, 0.0),
-    tip_offset: tuple[float, float] = (0.0, 0.0),
+    first_station: Place = None,
+    tip_offset: Place = None,
     geometry: GeometryInput = None,
     loss: str = "linear",
     loss_scale: float | None = None,
@@ -52,7 +53,8 @@ def fit_finger(
 
     `states` has `pattern`, `tip_x_mm` and `tip_y_mm` or `tip_angle_rad`; see
     `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
-    what the data call the tip, from the last node along the phalanx and to its left (mm).
+    what the data call the tip, from the last node along the phalanx and to its left (mm), unless
+    the data's header or the spec's section `data` says them.
     Raises SpecError for a wrong spec or data, UsageError for wrong choices, FitError for a fit
     that fails.
 
@@ -69,7 +71,7 @@ def fit_finger(
     weighted = chosen(Loss, "loss", loss)
     check_loss(weighted, loss_scale)
     met = chosen(Target, "target", target)
-    frame = Frame(point("first_station", first_station), point("tip_offset", tip_offset))
+    frame, _ = frame_of(given, known, first_station, tip_offset)
     keys = as_texts("free", free)
     if not keys:
         raise UsageError(Field("free"), ": expected one key or more")
@@ -82,6 +84,7 @@ def fit_finger(
         found,
         {
             **fitted(found, FINGER_UNITS[met], source, only_free=True),
+            "quality": judged(study, quality_of(found, FINGER_UNITS[met])),
             "method": finger_method(study, found, bootstrap, seed),
             "geometry": where,
         },
@@ -89,4 +92,5 @@ def fit_finger(
         partial(finger_summary, study, found),
         (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),
         partial(draw_fitted, study, found, name),
+        files=(*given.files, *files_of(states)),
     )

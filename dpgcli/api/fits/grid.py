@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.api.fits.result import FitResult, GeometryInput, fit_result, geometry_from, sizes
-from dpgcli.api.inputs import chosen, setting_texts
+from dpgcli.api.inputs import chosen, files_of, setting_texts
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.errors import Field, UsageError
@@ -57,6 +57,7 @@ def fit_grid(
         quantity_rows(law),
         partial(grid_summary, law, read),
         grid_doubts(law, read),
+        files=files_of(table, spec),
     )
 
 

@@ -13,7 +13,7 @@ from dpgcli.api.fits.result import (
     geometry_from,
     warned,
 )
-from dpgcli.api.inputs import check_resampling, chosen
+from dpgcli.api.inputs import Texts, check_resampling, chosen, files_of, table_choice
 from dpgcli.calibration import hinge
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.hinge import HingeFit
@@ -35,11 +35,15 @@ def fit_hinge(
     loss_scale: float | None = None,
     bootstrap: int = 0,
     seed: int = 0,
+    column: Texts = (),
+    skip: int | None = None,
+    units: Texts = (),
 ) -> FitResult[HingeFit]:
     """Fit k_θ (N mm/rad) to moments over rotations, and check that it is one number.
 
     `curve` has `moment_N_mm` and `rotation_rad`; `where`, "COLUMN=TEXT", chooses rows.
-    Dimensions (`geometry`, or those of a `spec`) say where the value holds.
+    Dimensions (`geometry`, or those of a `spec`) say where the value holds; `column`, `skip` and
+    `units` are those of `fit_bistable`.
     Raises SpecError for wrong data, UsageError for wrong choices, FitError for a fit that fails.
 
     >>> fit = fit_hinge({"moment_N_mm": [12.1, 24.2], "rotation_rad": [0.5, 1.0]})
@@ -48,7 +52,7 @@ def fit_hinge(
     """
     check_resampling(bootstrap, seed)
     at = geometry_from(geometry, spec)
-    data = read_moments(curve, where)
+    data = read_moments(curve, where, table_choice(column, skip, units))
     weighted = chosen(Loss, "loss", loss)
     check_loss(weighted, loss_scale)
     found = hinge.fit_hinge(
@@ -69,4 +73,5 @@ def fit_hinge(
         partial(hinge_summary, found),
         warned((*data.doubts, *found.fit.warnings), at, data.ignored),
         partial(draw_fit, hinge_figure(found, data, name_of(curve))),
+        files=files_of(curve, spec),
     )

@@ -11,6 +11,7 @@ from dpgcli.arrays import Columns
 from dpgcli.calibration.choices import Loss
 from dpgcli.errors import Field, Message, UsageError
 from dpgcli.files.calibration import Calibration, calibration_of, geometry_of, write_calibration
+from dpgcli.files.output import Mark, check_outputs
 from dpgcli.files.sections import Geometry
 from dpgcli.states.columns import Column
 
@@ -31,6 +32,7 @@ class FitResult(Generic[T]):
 
     `found` is the fit itself, `columns` and `rows` its values with their errors, `warnings` what
     a user should know. `summarized` says how good it is, `drawing`, where there is one, draws it.
+    `files` are those that the fit was made from.
     """
 
     found: T
@@ -40,6 +42,7 @@ class FitResult(Generic[T]):
     summarized: Callable[[], Iterable[str]]
     warnings: tuple[str, ...]
     drawing: Callable[[Path], None] | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:
@@ -60,9 +63,12 @@ class FitResult(Generic[T]):
     def save(self, path: str | Path) -> None:
         """Write the calibration to a YAML file, which a spec can name.
 
-        Raises OutputError where it cannot be written, or something else stands there.
+        Raises OutputError where it cannot be written, or something else stands there, UsageError
+        for a file that the fit was made from.
         """
-        write_calibration(path_of("path", path), self.calibration)
+        calibration = path_of("path", path)
+        check_outputs(self.files, (calibration, Mark.CALIBRATION))
+        write_calibration(calibration, self.calibration)
 
     def draw(self, path: str | Path) -> None:
         """Draw data, fit and residuals to a .svg or .png file; raises UsageError for a grid."""
@@ -84,10 +90,12 @@ def fit_result(
     summarized: Callable[[], Iterable[str]],
     warnings: Iterable[str],
     drawing: Callable[[Path], None] | None = None,
+    *,
+    files: tuple[Path, ...],
 ) -> FitResult[T]:
     """A result whose calibration has these sections and warnings."""
     calibration = calibration_of(sections)
-    result = FitResult(found, calibration, *rows, summarized, (), drawing)
+    result = FitResult(found, calibration, *rows, summarized, (), drawing, files)
     return result.with_warnings(warnings)
 
 

@@ -2,7 +2,7 @@
 
 import typer
 
-from dpgcli.cli.exits import command
+from dpgcli.cli.commands import add_command
 from dpgcli.cli.fit.bistable import bistable
 from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
@@ -14,4 +14,4 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for _function in (bistable, hinge, finger, grid):
-    app.command()(command(_function))
+    add_command(app, _function, "fit")

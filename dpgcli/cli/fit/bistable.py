@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from dpgcli.calibration.choices import LAW_KEYS, Branches, Loss, Quantity
+from dpgcli.cli.exits import say_problems
 from dpgcli.cli.fit.options import (
     Bootstrap,
+    ColumnTitles,
     GeometrySpec,
     GeometryValues,
     LossOption,
@@ -17,10 +19,15 @@ from dpgcli.cli.fit.options import (
     Plot,
     Printed,
     Seed,
+    Skip,
+    Units,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
+
+if TYPE_CHECKING:
+    from dpgcli.files.csv_file import Choice
 
 WHY_OPENING = """\
 --travel-to-opening is needed: a dome's travel u and the opening x of a unit, in which the law is
@@ -50,7 +57,11 @@ Area = Annotated[
     float | None, typer.Option("--area", metavar="MM2", help="Effective area, for pressure")
 ]
 BranchNames = Annotated[
-    Branches, typer.Option("--branches", help="All points, or slow stable pieces only")
+    Branches | None,
+    typer.Option(
+        "--branches",
+        help="Directions of travel, or slow pieces  [default: both, if they are alike]",
+    ),
 ]
 Fix = Annotated[
     list[str] | None, typer.Option("--fix", metavar="KEY=VALUE", help="Hold a value; repeatable")
@@ -67,9 +78,12 @@ def bistable(
     travel_to_opening: OpeningRule = None,
     quantity: QuantityName = None,
     area: Area = None,
-    branches: BranchNames = Branches.ALL,
+    branches: BranchNames = None,
     fix: Fix = None,
     free: Free = None,
+    column: ColumnTitles = None,
+    skip: Skip = None,
+    units: Units = None,
     geometry: GeometryValues = None,
     spec: GeometrySpec = None,
     loss: LossOption = Loss.LINEAR,
@@ -82,29 +96,48 @@ def bistable(
 ) -> None:
     """Fit k_b, alpha and d of the bistable law to a dome's curve."""
     from dpgcli.api.fits.bistable import fit_bistable
+    from dpgcli.api.inputs import table_choice
     from dpgcli.calibration.opening import Opening
-    from dpgcli.errors import UsageError
 
     if travel_to_opening is None:
-        raise UsageError(WHY_OPENING)
+        _ask(curve, geometry, spec, table_choice(column or (), skip, units or ()))
     opening, fixed = Opening.of(travel_to_opening), _fixed(fix or [])
     check_files((curve, spec), output, plot)
-    fit = fit_bistable(
-        curve,
-        travel_to_opening=opening,
-        quantity=quantity,
-        area=area,
-        branches=branches,
-        fix=fixed,
-        free=free,
-        geometry=geometry,
-        spec=spec,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-    )
+    with resampling(bootstrap, quiet=quiet):
+        fit = fit_bistable(
+            curve,
+            travel_to_opening=opening,
+            quantity=quantity,
+            area=area,
+            branches=branches,
+            fix=fixed,
+            free=free,
+            geometry=geometry,
+            spec=spec,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+            column=column or (),
+            skip=skip,
+            units=units or (),
+        )
     put_out(fit, output, plot, printed_as, quiet)
+
+
+def _ask(
+    curve: Path, geometry: Sequence[str] | None, spec: Path | None, choice: "Choice"
+) -> NoReturn:
+    """Ask for the rule, with all that is wrong with the data: one round of mistakes is enough."""
+    from dpgcli.api.fits.result import geometry_from, sizes
+    from dpgcli.errors import SpecError, UsageError
+    from dpgcli.files.measured import read_curve
+
+    try:
+        read_curve(curve, sizes(geometry_from(geometry, spec)), choice)
+    except SpecError as error:
+        say_problems(error)
+    raise UsageError(WHY_OPENING)
 
 
 def _fixed(texts: Sequence[str]) -> dict[str, float]:

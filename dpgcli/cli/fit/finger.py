@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.calibration.choices import LEVER, Loss, Target
+from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
 from dpgcli.cli.fit.options import (
     Bootstrap,
     GeometryValues,
@@ -16,7 +16,7 @@ from dpgcli.cli.fit.options import (
     Printed,
     Seed,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import FirstStation, Quiet, Settings, SpecPath, TipOffset, frame_of
 from dpgcli.cli.printing import Format
 
@@ -28,7 +28,9 @@ def finger(
     free: Annotated[
         list[str] | None,
         typer.Option(
-            "--free", metavar="KEY", help=f"Fit this value; repeatable  [default: {LEVER}]"
+            "--free",
+            metavar="KEY",
+            help=f"Fit this value; repeatable  [default: {FITTED_BY_DEFAULT}]",
         ),
     ] = None,
     target: Annotated[Target, typer.Option(help="What of the states to meet")] = Target.TIPS,
@@ -51,17 +53,18 @@ def finger(
     given = scene_input(spec, settings or ())
     check_files((data, *given.files), output, plot)
     frame = frame_of(first_station, tip_offset)
-    fit = fit_finger(
-        given,
-        data,
-        free=tuple(free or (LEVER,)),
-        target=target,
-        first_station=frame.first_station,
-        tip_offset=frame.tip,
-        geometry=geometry,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-    )
+    with resampling(bootstrap, quiet=quiet):
+        fit = fit_finger(
+            given,
+            data,
+            free=tuple(free or (FITTED_BY_DEFAULT,)),
+            target=target,
+            first_station=frame[0],
+            tip_offset=frame[1],
+            geometry=geometry,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+        )
     put_out(fit, output, plot, printed_as, quiet)

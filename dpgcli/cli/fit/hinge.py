@@ -8,6 +8,7 @@ import typer
 from dpgcli.calibration.choices import Loss
 from dpgcli.cli.fit.options import (
     Bootstrap,
+    ColumnTitles,
     GeometrySpec,
     GeometryValues,
     LossOption,
@@ -16,8 +17,10 @@ from dpgcli.cli.fit.options import (
     Plot,
     Printed,
     Seed,
+    Skip,
+    Units,
 )
-from dpgcli.cli.fit.output import check_files, put_out
+from dpgcli.cli.fit.output import check_files, put_out, resampling
 from dpgcli.cli.options import Quiet
 from dpgcli.cli.printing import Format
 
@@ -31,6 +34,9 @@ def hinge(
         str | None,
         typer.Option("--where", metavar="COLUMN=TEXT", help="Only rows with this text"),
     ] = None,
+    column: ColumnTitles = None,
+    skip: Skip = None,
+    units: Units = None,
     geometry: GeometryValues = None,
     spec: GeometrySpec = None,
     loss: LossOption = Loss.LINEAR,
@@ -45,14 +51,18 @@ def hinge(
     from dpgcli.api.fits.hinge import fit_hinge
 
     check_files((curve, spec), output, plot)
-    fit = fit_hinge(
-        curve,
-        where=where,
-        geometry=geometry,
-        spec=spec,
-        loss=loss,
-        loss_scale=loss_scale,
-        bootstrap=bootstrap,
-        seed=seed,
-    )
+    with resampling(bootstrap, quiet=quiet):
+        fit = fit_hinge(
+            curve,
+            where=where,
+            geometry=geometry,
+            spec=spec,
+            loss=loss,
+            loss_scale=loss_scale,
+            bootstrap=bootstrap,
+            seed=seed,
+            column=column or (),
+            skip=skip,
+            units=units or (),
+        )
     put_out(fit, output, plot, printed_as, quiet)

@@ -2,11 +2,13 @@
 
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dpgcli.cli.options import check_plot
 from dpgcli.cli.printing import Format, print_rows
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.spelling import with_options
 from dpgcli.cli.streams import say
 
@@ -25,6 +27,11 @@ def check_files(sources: Sequence[Path | None], output: Path | None, plot: Path 
         check_plot(plot)
     read = [source for source in sources if source is not None]
     check_outputs(read, (output, Mark.CALIBRATION), (plot, Mark.FIGURE))
+
+
+def resampling(bootstrap: int, *, quiet: bool) -> AbstractContextManager[object]:
+    """Progress while one waits for many fits; one alone is over soon."""
+    return under_way(f"{bootstrap:,} fits of resampled points", quiet=quiet or not bootstrap)
 
 
 def put_out(

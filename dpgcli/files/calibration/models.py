@@ -66,6 +66,7 @@ class Values(Section):
     segment_height_mm: FittedPositive | None = None
     segment_length_mm: FittedPositive | None = None
     linear_stiffness_N_per_mm: FittedBars | None = None
+    wall_compliance_mm_per_N: FittedNotNegative | None = None
 
 
 Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -157,6 +158,19 @@ class Quality(Section):
     )
     rms_residual: Size | None = Field(default=None, description="a number >= 0")
     residual_unit: str | None = Field(default=None, description="a unit")
+    left_out_rms: Size | None = Field(
+        default=None, description="a number >= 0, relative to the deflection"
+    )
+    left_out_largest: Size | None = Field(
+        default=None, description="a number >= 0, relative to the deflection"
+    )
+
+    @property
+    def leave_one_out(self) -> tuple[float, float] | None:
+        """Root mean square and largest error of states, each predicted from the others."""
+        if self.left_out_rms is None or self.left_out_largest is None:
+            return None
+        return self.left_out_rms, self.left_out_largest
 
 
 class DataFile(Section):
@@ -198,6 +212,7 @@ class Calibration(Section):
             self.correlation,
             None if self.curve is None else self.curve.known,
             None if self.grid is None else self.grid.known,
+            None if self.quality is None else self.quality.leave_one_out,
         )
 
     @property

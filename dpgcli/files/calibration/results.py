@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.calibration.bistable import BistableFit, BistableOptions
-from dpgcli.calibration.choices import GridMethod, Quantity
+from dpgcli.calibration.choices import Branches, GridMethod, Quantity
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import GridLaw
@@ -35,6 +35,15 @@ def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) ->
     }
 
 
+def judged(study: FingerFit, quality: Quality) -> Quality:
+    """The quality of a finger's fit, with the errors of states predicted from the others."""
+    known = study.left_out[np.isfinite(study.left_out)]
+    if not len(known):
+        return quality
+    errors = {"left_out_rms": float(np.sqrt((known**2).mean())), "left_out_largest": known.max()}
+    return quality.model_copy(update={key: float(error) for key, error in errors.items()})
+
+
 def method_of(what: str, fit: Fit, resamples: int, seed: int) -> str:
     """The method of a fit in one line."""
     text = f"least squares on the {what}, {fit.loss} loss"
@@ -48,6 +57,8 @@ def bistable_method(found: BistableFit, choice: BistableOptions) -> str:
     text = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
     if choice.quantity is Quantity.PRESSURE:
         text += f", area {choice.area:g} mm2"
+    if choice.branches in (Branches.LOADING, Branches.UNLOADING):
+        text += f", {choice.branches} only"
     return text + (", quasi-static pieces" if choice.is_quasi_static else "")
 
 

@@ -13,7 +13,7 @@ from dpgcli.files.scene_file.problems import checked, checked_keys
 from dpgcli.files.scene_file.references import recalibrated, with_calibrations
 from dpgcli.files.scene_file.scenes import scene_of
 from dpgcli.files.scene_file.settings import changed, with_settings
-from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.files.yaml_file import FREE, Document, read_document
 
 __all__ = [
     "Spec",
@@ -68,7 +68,7 @@ def json_schema() -> dict[str, Any]:
     """The JSON Schema of a spec, for editors."""
     schema = Spec.model_json_schema()
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dpg spec"}
-    return {**schema, **head}
+    return {**schema, **head, "patternProperties": {f"^{FREE}": {}}}
 
 
 def canonical_json(spec: Spec) -> str:

@@ -8,31 +8,38 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
-from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, Design
+from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
-from dpgcli.files.calibration.models import Calibration
+from dpgcli.files.calibration.models import Bounded, Calibration
+from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
     BarStiffness,
     Geometry,
     Lattice,
+    NotNegative,
     Positive,
     Section,
     UnitGeometry,
     UnitLattice,
 )
 
-BARS: list[JsonValue] = [{"required": ["linear_stiffness_N_per_mm"]}, {"required": ["calibration"]}]
 Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
+
+
+WallCompliance = NotNegative | None
 
 
 class UnitOverride(Section):
     """Values of some units that differ from the finger's."""
 
+    wall_compliance_mm_per_N: WallCompliance = Field(
+        default=None, description="How far walls of these units give way, in mm/N."
+    )
     geometry: UnitGeometry | None = Field(default=None, description="Dimensions of these units.")
     lattice: UnitLattice | None = Field(default=None, description="Lattice values of these units.")
 
@@ -40,14 +47,18 @@ class UnitOverride(Section):
 class FingerSpec(Section):
     """One finger."""
 
-    model_config = ConfigDict(json_schema_extra={"anyOf": BARS})
-
     units: Annotated[int, Field(ge=1, le=MAX_UNITS)] = Field(
         description="Number of units, 1 to 64, counted from the base."
     )
     linear_stiffness_N_per_mm: BarStiffness | None = Field(
         default=None,
-        description="Stiffness k_L of every bar, in N/mm; .inf makes the bars rigid.",
+        description="Stiffness k_L of every bar, in N/mm: 1e4 unless given or calibrated; "
+        ".inf makes the bars rigid.",
+    )
+    wall_compliance_mm_per_N: WallCompliance = Field(
+        default=None,
+        description="How far the wall that a dome pushes against gives way, c_w in mm/N: 0, rigid "
+        "walls, unless given or calibrated.",
     )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,
@@ -85,11 +96,36 @@ class GripperSpec(Section):
     )
 
 
+Place = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
+
+
+class DataSpec(Section):
+    """Where the lattice lies in known states: the frame of data about this finger."""
+
+    first_station_mm: Place | None = Field(
+        default=None, description="The lattice's first node in the data, x and y in mm."
+    )
+    tip_offset_mm: Place | None = Field(
+        default=None,
+        description="The data's tip from the last node: along the end phalanx and to its left, "
+        "in mm.",
+    )
+
+
 class Spec(Section):
     """A finger, and the gripper made of two of them."""
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+    uncertainty: Tolerances | None = Field(
+        default=None, description="Standard uncertainties of values, as tolerances of the mold."
+    )
+    model_error: ModelErrorSpec = Field(
+        default=None,
+        description="Standard uncertainty of the model itself: a percentage of the deflection, or "
+        "leave_one_out, that of the calibration.",
+    )
+    data: DataSpec | None = Field(default=None, description="The frame of data about the finger.")
 
     @cached_property
     def resolution(self) -> Resolution:
@@ -101,6 +137,7 @@ class Spec(Section):
         """The spec as a batch of one design."""
         finger = self.finger
         bars = finger.linear_stiffness_N_per_mm
+        said = self.model_error
         return Design(
             finger.units,
             _section(finger),
@@ -109,13 +146,18 @@ class Spec(Section):
             finger.calibrations,
             finger.law,
             _sizes(self.gripper),
+            tolerances={} if self.uncertainty is None else self.uncertainty.by_key,
+            model_error=said if (share := share_of(said)) is None else share,
         )
 
 
 def _section(part: UnitOverride | FingerSpec | None) -> dimensions.GivenValues:
     if part is None:
         return dimensions.GivenValues()
-    return dimensions.GivenValues(_sizes(part.geometry), _sizes(part.lattice))
+    lattice = _sizes(part.lattice)
+    if part.wall_compliance_mm_per_N is not None:
+        lattice[WALL_COMPLIANCE] = np.array([part.wall_compliance_mm_per_N], float)
+    return dimensions.GivenValues(_sizes(part.geometry), lattice)
 
 
 def _sizes(section: Section | None) -> dict[str, NDArray[np.float64]]:

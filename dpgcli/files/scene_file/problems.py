@@ -5,16 +5,25 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST, STIFFEST, unit_range
+from dpgcli.design.dimensions import (
+    LARGEST,
+    MAX_UNITS,
+    SMALLEST,
+    STIFFEST,
+    unit_of,
+    unit_range,
+)
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file.models import (
+    DataSpec,
     FingerSpec,
     GripperSpec,
     Spec,
     UnitOverride,
 )
 from dpgcli.files.scene_file.scenes import early_issues
+from dpgcli.files.scene_file.tolerances import Tolerances
 from dpgcli.files.sections import (
     Geometry,
     Lattice,
@@ -36,6 +45,8 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("finger", "overrides", "*", "geometry"): UnitGeometry,
     ("finger", "overrides", "*", "lattice"): UnitLattice,
     ("gripper",): GripperSpec,
+    ("data",): DataSpec,
+    ("uncertainty",): Tolerances,
 }
 
 SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
@@ -48,19 +59,24 @@ OWN = {
     "calibration": '"published", the name of a calibration file, or a list of these',
     "law": '"published", "tabulated" or "push_only"',
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
+    **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),
+    "model_error": "a percentage such as 5%, or leave_one_out",
 }
 
 HINTS = {
     "units": "a whole number without quotes or decimal point",
     "stroke_mm": "stroke is dome height minus unit separation",
-    "linear_stiffness_N_per_mm": "the study calls the bars nearly rigid: 1.0e4; .inf is rigid",
+    "linear_stiffness_N_per_mm": "1.0e+4 is assumed where it is left out; .inf is rigid",
+    "wall_compliance_mm_per_N": "0 is a rigid wall; those of the study's finger have about 0.8",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
     "segment_height_mm": "half the chamber width + half the limiting layer",
 }
 
 CALIBRATION: KeyPath = ("finger", "calibration")
-TEXTS = ("calibration", "law")
+UNCERTAINTY: KeyPath = ("uncertainty",)
+TEXTS = ("calibration", "law", "model_error")
+PAIRS = tuple(DataSpec.model_fields)
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
@@ -113,11 +129,15 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
+    if path[:1] == ("data",) and error["type"] != "extra_forbidden" and len(path) > 1:
+        path = path[:2]  # of the pair, not of one of its numbers
+        error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
-    return document.problem(path, _expected(path), found, _hint(key, error))
+    hint = "" if path[:-1] == UNCERTAINTY else _hint(key, error)
+    return document.problem(path, _expected(path), found, hint)
 
 
 def _at(data: Any, path: KeyPath) -> Any:
@@ -128,6 +148,8 @@ def _at(data: Any, path: KeyPath) -> Any:
 
 def _expected(path: KeyPath) -> str:
     key = str(path[-1]) if path else "document"
+    if path[:-1] == UNCERTAINTY:
+        return f"a standard uncertainty >= 0 in {unit_of(key) or 'its unit'}, or one such as 10%"
     if _pattern(path) in SECTIONS or key == "overrides":
         return "a section of keys"
     return OWN.get(key, expected_of(key))
@@ -138,10 +160,10 @@ def _hint(key: str, error: Any) -> str:
     value = error["input"]
     if error["type"] == "model_type":
         return "keys below it, indented"
-    if isinstance(value, str) and key not in TEXTS:
-        return "a plain number such as 6.5 or 1.0e4: no quotes, no unit"
+    if isinstance(value, str) and key not in (*TEXTS, *PAIRS):
+        return "a plain number such as 6.5 or 1.0e+4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS):
+    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS, *PAIRS):
         return OUT_OF_RANGE
     return HINTS.get(key, "")
 
@@ -154,8 +176,10 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
         and min(unit_range(str(path[2])), default=0) < 1
     ):
         return "units such as 4 or 4-5", dotted(path), "count from the base"
+    if path[:1] == UNCERTAINTY:
+        return "a key that designs can differ in", dotted(path), "the tables have no uncertainties"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
-    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS):
+    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
     if parent not in SECTIONS:
         known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]

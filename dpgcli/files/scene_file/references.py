@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.design.calibrations import PUBLISHED
-from dpgcli.design.dimensions import LINEAR_STIFFNESS
+from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
-from dpgcli.files.content import quoted_if
+from dpgcli.files.content import beside, quoted_if
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
@@ -58,8 +58,9 @@ def recalibrated(document: Document, calibration: Calibration) -> Document:
         return {**section, "lattice": {k: v for k, v in kept if not known.has(k)}}
 
     changes = {**without(finger), "calibration": [calibration, *before]}
-    if known.has(LINEAR_STIFFNESS):
-        changes.pop(LINEAR_STIFFNESS, None)
+    for key in (LINEAR_STIFFNESS, WALL_COMPLIANCE):
+        if known.has(key):
+            changes.pop(key, None)
     overrides = finger.get("overrides") or {}
     changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}
     return replace(document, data={**document.data, "finger": changes})
@@ -91,7 +92,7 @@ class _Reader:
         return said
 
     def named(self, path: KeyPath, name: str) -> Calibration | None:
-        file = self.folder / name
+        file = beside(self.folder, name)
         try:
             is_file = file.is_file()
         except OSError:  # a name too long, a folder that is closed

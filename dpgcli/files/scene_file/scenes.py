@@ -1,12 +1,9 @@
 """From a spec to a scene, and what is wrong between the keys of its data."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from dpgcli.design.calibrations import PUBLISHED
-from dpgcli.design.dimensions import LINEAR_STIFFNESS, MAX_UNITS, range_issues
+from dpgcli.design.dimensions import MAX_UNITS, range_issues
 from dpgcli.design.problems import Issue
-from dpgcli.design.resolve import NO_BARS
 from dpgcli.design.scene import Scene
 from dpgcli.errors import SpecError
 from dpgcli.files.places import Location, located
@@ -28,12 +25,6 @@ def early_issues(data: Any) -> list[Issue]:
     finger = data.get("finger") if isinstance(data, dict) else None
     if not isinstance(finger, dict):
         return []
-    is_bare = finger.get(LINEAR_STIFFNESS) is None
-    is_bare &= finger.get("calibration") in (None, PUBLISHED)
-    return [*_range_issues(finger), *([NO_BARS] if is_bare else [])]
-
-
-def _range_issues(finger: Mapping[str, Any]) -> list[Issue]:
     overrides, units = finger.get("overrides"), finger.get("units")
     if not isinstance(overrides, dict):
         return []

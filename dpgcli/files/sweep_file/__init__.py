@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.content import quoted_if
+from dpgcli.files.content import beside, quoted_if
 from dpgcli.files.places import in_order, located, shown
 from dpgcli.files.scene_file import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.scene_file.problems import checked
@@ -76,7 +76,7 @@ def sweep_in(
     `base` is the base spec where no file holds it. Raises SpecError as `read_sweep` does.
     """
     spec, problems = _validated(document)
-    base_path = folder / str(document.data.get("base"))
+    base_path = beside(folder, str(document.data.get("base")))
     base_files: tuple[Path, ...] = ()
     base_spec = None
     if base is not None:

@@ -1,6 +1,7 @@
 """The space of a sweep: axes from what its file says, and constraints over their keys."""
 
 import hashlib
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 
 from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.content import content_of
+from dpgcli.files.content import beside, content_of
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.sweep_file.models import (
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
 INDEX = "pandas writes no index where index=False"
-TABLE = "a CSV or Parquet file of designs"
+TABLE = "a CSV or Parquet file of designs, or a folder of such"
 
 
 @dataclass
@@ -56,10 +57,15 @@ class SpaceReader:
     def wrong(self, path: KeyPath, expected: str, found: str, hint: str = "") -> None:
         self.problems.append(self.document.problem(path, expected, found, hint))
 
-    def has_room(self, path: KeyPath, n_points: int, n_keys: int) -> bool:
-        """Count an axis in, before it is made; False, with a problem, where it is too large."""
+    def has_room(
+        self, path: KeyPath, n_points: int, n_keys: int, is_more_of_it: bool = False
+    ) -> bool:
+        """Count an axis in, before it is made; False, with a problem, where it is too large.
+
+        A part of an axis whose keys are counted already `is_more_of_it`.
+        """
         self.n_numbers += n_points * n_keys
-        self.n_keys += n_keys
+        self.n_keys += 0 if is_more_of_it else n_keys
         has_room = self.n_numbers <= MOST_NUMBERS and self.n_keys <= MOST_KEYS
         if not has_room:
             expected = f"at most {MOST_NUMBERS:,} numbers of {MOST_KEYS} keys in all axes"
@@ -135,24 +141,11 @@ class SpaceReader:
         return sampled(sample.method, ranges, sample.count, sample.seed)
 
     def tabulated(self, path: KeyPath, name: str) -> Axis | None:
-        """Columns of a CSV or Parquet file, which is read once."""
-        from dpgcli.files.sweep_file.tables import (
-            UNREADABLE,
-            NoTableError,
-            Wrong,
-            frame_in,
-            numbers_in,
-        )
+        """Columns of a CSV or Parquet file, or of a folder of such, which is read once."""
+        from dpgcli.files.sweep_file.tables import UNREADABLE, NoTableError, Wrong, numbers_in
 
-        file = self.folder / name
-        if file.is_file() and (size := file.stat().st_size) > MOST_BYTES:
-            expected = f"at most {MOST_BYTES // 2**20} MiB of CSV or Parquet"
-            found = f"{size // 2**20:,} MiB"
-            self.wrong(path, expected, found, "take fewer designs, or several sweeps")
-            return None
         try:
-            content = content_of(file, self.document.place(path))
-            frame = frame_in(content, lambda *shape: self.has_room(path, *shape))
+            frame = self.read(path, beside(self.folder, name))
         except SpecError as error:
             self.wrong(path, TABLE, error.problems[0].found)
             return None
@@ -168,10 +161,33 @@ class SpaceReader:
         wrong = {key: found for key, found in columns.items() if isinstance(found, Wrong)}
         for key, (kind, found, hint) in wrong.items():
             self.wrong(path, f"{kind} in column {key}", found, hint)
-        if wrong:
+        return None if wrong else Axis(columns)
+
+    def read(self, path: KeyPath, file: Path) -> "pd.DataFrame | None":
+        """The table in a file or a folder; None, with a problem, where there is no room for it."""
+        from dpgcli.files.sweep_file.folders import joined, parts_of
+        from dpgcli.files.sweep_file.tables import frame_in
+
+        parts = parts_of(file) if file.is_dir() else [file]
+        size = sum(part.stat().st_size for part in parts if part.is_file())
+        if size > MOST_BYTES:
+            expected = f"at most {MOST_BYTES // 2**20} MiB of CSV or Parquet"
+            found = f"{size // 2**20:,} MiB"
+            self.wrong(path, expected, found, "take fewer designs, or several sweeps")
             return None
-        self.files[file] = hashlib.sha256(content).hexdigest()
-        return Axis(columns)
+        frames: dict[Path, pd.DataFrame] = {}
+        for part in parts:
+            content = content_of(part, self.document.place(path))
+            frame = frame_in(content, lambda n, keys: self.has_room(path, n, keys, bool(frames)))
+            if frame is None:
+                return None
+            frames[part] = frame
+            self.files[part] = hashlib.sha256(content).hexdigest()
+        if parts == [file]:
+            return frames[file]
+        names = "\n".join(part.relative_to(file).as_posix() for part in parts)
+        self.files[file] = hashlib.sha256(os.fsencode(names)).hexdigest()  # one more is a change
+        return joined(file, frames)
 
     def is_of_designs(self, path: KeyPath, frame: "pd.DataFrame") -> bool:
         """Whether there are rows, and keys as columns, each once; False with a problem.

@@ -13,7 +13,11 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from dpgcli.files.places import shown
+from dpgcli.errors import SpecError
+from dpgcli.files.csv_file import text_of
+from dpgcli.files.frames import with_index
+from dpgcli.files.layout import marks_in, rows_in, separator_of
+from dpgcli.files.places import Location, shown
 from dpgcli.files.table_reader import DAMAGED, undamaged
 
 LARGEST_WHOLE = 2**63 - 1
@@ -22,6 +26,7 @@ TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\n)+")
 COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?$", re.MULTILINE)
 UNNAMED = re.compile(r"__index_level_[0-9]+__")  # an index of pandas, which is no column
 FIRST = 1000  # rows
+SAMPLE = 2**16  # bytes
 UNREADABLE = (  # what pandas and pyarrow raise for content that is no table
     OSError,
     csv.Error,
@@ -48,7 +53,7 @@ def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFra
         raise ValueError(DAMAGED)
     if not has_room(file.metadata.num_rows, file.metadata.num_columns):
         return None
-    return _with_index(_parquet(file))
+    return with_index(_parquet(file))
 
 
 def _parquet(file: Any) -> pd.DataFrame:
@@ -59,18 +64,22 @@ def _parquet(file: Any) -> pd.DataFrame:
     numbers = [field.name for field in file.schema_arrow if _is_number(field.type)]
     others = [name for name in file.schema_arrow.names if name not in numbers]
     if not others:
-        whole: pd.DataFrame = file.read().to_pandas()
+        whole: pd.DataFrame = _with_floats(file.read()).to_pandas()
         return whole
     first = pa.Table.from_batches(islice(file.iter_batches(FIRST), 1), file.schema_arrow)
-    head: pd.DataFrame = first.to_pandas()
+    head: pd.DataFrame = _with_floats(first).to_pandas()
     if _has_names(head.index) or not all(map(UNNAMED.fullmatch, others)):
         return head
-    rest: pd.DataFrame = file.read(columns=numbers).to_pandas()
+    rest: pd.DataFrame = _with_floats(file.read(columns=numbers)).to_pandas()
     return rest
 
 
-def _with_index(frame: pd.DataFrame) -> pd.DataFrame:
-    return frame.reset_index() if _has_names(frame.index) else frame
+def _with_floats(table: Any) -> Any:
+    """A table with numbers in the place of decimals, which databases write."""
+    for place, field in enumerate(table.schema):
+        if pa.types.is_decimal(field.type):
+            table = table.set_column(place, field.name, table.column(place).cast(pa.float64()))
+    return table
 
 
 def _has_names(index: "pd.Index[Any]") -> bool:
@@ -82,7 +91,8 @@ def _is_number(kind: Any) -> bool:
     types = pa.types
     if types.is_dictionary(kind):
         kind = kind.value_type
-    return any(is_kind(kind) for is_kind in (types.is_integer, types.is_floating, types.is_boolean))
+    kinds = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal)
+    return any(is_kind(kind) for is_kind in kinds)
 
 
 class NoTableError(ValueError):
@@ -94,40 +104,78 @@ def _csv(content: bytes) -> pd.DataFrame:
 
     Lines end as pandas ends them: where a comment went on behind a lone CR, rows would be lost.
     """
-    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    content = _utf8(content).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"#" in content:
         content = TOP.sub(lambda top: b"\n" * top[0].count(b"\n"), content)
         content = COMMENT.sub(b"", content)
+    ends = _ends(content)
+    separator = separator_of(ends)
+    mark = separator if separator.strip() else "\t"
     if b'"' in content:  # pandas reads "3"4 as 34
-        for _ in csv.reader(io.StringIO(content.decode("utf-8")), strict=True):
+        for _ in csv.reader(io.StringIO(content.decode()), delimiter=mark, strict=True):
             pass
+    parted = separator if mark == separator else r"\s+"
+    decimal = _decimal_mark(ends, separator)
     with warnings.catch_warnings():  # rows that do not fit the header
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
-            frame = pd.read_csv(io.BytesIO(content), index_col=False)
+            content = _without_ends(content, separator)
+            if re.search(re.escape(mark.encode()) + rb"[ \t]*(\n|\Z)", content):
+                _check_rows(content, mark)  # pandas drops an empty cell too many
+            stream = io.BytesIO(content)
+            return pd.read_csv(stream, index_col=False, sep=parted, decimal=decimal)
         except (pd.errors.ParserError, pd.errors.ParserWarning):
-            _check_rows(content)
+            _check_rows(content, mark)
             raise
-    if len(frame.columns) == 1:
-        _check_separator([str(frame.columns[0])])
-    return frame
 
 
-def _check_rows(content: bytes) -> None:
+def _utf8(content: bytes) -> bytes:
+    try:
+        return text_of(content, Location("table")).encode()
+    except SpecError as error:
+        raise NoTableError(error.problems[0].found, error.problems[0].hint) from None
+
+
+def _ends(content: bytes) -> list[str]:
+    """The first and the last lines of a content: they tell its separator and its marks."""
+    parts = (content[:SAMPLE],) if len(content) <= SAMPLE else (content[:SAMPLE], content[-SAMPLE:])
+    lines = [part.decode(errors="ignore").split("\n") for part in parts]
+    whole = lines if len(lines) == 1 else [lines[0][:-1], lines[1][1:]]
+    return [line for part in whole for line in part]
+
+
+def _decimal_mark(lines: list[str], separator: str) -> str:
+    """The mark of decimals, a comma only between cells that others part. Raises NoTableError."""
+    rows, _ = rows_in(lines, separator)
+    marks = marks_in([cell for row in rows[1:] for cell in row.cells], separator)
+    if marks.doubtful or marks.grouping:
+        found = shown(marks.doubtful or f"thousands grouped by {marks.grouping}")
+        raise NoTableError(found, "write decimal points, and no groups of thousands")
+    return marks.decimal if separator != "," else "."
+
+
+def _without_ends(content: bytes, separator: str) -> bytes:
+    """The content without the separator that ends each of its rows: one more ends no cell."""
+    if not separator.strip():
+        return content
+    mark = separator.encode()
+    head, *rows = [line for line in content.split(b"\n") if line.strip()]
+    is_habit = len(rows) > 1 or head.rstrip().endswith(mark)
+    if rows and is_habit and all(row.rstrip().endswith(mark) for row in rows):
+        end = re.compile(re.escape(mark) + rb"[ \t]*$", re.MULTILINE)
+        longer = rows[0].count(mark) > head.count(mark) or head.rstrip().endswith(mark)
+        return end.sub(b"", content) if longer else content
+    return content
+
+
+def _check_rows(content: bytes, mark: str) -> None:
     """Raise NoTableError for the first row that is longer than the header."""
-    rows = csv.reader(io.StringIO(content.decode("utf-8-sig")))
+    rows = csv.reader(io.StringIO(content.decode("utf-8-sig")), delimiter=mark)
     header = next(row for row in rows if row)
-    _check_separator(header)
     for row in rows:
         if len(row) > len(header):
             found = f"{len(row)} cells in line {rows.line_num}"
             raise NoTableError(found, f"the header has {len(header)}")
-
-
-def _check_separator(header: list[str]) -> None:
-    if len(header) == 1 and (foreign := [c for c in ";\t" if c in header[0]]):
-        hint = "separate them by commas, and write decimal points"
-        raise NoTableError(f"columns separated by {shown(foreign[0])}", hint)
 
 
 class Wrong(NamedTuple):

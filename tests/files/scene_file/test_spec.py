@@ -204,9 +204,9 @@ def test_wrong_values_are_all_reported_by_line(problems):
         "x.yaml:2:3: finger.units: expected a whole number from 1 to 64, found 5.0 "
         "(a whole number without quotes or decimal point)",
         "x.yaml:3:3: finger.linear_stiffness_N_per_mm: expected a stiffness > 0 in N/mm, or .inf, "
-        "found .nan (the study calls the bars nearly rigid: 1.0e4; .inf is rigid)",
+        "found .nan (1.0e+4 is assumed where it is left out; .inf is rigid)",
         'x.yaml:7:5: finger.geometry.dome_thickness_mm: expected a length > 0 in mm, found "0.75" '
-        "(a plain number such as 6.5 or 1.0e4: no quotes, no unit)",
+        "(a plain number such as 6.5 or 1.0e+4: no quotes, no unit)",
         "x.yaml:8:5: finger.geometry.unit_sell_mm: expected a known key, found unit_sell_mm "
         "(did you mean unit_cell_mm?)",
         "x.yaml:9:5: finger.geometry.chamber_length_mm: expected a length > 0 in mm, found true",
@@ -247,7 +247,6 @@ def test_problems_of_form_and_of_content_come_together(problems):
         ("finger.lattice.hinge_stiffness_N_mm_per_rad", "-1"),
         ("finger.linear_stiffness_N_per_mm", "1.1e18"),
         ("finger.linear_stiffness_N_per_mm", "-.inf"),
-        ("finger.linear_stiffness_N_per_mm", "null"),
         ("finger.units", "0"),
         ("finger.units", "0x" + "f" * 5000),
         ("finger.units", "65"),
@@ -317,7 +316,8 @@ def test_settings_reach_overrides_written_as_numbers(read):
         ),
         (
             "zzz=3",
-            "settings: zzz: expected a known key, found zzz (known here: finger, gripper)",
+            "settings: zzz: expected a known key, found zzz "
+            "(known here: finger, gripper, data, uncertainty, model_error)",
         ),
     ],
 )
@@ -600,3 +600,16 @@ def test_any_setting_is_applied_or_refused(text, key):
     except SpecError as error:
         assert error.problems
         str(error).encode()
+
+
+@pytest.mark.parametrize("pair", ["[5.375]", "5.375", "[5, x]", "[1, 2, 3]", "[.inf, 0]", "up"])
+def test_a_place_in_some_data_is_two_numbers(problems, pair):
+    text = FINGER + f"data:\n  first_station_mm: {pair}\n"
+    (problem,) = problems(text)
+    assert problem.key == "data.first_station_mm"
+    assert problem.expected == "two numbers in mm, such as [5.375, -0.75]"
+
+
+def test_a_key_of_the_data_that_is_not_known(problems):
+    (problem,) = problems(FINGER + "data: {first_station: [1, 2]}\n")
+    assert problem.hint == "did you mean first_station_mm?"

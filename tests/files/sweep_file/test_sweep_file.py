@@ -6,6 +6,7 @@ import os
 import time
 import tracemalloc
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.errors import SpecError
+from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.sections import UnitGeometry
 from dpgcli.files.sweep_file import Sweep, read_sweep
-from dpgcli.files.table_writer import record_batch, schema, write_table
+from dpgcli.files.table_writer import write_table
 from dpgcli.states.columns import Column, Group, Kind
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -505,9 +507,13 @@ def test_comments_in_a_table_of_designs(read: Read, tmp_path: Path) -> None:
     [
         (f"{HEIGHT},{SEPARATION}\n6,3\n7,3,1\n", "found 3 cells in line 3 (the header has 2)"),
         (f"# a\n{HEIGHT},{SEPARATION}\n6,3,1\n", "found 3 cells in line 3 (the header has 2)"),
-        (f"{HEIGHT};{SEPARATION}\n6,5;3,0\n", 'columns separated by ";" (separate them by commas'),
-        (f"{HEIGHT};{SEPARATION}\n6;3\n", 'columns separated by ";" (separate them by commas'),
-        (f"{HEIGHT}\t{SEPARATION}\n6\t3\n", 'columns separated by "\\t" (separate them by commas'),
+        (f"{HEIGHT};{SEPARATION}\n6,5;3,0\n7;3;1\n", "3 cells in line 3 (the header has 2)"),
+        (f"{HEIGHT};{SEPARATION}\n1,234;1,500\n", '"1,234" (write decimal points'),
+        (f"{HEIGHT};{SEPARATION}\n1.234,5;1\n", "thousands grouped by ."),
+        (f"{HEIGHT};{SEPARATION}\n6,5;3\n6.5;4\n", '"6,5" in row 1'),
+        (f"{HEIGHT},{SEPARATION}\n6,5,\n", "3 cells in line 2 (the header has 2)"),
+        (f"{HEIGHT},{SEPARATION}\n6,3,\n7,3\n", "3 cells in line 2 (the header has 2)"),
+        (f"{HEIGHT}\n6,5\n7,5\n", "2 cells in line 2 (the header has 1)"),
     ],
 )
 def test_what_is_wrong_with_a_csv_is_said_in_words(
@@ -516,6 +522,101 @@ def test_what_is_wrong_with_a_csv_is_said_in_words(
     (tmp_path / "t.csv").write_text(text)
     (problem,) = problems(read, "table: t.csv")
     assert said in problem
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{HEIGHT};{SEPARATION}\n6,5;3\n7;3,5\n",
+        f"\ufeff{HEIGHT};{SEPARATION};\r\n6,5;3;\r\n7;3,5;\r\n",
+        f"{HEIGHT}\t{SEPARATION}\n6.5\t3\n7\t3.5\n",
+        f"{HEIGHT} {SEPARATION}\n6.5 3\n7 3.5\n",
+        f"  {HEIGHT}    {SEPARATION}\n   6.5   3\n   7     3.5\n",
+        f"{HEIGHT},{SEPARATION},\n6.5,3,\n7,3.5,\n",
+        f"{HEIGHT},{SEPARATION}\n6.5,3,\n7,3.5,\n",
+        f'"{HEIGHT}";"{SEPARATION}"\n"6,5";"3"\n7;3,5\n',
+        f"# of the lab\n{HEIGHT};{SEPARATION}\n6,5;3\n# more\n7;3,5\n",
+        f"{HEIGHT};{SEPARATION}\n6,500;3\n7;3,5\n",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_table_as_any_spreadsheet_writes_it(
+    read: Read, tmp_path: Path, text: str, encoding: str
+) -> None:
+    (tmp_path / "t.csv").write_bytes(text.encode(encoding))
+    assert designs(read("table: t.csv")) == {HEIGHT: [6.5, 7], SEPARATION: [3, 3.5]}
+
+
+def test_decimals_of_a_database_are_numbers(read: Read, tmp_path: Path) -> None:
+    heights = pa.array([Decimal("6.50"), Decimal("7.00")], pa.decimal128(10, 2))
+    counts = pa.array([Decimal(3), Decimal(5)], pa.decimal256(40, 0))
+    table = pa.table({HEIGHT: heights, "finger.units": counts})
+    pq.write_table(table, tmp_path / "t.parquet")
+    found = read("table: t.parquet").space.designs(0, 2)
+    assert found[HEIGHT].tolist() == [6.5, 7.0]
+    assert found["finger.units"].dtype == np.int64
+    assert found["finger.units"].tolist() == [3, 5]
+    gap = pa.table({HEIGHT: pa.array([Decimal("6.5"), None], pa.decimal128(10, 2))})
+    pq.write_table(gap, tmp_path / "t.parquet")
+    assert "finite numbers in column" in problems(read, "table: t.parquet")[0]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A table of two parts, as Spark writes it, beside what is no part."""
+    folder = tmp_path / "d.parquet"
+    folder.mkdir()
+    for name, height in (("part-1.parquet", 7.0), ("part-0.snappy.parquet", 6.5)):
+        pq.write_table(pa.table({HEIGHT: [height], SEPARATION: [3.0]}), folder / name)
+    for name in ("_SUCCESS", "._SUCCESS.crc", ".part-0.parquet.crc", "_metadata.parquet"):
+        (folder / name).write_text("")
+    return folder
+
+
+def test_a_folder_is_the_table_of_its_parts(read: Read, folder: Path) -> None:
+    sweep = read("table: d.parquet")
+    assert designs(sweep) == {HEIGHT: [6.5, 7], SEPARATION: [3, 3]}
+    assert {path.name for path in sweep.files} >= {folder.name, "part-1.parquet"}
+    pq.write_table(pa.table({HEIGHT: [8.0], SEPARATION: [3.0]}), folder / "part-2.parquet")
+    more = read("table: d.parquet")
+    assert designs(more)[HEIGHT] == [6.5, 7, 8]
+    assert more.digests != sweep.digests
+
+
+def test_values_in_the_names_of_folders_are_columns(read: Read, tmp_path: Path) -> None:
+    for height in (6.5, 7.0):
+        part = tmp_path / "d" / f"{HEIGHT}={height}" / "finger.units=3"
+        part.mkdir(parents=True)
+        pq.write_table(pa.table({SEPARATION: [3.0, 3.5]}), part / "p.parquet")
+    found = read("table: d").space.designs(0, 4)
+    assert found[HEIGHT].tolist() == [6.5, 6.5, 7, 7]
+    assert found["finger.units"].tolist() == [3] * 4
+
+
+def test_what_is_wrong_with_a_folder(read: Read, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert "a folder without any .parquet or .csv file" in problems(read, "table: empty")[0]
+    pq.write_table(pa.table({HEIGHT: [8.0]}), folder / "part-2.parquet")
+    assert "other columns in part-2.parquet" in problems(read, "table: d.parquet")[0]
+    (folder / "part-2.parquet").unlink()
+    (folder / "part-3.parquet").symlink_to("part-1.parquet")
+    assert "links in it" in problems(read, "table: d.parquet")[0], "no part is left out in silence"
+    (folder / "part-3.parquet").unlink()
+    (folder / "a.csv").write_text(f"{HEIGHT}\n6\n")
+    assert "keep one kind of them" in problems(read, "table: d.parquet")[0]
+    (folder / "a.csv").unlink()
+    (folder / "part-1.parquet").write_bytes(b"PAR1 cut off")
+    assert len(problems(read, "table: d.parquet")) == 1
+
+
+def test_the_parts_of_a_folder_have_room_together(
+    read: Read, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dpgcli.files.sweep_file.space.MOST_NUMBERS", 3)
+    assert "found 4 numbers of 2 keys" in problems(read, "table: d.parquet")[0]
+    monkeypatch.setattr("dpgcli.files.sweep_file.space.MOST_NUMBERS", 4)
+    monkeypatch.setattr("dpgcli.files.sweep_file.space.MOST_KEYS", 2)
+    assert read("table: d.parquet").space.size == 2
 
 
 def test_a_table_is_a_file_and_nothing_else(read: Read, tmp_path: Path) -> None:

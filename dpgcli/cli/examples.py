@@ -1,0 +1,59 @@
+"""What `--help` of each command ends with; tests run every line.
+
+`finger.yaml` is what `dpg init` writes; other files are the user's own, or made by an example.
+"""
+
+EXAMPLES = {
+    "predict": (
+        "dpg predict finger.yaml",
+        "dpg predict finger.yaml --pattern '1*' --set finger.geometry.unit_separation_mm=2.5",
+        "dpg predict finger.yaml --output states.parquet --plot states.svg",
+        "dpg predict finger.yaml --format csv > states.csv",
+    ),
+    "explain": (
+        "dpg explain finger.yaml",
+        "dpg explain finger.yaml --columns default,stiffness --target-error 0.01mm",
+    ),
+    "sweep": (
+        "dpg sweep sweep.yaml --output out",
+        "dpg sweep sweep.yaml --output part1 --shard 1/2",
+        'dpg sweep sweep.yaml --output out --require "n_stable >= 8"',
+    ),
+    "merge": ("dpg merge part1 part2 --output whole",),
+    "check": (
+        'dpg check out/designs.parquet --require "reach_max_mm > 30"',
+        'dpg check out/designs.parquet --require "n_stable >= 8" --summary-file summary.md',
+    ),
+    "report": ("dpg report out", "dpg report out --output page.html"),
+    "bench": (
+        "dpg bench finger.yaml",
+        "dpg bench finger.yaml --target-error 0.01mm --repeats 1 --plot error.svg",
+    ),
+    "compare": (
+        "dpg compare finger.yaml tips.csv",
+        "dpg compare finger.yaml tips.csv --first-station 0.75,0 --plot tips.svg",
+    ),
+    "stress": (
+        "dpg stress finger.yaml",
+        "dpg stress --only crossed --format csv > cases.csv",
+    ),
+    "validate": ("dpg validate finger.yaml", "dpg validate finger.yaml --format github"),
+    "init": ("dpg init", "dpg init my_finger.yaml"),
+    "help": ("dpg help", "dpg help tutorial"),
+    "schema": ("dpg schema > finger.schema.json",),
+    "fit bistable": (
+        "dpg fit bistable dome.csv --travel-to-opening stroke:3.5 --spec finger.yaml",
+        "dpg fit bistable dome.csv --travel-to-opening equal --bootstrap 100 --output dome.yaml",
+    ),
+    "fit hinge": ("dpg fit hinge hinge.csv --spec finger.yaml --output hinge.yaml",),
+    "fit finger": (
+        "dpg fit finger finger.yaml tips.csv --output height.yaml",
+        "dpg fit finger finger.yaml tips.csv --free hinge_stiffness_N_mm_per_rad",
+    ),
+    "fit grid": ("dpg fit grid domes.csv --geometry elastic_modulus_MPa=26 --output grid.yaml",),
+    "fe dome": (
+        "dpg fe dome finger.yaml --output deck",
+        "dpg fe dome finger.yaml --output deck --mesh coarse --run",
+    ),
+    "fe hinge": ("dpg fe hinge finger.yaml --output deck --mesh coarse --run",),
+}

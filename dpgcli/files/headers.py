@@ -1,0 +1,126 @@
+"""Which columns the header of a table has: those that were chosen, by our names, and the others."""
+
+from collections import Counter
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from dpgcli.files.layout import Row, header_in, is_number, is_of_units
+from dpgcli.files.units import bare, name_and_unit
+
+
+@dataclass(frozen=True)
+class Head:
+    """Names of columns in the order of the cells, and the rows below.
+
+    `line` is that of the header. By name, `titles` are those of columns that were chosen, `units`
+    what the file has behind a title or in a row of units; `reversed` are names whose numbers are.
+    """
+
+    names: tuple[str, ...]
+    rows: list[Row]
+    line: int
+    units: Mapping[str, str]
+    titles: Mapping[str, str]
+    reversed: frozenset[str]
+
+
+def headed(
+    rows: Sequence[Row],
+    wanted: Container[str],
+    columns: Mapping[str, str],
+    *,
+    is_first: bool = False,
+) -> Head:
+    """Find the header, and the columns that were chosen: titles by our names.
+
+    Where no row is one, columns are called by their places, from 1.
+    """
+    sources = [source.removeprefix("-") for source in columns.values()]
+    place = 0 if is_first else header_in(rows, wanted, sources)
+    line, below = rows[place].line, list(rows[place + 1 :])
+    titles = list(rows[place].cells)
+    if _are_numbers(titles, sources):
+        below, titles = list(rows[place:]), [str(n) for n in range(1, len(titles) + 1)]
+    units = below.pop(0).cells if below and is_of_units(below[0]) else []
+    found = dict(_found(titles, columns))
+    names = _named(titles, found)
+    n_names = _width(names, below, {*found} | {n for n in names if n in wanted})
+    said = {name: unit for name, unit in zip(names, _units(titles, units), strict=True) if unit}
+    return Head(
+        tuple(names[:n_names]),
+        _cut(below, n_names, len(titles)),
+        line,
+        said,
+        {name: titles[column] for name, (column, _) in found.items()},
+        frozenset(name for name, (_, is_reversed) in found.items() if is_reversed),
+    )
+
+
+def _are_numbers(titles: Sequence[str], sources: Sequence[str]) -> bool:
+    """Whether a row is no header: all its cells are numbers, or those of a place that is chosen."""
+    places = (place for source in sources if (place := _place(titles, source)) is not None)
+    return all(map(is_number, titles)) or any(is_number(titles[place]) for place in places)
+
+
+def _found(
+    titles: Sequence[str], columns: Mapping[str, str]
+) -> Iterator[tuple[str, tuple[int, bool]]]:
+    """The place of each column that was chosen, and whether its numbers are reversed."""
+    for name, source in columns.items():
+        for title in dict.fromkeys((source, source.removeprefix("-"))):
+            place = _place(titles, title)
+            if place is not None:
+                yield name, (place, title != source)
+                break
+
+
+def _place(titles: Sequence[str], source: str) -> int | None:
+    """The place of a title, with its unit or without; of a number that is none, the place itself.
+
+    None where there is no such title, or more than one.
+    """
+    bare_titles = [name_and_unit(title)[0] for title in titles]
+    for known in (titles, bare_titles):
+        if source in known:
+            return known.index(source) if list(known).count(source) == 1 else None
+    is_place = source.isascii() and source.isdigit() and 1 <= int(source) <= len(titles)
+    return int(source) - 1 if is_place else None
+
+
+def _named(titles: Sequence[str], found: Mapping[str, tuple[int, bool]]) -> list[str]:
+    """Our names where columns were chosen; of the others, those that stand there once."""
+    names = list(titles)
+    if found:
+        counts = Counter(titles)
+        names = ["" if counts[title] > 1 else title for title in titles]
+    for name, (place, _) in found.items():
+        names[place] = name
+    return names
+
+
+def _units(titles: Sequence[str], row: Sequence[str]) -> list[str]:
+    """The unit of each column, by the row of units, or else by its title."""
+    below = [bare(cell) for cell in row[: len(titles)]]
+    below += [""] * (len(titles) - len(below))
+    pairs = zip(titles, below, strict=True)
+    return [unit or name_and_unit(title)[1] for title, unit in pairs]
+
+
+def _width(names: Sequence[str], rows: Sequence[Row], needed: Container[str]) -> int:
+    """The number of columns: those at the end without a title, or without any cell, are none."""
+    width = len(names)
+    while width > 1 and not names[width - 1] and not any(any(r.cells[width - 1 :]) for r in rows):
+        width -= 1
+    longest = max((len(row.cells) for row in rows), default=width)
+    while width > max(longest, 1) and names[width - 1] not in needed:
+        width -= 1
+    return width
+
+
+def _cut(rows: list[Row], width: int, n_titles: int) -> list[Row]:
+    """The rows without the separator that ends each of them: one more is a decimal comma's."""
+    lengths = {len(row.cells) for row in rows}
+    is_habit = len(lengths) == 1 and (len(rows) > 1 or lengths == {n_titles})
+    if not is_habit or any(any(row.cells[width:]) for row in rows):
+        return rows
+    return [Row(row.cells[:width], row.line) for row in rows]
