@@ -31,14 +31,14 @@ class Curve:
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
     Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
     the well, where the slope vanishes: the minimum that lies deepest below what is on both its
-    sides, and the highest maximum before it; NaN where there is none. `ripples` are the lesser
-    wells between the two, each with the top after it.
+    sides, and the highest maximum before it; NaN where there is none. `branches` are the stretches
+    between the two on which the energy falls, each from its top to its well, the last one first.
     """
 
     knots: Array
     coefficients: Array
     rests: tuple[float, float]
-    ripples: tuple[tuple[float, float], ...]
+    branches: tuple[tuple[float, float], ...]
 
     def __call__(self, travel: Array) -> Derivatives:
         """Value and derivatives at travels of any shape, complex ones too.
@@ -143,15 +143,17 @@ def _rests(
 ) -> tuple[tuple[float, float], tuple[tuple[float, float], ...]]:
     """The highest top before the deepest well, by how much it lies below both sides, and that well.
 
-    Then the wells between the two, each with the next top.
+    Then what lies between the two: the branches, from the last to the first. A curve that ends
+    while it rises goes on rising, so that a well near its end is not the shallower for it.
     """
     slope, bend = cubic.derivative(), cubic.derivative(2)
     roots = np.array([root for root in slope.roots(extrapolate=False) if root > 0.0])
     tops, wells = (roots[sign * bend(roots) > 0.0] for sign in (-1.0, 1.0))
     wells = wells[wells > np.min(tops, initial=np.inf)]
     if not len(wells):
-        return (np.nan, np.nan), ()
-    last = float(cubic(cubic.x[-1]))
+        return (np.nan, np.nan), ((np.nan, np.nan),)
+    end = float(cubic.x[-1])
+    last = np.inf if slope(end) > 0.0 else float(cubic(end))
     depths = [
         min(cubic(tops[tops < well]).max(), np.max(cubic(tops[tops > well]), initial=last))
         - cubic(well)
@@ -161,5 +163,5 @@ def _rests(
     before = tops[tops < well]
     top = float(before[np.argmax(cubic(before))])
     lesser = wells[(wells > top) & (wells < well)]
-    ripples = tuple((float(lower), float(before[before > lower].min())) for lower in lesser)
-    return (top, well), ripples
+    ends = (well, *map(float, lesser[::-1]))
+    return (top, well), tuple((float(before[before < end].max()), end) for end in ends)

@@ -51,6 +51,7 @@ class Finger:
 
     `acting` (unit, design) is the state of the domes, given beside the energy: 1 where a dome acts
     on its neighbor, 0 where it does not, a dome that only pushes and stands in its ground state.
+    So is `branch`, the stretch of its curve that a dome which only pushes is on; see `laws.Dome`.
     `law` says how the domes answer.
     """
 
@@ -65,6 +66,7 @@ class Finger:
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
     wall_compliance: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
+    branch: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: DomeLaw = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -80,6 +82,10 @@ class Finger:
     def arrays(self) -> dict[str, Array]:
         """Every array by name, in the order of the fields."""
         return {name: getattr(self, name) for name in ARRAYS}
+
+    def states_of_domes(self) -> dict[str, Array]:
+        """What is given beside the energy, by name."""
+        return {"acting": self.acting, "branch": self.branch}
 
     @property
     def n_designs(self) -> int:
@@ -135,7 +141,7 @@ class Finger:
         if self.dome_travel.any():
             contact = np.where(self.dome_travel > 0.0, self.dome_travel - self.stroke, 0.0)
         stiffness = self.acting * self.bistable_stiffness
-        return Dome(stiffness, self.force_linearity, self.stroke, contact)
+        return Dome(stiffness, self.force_linearity, self.stroke, contact, self.branch)
 
     def springs(self, extension: Array) -> Response:
         """Energy, force and stiffness of the bistable springs at extensions (unit, batch)."""
@@ -158,7 +164,7 @@ class Finger:
         >>> uniform_finger(3, **STUDY).with_units([0, 0, 1, 2]).n_units
         4
         """
-        arrays = {**self.arrays(), "acting": self.acting}.items()
+        arrays = {**self.arrays(), **self.states_of_domes()}.items()
         picked = {k: v if len(v) == 1 else v[list(places)] for k, v in arrays}
         return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
 
@@ -173,6 +179,10 @@ class Finger:
         """
         return self.changed(acting=self.law.acting(inverted))
 
+    def with_branches(self, extension: Array) -> "Finger":
+        """The finger whose inverted domes are where their springs have these extensions, mm."""
+        return self.changed(branch=self.law.branch_at(extension, self.domes))
+
     def with_domes_held(self, inverted: Flags) -> "Finger":
         """The finger with inverted domes held at the rest of each alone; pattern (unit, batch)."""
         rest = self.law.rests(self.domes).well / self.stroke
@@ -182,7 +192,7 @@ class Finger:
 
     def take_lanes(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
-        arrays = {**self.arrays(), "acting": self.acting}.items()
+        arrays = {**self.arrays(), **self.states_of_domes()}.items()
         return self.changed(**{k: take_lanes(v, index) for k, v in arrays})
 
     def section(self, first: int, stop: int) -> "Finger":

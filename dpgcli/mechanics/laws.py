@@ -56,13 +56,15 @@ class Dome(NamedTuple):
 
     `stiffness` k_b at rest (N/mm), `linearity` α (1), `stroke` d (mm) and `contact` c (mm), the
     travel of the dome's pole at which it touches its neighbor in the straight finger; 0 where
-    the opening stands for the travel.
+    the opening stands for the travel. `branch` counts the stretches of a curve with ripples on
+    which a dome pushes, from the last (0) back; only a dome that never pulls is on one alone.
     """
 
     stiffness: Array
     linearity: Array
     stroke: Array
     contact: Array
+    branch: Array = np.zeros((1, 1))
 
 
 class Rests(NamedTuple):
@@ -89,6 +91,10 @@ class Attached:
         """1."""
         return np.ones((1, 1))
 
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
+        """0: the dome acts on all of its curve."""
+        return np.zeros((1, 1))
+
     def touching(self, dome: Dome) -> Touching:
         """Everywhere."""
         everywhere = np.full_like(np.real(dome.stroke), np.inf)
@@ -112,8 +118,15 @@ class DomeLaw(Protocol):
     def rests(self, dome: Dome) -> Rests:
         """Extensions (mm) of the spring alone at its barrier and in its inverted well."""
 
+    @property
+    def pulling(self) -> "Published | Tabulated | Held":
+        """The law of the same dome if it is attached to its neighbor."""
+
     def acting(self, inverted: Flags) -> Array:
         """1 for acting domes, 0 for others, (unit, batch); (1, 1) if all act in any state."""
+
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
+        """The branch of its curve that an inverted dome is on at an extension (mm); see `Dome`."""
 
     def touching(self, dome: Dome) -> Touching:
         """The range of extensions (mm) in which a dome acts."""
@@ -124,6 +137,11 @@ class Published(Attached):
 
     description = "published law, pushing and pulling"
     curve = None
+
+    @property
+    def pulling(self) -> "Published":
+        """Itself."""
+        return self
 
     def response(self, extension: Array, dome: Dome) -> Response:
         """The study's polynomial."""
@@ -156,6 +174,11 @@ class Tabulated(Attached):
     def __init__(self, curve: Curve) -> None:
         self.curve = curve
 
+    @property
+    def pulling(self) -> "Tabulated":
+        """Itself."""
+        return self
+
     def response(self, extension: Array, dome: Dome) -> Response:
         """The spline and its derivatives, in mm and N."""
         travel = dome.stroke + dome.contact
@@ -173,19 +196,20 @@ class Tabulated(Attached):
 class PushOnly:
     """A dome that pushes its neighbor but never pulls it: F = min(0, E') between its rests.
 
-    Outside them dome and neighbor do not touch, the energy is constant there. So it is where a
-    curve with ripples would pull, from a lesser well to the next top: the dome stays in that well.
-    Only inverted domes act: which those are is a state of contact, given beside the energy.
+    Outside them dome and neighbor do not touch, the energy is constant there. A curve with ripples
+    has several branches, from a top to the next well, and the dome is on one of them: what goes
+    over a top has left its state. Only inverted domes act: which those are, and on which branch,
+    are states of contact, given beside the energy.
     """
 
     def __init__(self, law: Published | Tabulated) -> None:
-        self.law = law
+        self.pulling = law
         self.curve = law.curve
 
     @property
     def description(self) -> str:
         """The law in words, with the origin of the dome's own energy."""
-        energy = self.law.description.split(" law")[0]
+        energy = self.pulling.description.split(" law")[0]
         return f"push-only law, {energy} energy of the dome"
 
     def response(self, extension: Array, dome: Dome) -> Response:
@@ -196,23 +220,18 @@ class PushOnly:
         >>> float(beyond.force), float(beyond.stiffness)
         (0.0, 0.0)
         """
-        top, well = self.law.rests(dome)
+        top, well = self.touching(dome)
         place = np.real(extension)
         touches = (place > np.real(top)) & (place < np.real(well))
         apart = np.where(place < np.real(well), top, well)
         apart = np.where(np.isnan(apart), 0.0, apart)  # never inverted: never in touch
-        travel = dome.stroke + dome.contact
-        for ripple in self.curve.ripples if self.curve is not None else ():
-            lower, upper = (rest * travel - dome.contact for rest in ripple)
-            lets_go = (place > np.real(lower)) & (place < np.real(upper))
-            touches, apart = touches & ~lets_go, np.where(lets_go, lower, apart)
-        energy, *derivatives = self.law.response(np.where(touches, extension, apart), dome)
+        energy, *derivatives = self.pulling.response(np.where(touches, extension, apart), dome)
         force, stiffness = (np.where(touches, values, 0.0) for values in derivatives)
         return Response(energy, force, stiffness)
 
     def rests(self, dome: Dome) -> Rests:
         """Those of the dome itself."""
-        return self.law.rests(dome)
+        return self.pulling.rests(dome)
 
     def acting(self, inverted: Flags) -> Array:
         """1 for inverted domes, (unit, batch).
@@ -222,10 +241,24 @@ class PushOnly:
         """
         return inverted.astype(float)
 
+    def branch_at(self, extension: Array, dome: Dome) -> Array:
+        """The last one whose top lies before the extension, or the first."""
+        if self.curve is None:
+            return np.zeros((1, 1))
+        tops = (self._opening(top, dome) for top, _ in self.curve.branches[:-1])
+        behind = (np.asarray(extension <= top, float) for top in tops)
+        return np.asarray(sum(behind, np.zeros((1, 1))))
+
     def touching(self, dome: Dome) -> Touching:
-        """From the top of its barrier to its well; nowhere if it has none."""
-        top, well = self.law.rests(dome)
-        return Touching(top, well)
+        """From the top of its barrier to its well, or of its branch; nowhere if it has none."""
+        if self.curve is None or len(self.curve.branches) == 1:
+            return Touching(*self.pulling.rests(dome))
+        ends = np.array(self.curve.branches)[dome.branch.astype(int)]
+        return Touching(self._opening(ends[..., 0], dome), self._opening(ends[..., 1], dome))
+
+    @staticmethod
+    def _opening(travel: Array | float, dome: Dome) -> Array:
+        return np.asarray(travel * (dome.stroke + dome.contact) - dome.contact)
 
 
 class Held(Attached):
@@ -237,6 +270,11 @@ class Held(Attached):
 
     description = "domes held"
     curve = None
+
+    @property
+    def pulling(self) -> "Held":
+        """Itself."""
+        return self
 
     def response(self, extension: Array, dome: Dome) -> Response:
         """As of a linear spring of the dome's stiffness."""

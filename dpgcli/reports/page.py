@@ -3,7 +3,14 @@
 import re
 from collections.abc import Sequence
 
-from dpgcli.reports.summary import MOST_ROWS, DesignSpace, Section, Table, sections, shortened
+from dpgcli.reports.summary import (
+    MOST_ROWS,
+    DesignSpace,
+    PageSection,
+    PageTable,
+    sections,
+    shortened,
+)
 from dpgcli.sweeps.gate import RequirementVerdict
 from dpgcli.text import printable
 
@@ -50,16 +57,16 @@ def html(space: DesignSpace) -> str:
 
 def verdicts_markdown(verdicts: Sequence[RequirementVerdict]) -> str:
     """Verdicts on requirements as Markdown, with the first designs that fail each."""
-    lines: list[str | Table] = []
+    lines: list[str | PageTable] = []
     for verdict in verdicts:
         lines.append(str(verdict))
         if not verdict.is_met:
             failures = [[str(failure)] for failure in verdict.failures(MOST_ROWS)]
-            lines += shortened(Table(("first that fail",), failures), len(verdict.rows))
-    return _markdown([Section("Requirements", lines)])
+            lines += shortened(PageTable(("first that fail",), failures), len(verdict.rows))
+    return _markdown([PageSection("Requirements", lines)])
 
 
-def _markdown(shown: Sequence[Section]) -> str:
+def _markdown(shown: Sequence[PageSection]) -> str:
     parts = []
     for place, section in enumerate(shown):
         parts.append(f"{'##' if place else '#'} {section.title}")
@@ -70,7 +77,7 @@ def _markdown(shown: Sequence[Section]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _markdown_table(table: Table) -> str:
+def _markdown_table(table: PageTable) -> str:
     rows = [table.head, ["---"] * len(table.head), *table.rows]
     lines = [" | ".join(c if c == "---" else _escaped(c) for c in row) for row in rows]
     return "\n".join(f"| {line} |" for line in lines)

@@ -44,18 +44,18 @@ BARS_ALONE = 0.01  # relative: how close to k_L/n a stiffness shows nothing but 
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
-class Table(NamedTuple):
+class PageTable(NamedTuple):
     """Cells of text under a head."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """Paragraphs and tables under a title."""
 
     title: str
-    blocks: Sequence[str | Table]
+    blocks: Sequence[str | PageTable]
 
 
 @dataclass(frozen=True)
@@ -122,18 +122,18 @@ class DesignSpace:
         return f"{words} ({unit})" if unit else words
 
 
-def sections(space: DesignSpace) -> list[Section]:
+def sections(space: DesignSpace) -> list[PageSection]:
     """All sections about a space, the best designs first."""
-    counted = Section("Design space", [_extent(space), *base_lines(space.metadata)])
+    counted = PageSection("Design space", [_extent(space), *base_lines(space.metadata)])
     if not len(space):
         return [counted]
     return [
         counted,
-        Section("Best and worst designs", _extremes(space)),
-        Section("Designs by status and calibration", [_counts(space)]),
-        Section("What failed and why", _failures(space)),
-        Section("Where bistability ends", _bistability(space)),
-        Section("Largest numerical error", _errors(space)),
+        PageSection("Best and worst designs", _extremes(space)),
+        PageSection("Designs by status and calibration", [_counts(space)]),
+        PageSection("What failed and why", _failures(space)),
+        PageSection("Where bistability ends", _bistability(space)),
+        PageSection("Largest numerical error", _errors(space)),
     ]
 
 
@@ -148,7 +148,7 @@ def _extent(space: DesignSpace) -> str:
     return f"{len(space):,} designs over {', '.join(spans)}."
 
 
-def _counts(space: DesignSpace) -> Table:
+def _counts(space: DesignSpace) -> PageTable:
     columns = (space.designs[name].tolist() for name in ("status", "calibration"))
     counts = Counter(zip(*columns, strict=True))
     found = {kind for _, kind in counts}
@@ -160,7 +160,7 @@ def _counts(space: DesignSpace) -> Table:
         for status, total in totals.items()
         if total
     ]
-    return Table(head, rows)
+    return PageTable(head, rows)
 
 
 class Extreme(NamedTuple):
@@ -205,7 +205,7 @@ def bars_alone(space: DesignSpace, rows: Indices) -> Flags:
     return np.isclose(space.designs[STIFFEST][rows], in_series, rtol=BARS_ALONE, atol=0)
 
 
-def in_short(space: DesignSpace) -> tuple[str, Table]:
+def in_short(space: DesignSpace) -> tuple[str, PageTable]:
     """How many designs there are of each status, and the best and the worst of each metric."""
     counts = {status: len(space.of_status(status)) for status in STATUSES}
     listed = ", ".join(f"{n:,} {status}" for status, n in counts.items() if n)
@@ -215,10 +215,10 @@ def in_short(space: DesignSpace) -> tuple[str, Table]:
         cells = (space.shown(name, space.designs[name][row]), space.number(row) + more)
         rows.setdefault(name, [name]).extend(cells)
     filled = [[*cells, "all alike", ""][: len(SHORT_HEAD)] for cells in rows.values()]
-    return f"{len(space):,} designs: {listed or 'none'}", Table(SHORT_HEAD, filled)
+    return f"{len(space):,} designs: {listed or 'none'}", PageTable(SHORT_HEAD, filled)
 
 
-def _extremes(space: DesignSpace) -> list[str | Table]:
+def _extremes(space: DesignSpace) -> list[str | PageTable]:
     rows = []
     for name, word, row, n_more in extremes(space):
         more = f" and {n_more:,} more" if n_more else ""
@@ -230,7 +230,7 @@ def _extremes(space: DesignSpace) -> list[str | Table]:
     return [
         text,
         *_left_out(space),
-        Table(["metric", "", "value", "design", *space.swept], rows),
+        PageTable(["metric", "", "value", "design", *space.swept], rows),
     ]
 
 
@@ -250,7 +250,7 @@ def is_alike(values: Any) -> bool:
     return bool(np.isclose(values.max(), values.min(), rtol=RELATIVE_EQUALITY, atol=0))
 
 
-def _failures(space: DesignSpace) -> list[str | Table]:
+def _failures(space: DesignSpace) -> list[str | PageTable]:
     """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
     others = space.of_status(*STATUSES[1:])
     if not len(others):
@@ -266,10 +266,10 @@ def _failures(space: DesignSpace) -> list[str | Table]:
         why = reason or WITHOUT_REASON.get(status, "")
         rows.append([status, f"{count:,}", why, space.number(row), *space.point(row)])
     head = ["status", "designs", "reason, as of the example", "example", *space.swept]
-    return shortened(Table(head, rows[:MOST_ROWS]), len(rows))
+    return shortened(PageTable(head, rows[:MOST_ROWS]), len(rows))
 
 
-def _bistability(space: DesignSpace) -> list[str | Table]:
+def _bistability(space: DesignSpace) -> list[str | PageTable]:
     judged = space.of_status(*BOUNDARY_STATUSES)
     by_status = {status: space.of_status(status) for status in BOUNDARY_STATUSES}
     found = [status for status, rows in by_status.items() if len(rows)]
@@ -280,10 +280,10 @@ def _bistability(space: DesignSpace) -> list[str | Table]:
     rows = [
         [name, *(space.span(name, by_status[status]) for status in found)] for name in space.swept
     ]
-    return [Table(["range of", *found], rows), *_boundary(space, judged)]
+    return [PageTable(["range of", *found], rows), *_boundary(space, judged)]
 
 
-def _boundary(space: DesignSpace, judged: Indices) -> list[str | Table]:
+def _boundary(space: DesignSpace, judged: Indices) -> list[str | PageTable]:
     """Runs of stable designs along one swept value, for each value of the other."""
     if not 1 <= len(space.swept) <= 2:
         return []
@@ -302,7 +302,7 @@ def _boundary(space: DesignSpace, judged: Indices) -> list[str | Table]:
         ]
     head = [*fixed, "not stable up to", "stable from", "stable to", "not stable from"]
     text = f"Along {along}; – where the space ends first or nothing is stable."
-    return [text, *shortened(Table(head, rows[:MOST_ROWS]), len(rows))]
+    return [text, *shortened(PageTable(head, rows[:MOST_ROWS]), len(rows))]
 
 
 def _lines(space: DesignSpace, name: str, rows: Indices) -> Iterator[Indices]:
@@ -320,7 +320,7 @@ def _stable_runs(values: Array, is_stable: Flags) -> Iterator[tuple[float | None
         yield padded[start], padded[start + 1], padded[stop], padded[stop + 1]
 
 
-def _errors(space: DesignSpace) -> list[str | Table]:
+def _errors(space: DesignSpace) -> list[str | PageTable]:
     rows = []
     for name in ERRORS:
         known = space.known(name, space.usable) if name in space.designs else ()
@@ -329,10 +329,12 @@ def _errors(space: DesignSpace) -> list[str | Table]:
             row = known[np.argmax(values[known])]
             value = space.shown(name, values[row])
             rows.append([name, value, space.number(row), *space.point(row)])
-    return [Table(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]
+    return (
+        [PageTable(["", "value", "design", *space.swept], rows)] if rows else ["No design has any."]
+    )
 
 
-def shortened(table: Table, n_rows: int) -> list[str | Table]:
+def shortened(table: PageTable, n_rows: int) -> list[str | PageTable]:
     """A table, and a line that counts the rows left out."""
     n_more = n_rows - len(table.rows)
     return [table, f"And {n_more:,} more."] if n_more else [table]

@@ -23,9 +23,9 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.guess import without_first
+from dpgcli.states.rigid_unit import single_units
 from dpgcli.states.tip import TIP_ROUNDING
 from dpgcli.states.units import UnitSolutions
-from dpgcli.states.wells import single_units
 
 SAFETY = 2.0
 SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-14, 1e-3  # below, rounding decides

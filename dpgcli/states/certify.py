@@ -17,7 +17,7 @@ from dpgcli.states.wells import Wells
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))  # below it, rounding may decide
 SMALL_SHARE = 0.1  # of a unit's holding force: a smaller residual cannot make it snap
 LARGEST_CURVATURE = 1.0  # a larger one is far from any loss of stability
-FINEST_BALANCE = 1e-13  # of the forces in play: rounding leaves so much of them
+FINEST_BALANCE = 1e-13  # of the finger's forces in play: rounding leaves so much of them
 
 
 class Status(IntEnum):
@@ -47,7 +47,8 @@ class Status(IntEnum):
 _MEANINGS = {
     Status.STABLE: "certified: residual, curvature, wells and shape",
     Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
-    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern",
+    Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern, or in a ripple of "
+    "a dome's curve",
     Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
@@ -60,14 +61,16 @@ class Settled:
     """Equilibria of one finger (or one per lane), certified, shapes (…, batch).
 
     `inverted` is the pattern that was asked for, `reached` the wells in which the units ended,
-    (unit, batch); `is_folded` marks impossible shapes, `is_balanced` residual forces too small to
-    matter, (batch,). `status` holds `Status` codes.
+    (unit, batch); `strayed` are units in a ripple of their dome's curve instead of their well (see
+    `wells.Wells`), (unit, batch); `is_folded` marks impossible shapes, `is_balanced` residual
+    forces too small to matter, (batch,). `status` holds `Status` codes.
     """
 
     potential: FingerPotential
     equilibrium: Equilibrium
     inverted: Flags
     reached: Flags
+    strayed: Flags
     is_folded: Flags
     is_balanced: Flags
     status: NDArray[np.uint8]
@@ -93,14 +96,18 @@ def certified(
     coordinates = potential.coordinates
     extension, is_folded, lever = coordinates.springs(equilibrium.coordinates)
     # a dome that does not act is not inverted by its neighbors
-    reached = (extension > units.wells.spring_barrier) & (coordinates.finger.acting > 0.0)
+    wells = units.wells
+    reached = (extension > wells.spring_barrier) & (coordinates.finger.acting > 0.0)
+    strayed = reached & ((extension < wells.from_top) | (extension > wells.to_top))
     loop = units.shortest_loop
     if loop is not None:
         nodes = coordinates.stations(equilibrium.coordinates)
         is_folded |= crosses_itself(outline(nodes, units.finger.segment_height), loop)
-    is_balanced = _is_balanced(coordinates, equilibrium, lever, reached, units.wells)
+    is_balanced = _is_balanced(coordinates, equilibrium, lever, reached, wells)
     unknown = np.zeros(inverted.shape[1], np.uint8)
-    settled = Settled(potential, equilibrium, inverted, reached, is_folded, is_balanced, unknown)
+    settled = Settled(
+        potential, equilibrium, inverted, reached, strayed, is_folded, is_balanced, unknown
+    )
     return replace(settled, status=certify(settled, units, tolerance, own))
 
 
@@ -115,7 +122,7 @@ def certify(
     is_curved = equilibrium.curvature > MARGINAL_CURVATURE
     checks = (
         (~is_curved, Status.MARGINAL),
-        (elsewhere.any(axis=0), Status.ANOTHER_PATTERN),
+        ((elsewhere | settled.strayed[own]).any(axis=0), Status.ANOTHER_PATTERN),
         ((elsewhere & inverted & has_none).any(axis=0), Status.NOT_BISTABLE),
         (settled.is_folded, Status.FOLDED),
         (is_curved & ~settled.is_balanced, Status.NOT_CONVERGED),
@@ -153,6 +160,7 @@ def _is_balanced(
     on_opening = (moments / np.where(lever > 0.0, lever, finger.segment_height)).max(axis=0)
     borne = np.where(reached, np.abs(wells.reset_force), wells.snap_force)
     curvature = np.clip(equilibrium.curvature, 0.0, LARGEST_CURVATURE)
-    by_fold = np.maximum(curvature * curvature / 96.0, FINEST_BALANCE) * finger.force_scale
+    rounding = FINEST_BALANCE * finger.force_scale.max(axis=0)  # a weak unit feels its neighbors'
+    by_fold = np.maximum(curvature * curvature / 96.0 * finger.force_scale, rounding)
     is_small = (on_opening <= SMALL_SHARE * borne) & (unbalance <= SMALL_SHARE * by_fold)
     return np.asarray(is_small.all(axis=0))

@@ -8,7 +8,8 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.wells import ByUnit, Wells, opening_of, single_units
+from dpgcli.states.rigid_unit import opening_of, single_units
+from dpgcli.states.wells import ByUnit, Wells
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.wells import inverted_wells, single_units
+from dpgcli.states.rigid_unit import single_units
+from dpgcli.states.wells import inverted_wells
 
 BISECTIONS = 60
 SHORTEST = 1e-9  # strokes in heights: the hinge then turns as good as not at all

@@ -84,7 +84,7 @@ def _worth_a_search(settled: Settled, units: UnitSolutions) -> Indices:
 
     What is folded in its own wells between stiff bars has no other state.
     """
-    is_elsewhere = (settled.reached != settled.inverted).any(axis=0)
+    is_elsewhere = ((settled.reached != settled.inverted) | settled.strayed).any(axis=0)
     is_missed = is_elsewhere | (settled.status != Status.STABLE)
     if units.finger.is_rigid or not is_missed.any():
         return np.arange(0)

@@ -67,6 +67,7 @@ class UnitSolutions:
     @classmethod
     def of(cls, finger: Finger) -> "UnitSolutions":
         wells = inverted_wells(finger)
+        finger = finger.with_branches(wells.extension)
         return cls(finger, wells, first_order(finger, wells))
 
     def section(self, first: int, stop: int) -> "UnitSolutions":

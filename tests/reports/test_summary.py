@@ -19,7 +19,7 @@ from dpgcli.arrays import Columns
 from dpgcli.reports.page import _html, _markdown, verdicts_markdown
 from dpgcli.reports.page import html as html_of
 from dpgcli.reports.page import markdown as markdown_of
-from dpgcli.reports.summary import DesignSpace, Section, Table, in_short
+from dpgcli.reports.summary import DesignSpace, PageSection, PageTable, in_short
 from dpgcli.sweeps.gate import check_requirements, requirement
 from dpgcli.text import printable
 
@@ -240,9 +240,9 @@ def test_the_page_has_the_same_cells_and_needs_no_other_file() -> None:
 @example("---")
 @example("- 1. # > + =")
 def test_whatever_a_cell_says_the_page_says_the_same(text: str) -> None:
-    table = Table(("a", "b"), [["0", text], [text, "1"]])
+    table = PageTable(("a", "b"), [["0", text], [text, "1"]])
     reader = Cells()
-    reader.feed(_html(_markdown([Section("S", [table])])))
+    reader.feed(_html(_markdown([PageSection("S", [table])])))
     said = printable(" ".join(text.split()))
     assert reader.cells == ["a", "b", "0", said, said, "1"]
 

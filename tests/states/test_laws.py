@@ -116,16 +116,16 @@ def test_a_hinge_never_resets_a_dome_that_still_pushes_in_the_straight_finger() 
 
 
 def test_barriers_of_a_dome_that_inverts_before_it_touches() -> None:
-    """To snap costs the dome's own barrier alone, to reset at least that less the well."""
+    """The dome's own, as the hinge is at rest at that top; to reset, that less the well."""
     finger = dome_that_inverts_before_it_touches()
     curve = finger.law.curve
     assert curve is not None
     own = 12.84 * 13.7**2 * float(curve(np.array(curve.rests[0])).value)
     wells = inverted_wells(finger)
     (lowest,) = barriers(finger, wells)
-    half_turns = np.arcsin(np.stack((wells.barrier, wells.extension))[:, 0, 0] / 21.5)
-    top, bottom = 0.5 * 24.2 * (2.0 * half_turns) ** 2
-    reset = own + top - float(finger.springs(wells.extension).energy[0, 0]) - bottom
+    half_turn = float(np.arcsin(wells.extension[0, 0] / 21.5))
+    bottom = 0.5 * 24.2 * (2.0 * half_turn) ** 2
+    reset = own - float(finger.springs(wells.extension).energy[0, 0]) - bottom
     assert lowest == pytest.approx(min(own, reset), rel=1e-9)
 
 
@@ -316,23 +316,29 @@ def test_units_with_rippled_curves_rest_where_a_scan_finds_them(pushes_only: boo
     assert min(n_states, n_none) > 5
 
 
-def test_a_dome_that_only_pushes_does_not_pull_in_a_ripple_either() -> None:
-    """It stays in the lesser well, where its energy is, until the next top."""
-    curve = rippled(np.inf, 24.2).law.curve
-    assert curve is not None and curve.ripples == ()
+def test_a_dome_that_only_pushes_is_on_one_branch_of_a_curve_with_ripples() -> None:
+    """Between a top and the next well it answers as if attached, beyond them not at all."""
+    plain = rippled(np.inf, 24.2).law.curve
+    assert plain is not None and plain.branches == (plain.rests,)
     travel = np.linspace(0.0, 1.4, 141)
     energy = 0.5 * travel**2 * (0.02 + 0.98 * (1.0 - travel) ** 2) + 0.01 * np.sin(20.0 * travel)
     curve = spline(tuple(travel), tuple(energy))
-    ((lower, upper),) = curve.ripples
+    (upper, well), (top, lower) = curve.branches
+    assert (top, well) == curve.rests and top < lower < upper < well
     law, dome = PushOnly(Tabulated(curve)), rippled(np.inf, 24.2).domes
-    inside = np.linspace(lower, upper, 9)[1:-1] * 4.6
-    assert (Tabulated(curve).response(inside, dome).force > 0.0).all()
-    apart = law.response(inside, dome)
-    assert (apart.force == 0.0).all() and (apart.stiffness == 0.0).all()
-    at_rest = float(dome.stiffness.item() * 4.6**2 * curve(np.array(lower)).value)
-    assert apart.energy == pytest.approx(np.full((1, 7), at_rest), rel=1e-12)
-    around = np.linspace(*curve.rests, 201)[1:-1] * 4.6
-    assert (law.response(around, dome).force <= 0.0).all()
+    for branch, ends in enumerate(curve.branches):
+        on = dome._replace(branch=np.array([[float(branch)]]))
+        inside = np.linspace(*ends, 9)[1:-1] * 4.6
+        assert (law.branch_at(inside, on) == branch).all()
+        for own, attached in zip(
+            law.response(inside, on), Tabulated(curve).response(inside, on), strict=True
+        ):
+            assert own == pytest.approx(attached, rel=1e-12)
+        for end, beyond in zip(ends, (ends[0] - 0.1, ends[1] + 0.1), strict=True):
+            apart = law.response(np.array(beyond * 4.6), on)
+            assert (apart.force.item(), apart.stiffness.item()) == (0.0, 0.0)
+            at_end = float(dome.stiffness.item() * 4.6**2 * curve(np.array(end)).value)
+            assert apart.energy.item() == pytest.approx(at_end, rel=1e-12)
 
 
 def test_a_dome_that_does_not_act_brings_no_force_into_play(reference_finger: Fingers) -> None:

@@ -1,0 +1,83 @@
+"""One unit between rigid bars: energy, force and stiffness by its dome's extension.
+
+Both corners open by m, so that the opening is x = 2H sin m, and the hinge's energy ½ k_θ (2m)².
+Walls take the rest of the dome's extension y: w = y − x.
+"""
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.equilibrium.contracts import Response
+from dpgcli.mechanics import laws
+from dpgcli.mechanics.finger import Finger
+
+SHORT_OF_LEVER = 1.0 - 1e-9  # of 2H, where bars end all opening
+NEWTON_STEPS = 12  # for an opening: quadratic from a start that is off by the wall's share
+
+
+def rigid_unit(finger: Finger, extension: Array) -> Response:
+    """Energy (mJ), force (N) and stiffness (N/mm) by the extension y (mm) of the dome's spring.
+
+    E(y) + w²/(2 c_w) + ½ k_θ φ² with φ = 2m and w = c_w h', h' being the hinge's pull on the
+    opening: hinge and wall are springs in series. Beyond the lever there is no well to ask for.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> unit = uniform_finger(1, **{**STUDY, "hinge_stiffness": 0.0})
+    >>> print(rigid_unit(unit, np.array([[3.5]])).energy.round(8))  # ½ α k_b d²
+    [[3.381735]]
+    """
+    spring, opening = finger.springs(extension), opening_of(finger, extension)
+    turn, pull, stiffness = _hinge(finger, opening)
+    energy = spring.energy + laws.quadratic(2.0 * turn, finger.hinge_stiffness).energy
+    if finger.has_walls:
+        energy = energy + 0.5 * finger.wall_compliance * pull * pull
+    stiffness = spring.stiffness + _with_wall(finger, stiffness)
+    return Response(energy, spring.force + pull, stiffness)
+
+
+def rigid_stiffness(finger: Finger, extension: Array) -> Array:
+    """The stiffness alone, N/mm, of `rigid_unit`."""
+    *_, stiffness = _hinge(finger, opening_of(finger, extension))
+    return finger.springs(extension).stiffness + _with_wall(finger, stiffness)
+
+
+def _with_wall(finger: Finger, stiffness: Array) -> Array:
+    """The hinge's stiffness in series with the wall's, N/mm."""
+    if not finger.has_walls:
+        return stiffness
+    return np.asarray(stiffness / (1.0 + finger.wall_compliance * stiffness))
+
+
+def opening_of(finger: Finger, extension: Array) -> Array:
+    """The opening x of a unit with rigid bars whose dome's spring extends by y, mm.
+
+    Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. The right
+    side is convex, so that Newton's method from above reaches the root monotonically.
+    """
+    if not finger.has_walls:
+        return extension
+    opening = np.minimum(extension, SHORT_OF_LEVER * 2.0 * finger.segment_height)
+    for _ in range(NEWTON_STEPS):
+        _, pull, stiffness = _hinge(finger, opening)
+        excess = opening - extension + finger.wall_compliance * pull
+        step = excess / (1.0 + finger.wall_compliance * stiffness)
+        opening = opening - np.maximum(step, 0.0)  # not at all where bars end it
+    return np.asarray(opening)
+
+
+def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
+    """m (rad), the hinge's pull on the opening x = 2H sin m, N, and its stiffness, N/mm."""
+    sine = opening / (2.0 * finger.segment_height)
+    sine = np.minimum(sine, SHORT_OF_LEVER)  # beyond it there is no well to ask for
+    half_turn, cosine = np.arcsin(sine), np.sqrt(1.0 - sine * sine)
+    stiffness = finger.hinge_stiffness / finger.segment_height**2
+    pull = 2.0 * stiffness * finger.segment_height * half_turn / cosine
+    return half_turn, pull, stiffness / cosine**2 * (1.0 + half_turn * sine / cosine)
+
+
+def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
+    """Every unit of every design as a design of its own, and how many units and designs."""
+    arrays = {**finger.arrays(), "branch": finger.branch}
+    units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
+    flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
+    return finger.with_units([0]).changed(**flat), (units, designs)

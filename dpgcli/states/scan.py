@@ -1,0 +1,185 @@
+"""Wells and tops of a unit under any law: signs of its force on a grid, then bisection.
+
+The places of the grid next to which the force turns are moved to where it does, so that a well and
+its barrier next to a fold are told apart, however close they are.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.mechanics.finger import Finger
+from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_stiffness, rigid_unit, single_units
+
+MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
+IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
+SEARCHED = 512  # extensions at which the force of a unit is looked at
+TANGENTS = 2.0  # times a slope's reach: a stiffness may have a kink in the cell
+WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
+BISECTIONS = 52  # of one 512th of the range: down to rounding
+
+
+class Scan(NamedTuple):
+    """What there is of a unit's wells, extensions in mm; see `wells.Wells`."""
+
+    exists: Flags
+    extension: Array
+    barrier: Array
+    from_top: Array
+    to_top: Array
+    snap_force: Array
+    reset_force: Array
+
+
+class _Profile(NamedTuple):
+    """Places along the extension of a unit and its response there, (place, unit, design)."""
+
+    places: Array
+    energy: Array
+    force: Array
+    stiffness: Array
+
+
+def scan(finger: Finger) -> Scan:
+    """Find each unit's deepest well beyond its spring's own barrier; `wells` says which counts.
+
+    Wells and tops are those of the dome attached to its neighbor, also where it only pushes: the
+    hinge pulls back at every opening, so that the dome pushes wherever the unit rests or turns.
+    """
+    attached = replace(finger, law=finger.law.pulling)
+    rests = finger.law.rests(finger.domes)
+    widest, within_reach = _range(finger, rests.well)
+    profile = _turned(attached, _profile(attached, widest))
+    rises = profile.force >= 0.0
+    places = np.arange(len(rises) - 1)[:, None, None]
+    is_well, is_top = ~rises[:-1] & rises[1:], rises[:-1] & ~rises[1:]
+    before = profile.places[:-1]
+    is_well &= (before >= np.maximum(rests.top, 0.0)) & within_reach
+    if not pulls(finger):
+        is_well &= before < rests.well  # beyond it the dome is not in touch
+    at_top = attached.springs(rests.top).energy  # the barrier of a dome that inverts untouched
+    untouched = np.where(rests.top < 0.0, at_top, -np.inf)
+    # beyond the last place the unit's energy rises on, or bars end it: no well is shallow for that
+    highest = np.maximum(np.maximum.accumulate(profile.energy, axis=0), untouched)[:-1]
+    well = np.where(is_well, highest - profile.energy[:-1], -np.inf).argmax(axis=0)
+    tops = np.where(is_top & (places < well), profile.energy[:-1], -np.inf)
+    top = tops.argmax(axis=0)
+    is_touching = tops.max(axis=0) > untouched
+    exists = np.asarray(is_well.any(axis=0))
+    at_well = _bisected(attached, profile.places, well, rises=True)
+    turning = _bisected(attached, profile.places, top, rises=False)
+    turning = np.where(is_touching, turning, _or_zero(rests.top))
+    extension = np.where(exists, at_well, opened(finger, widest))
+    barrier = np.where(exists, turning, MIDDLE * finger.stroke)
+    along = profile.places
+    reset = _largest(-profile.force, (along >= barrier) & (along <= extension))
+    snap = _largest(profile.force, (along <= barrier) & pulls(finger))
+    others = _between(attached, profile.places, (is_well, is_top), well)
+    return Scan(exists, extension, barrier, *others, snap, reset)
+
+
+def pulls(finger: Finger) -> bool:
+    """Whether domes act in any state, also where they pull."""
+    return finger.law.pulling is finger.law
+
+
+def opened(finger: Finger, widest: Array) -> Array:
+    """Where a search begins in a unit without a second well, mm: open by its stroke.
+
+    A dome that only pushes has to be in touch, or nothing would hold the unit there.
+    """
+    highest = np.nan if pulls(finger) else finger.law.rests(finger.domes).well
+    opening = np.where(np.isnan(highest), finger.stroke, IN_TOUCH * highest)
+    return np.asarray(np.minimum(opening, widest))
+
+
+def _or_zero(top: Array) -> Array:
+    return np.where(np.isnan(top), 0.0, np.minimum(top, 0.0))
+
+
+def _range(finger: Finger, own_well: Array) -> tuple[Array, Flags]:
+    """The widest extension to look at (mm), and whether a unit can get there."""
+    domes = finger.domes
+    whole = domes.stroke + domes.contact
+    own = own_well + domes.contact  # a travel; the unit's is shorter
+    widest = WIDEST * np.where(np.isnan(own), whole, own) - domes.contact
+    if not finger.has_walls:  # walls take the rest
+        widest = np.minimum(widest, SHORT_OF_LEVER * 2.0 * finger.segment_height)
+    within_reach = widest > 0.0
+    return np.where(within_reach, widest, finger.stroke), within_reach
+
+
+def _profile(finger: Finger, widest: Array) -> _Profile:
+    grid = widest * np.linspace(0.0, 1.0, SEARCHED + 1)[:, None, None]
+    energy, force, stiffness = rigid_unit(finger, grid)
+    return _Profile(np.broadcast_to(grid, force.shape), energy, force, stiffness)
+
+
+def _turned(finger: Finger, profile: _Profile) -> _Profile:
+    """The profile with the end of a cell moved to where the force turns in it, if that may matter.
+
+    It does where the force keeps its sign at both ends but may lose it between: next to a fold.
+    """
+    cell, unit, design = np.nonzero(_may_hide_two_roots(profile))
+    if not len(cell):
+        return profile
+    flat, (_, designs) = single_units(finger)
+    few = flat.take_lanes(unit * designs + design)
+    low, high = (profile.places[cell + k, unit, design][None] for k in (0, 1))
+    begins = profile.stiffness[cell, unit, design] >= 0.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_before = (rigid_stiffness(few, middle) >= 0.0) == begins
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    places, energy, force = (part.copy() for part in profile[:3])
+    for own, new in zip((places, energy, force), (low, *rigid_unit(few, low)[:2]), strict=True):
+        own[cell + 1, unit, design] = new[0]
+    return _Profile(places, energy, force, profile.stiffness)
+
+
+def _may_hide_two_roots(profile: _Profile) -> Flags:
+    """Cells between whose ends the force turns, may vanish by its tangents, and has one sign."""
+    first, second = (profile.stiffness[:-1], profile.stiffness[1:])
+    before, after = profile.force[:-1], profile.force[1:]
+    width = TANGENTS * np.diff(profile.places, axis=0)
+    is_least = (before >= 0.0) & (after >= 0.0) & (first < 0.0) & (second >= 0.0)
+    is_largest = (before < 0.0) & (after < 0.0) & (first >= 0.0) & (second < 0.0)
+    reaches = (np.abs(before) <= width * np.abs(first)) & (np.abs(after) <= width * np.abs(second))
+    hides = (is_least | is_largest) & reaches
+    hides[-1] = False  # the last place stays
+    return np.asarray(hides)
+
+
+def _between(
+    finger: Finger, places: Array, turns: tuple[Flags, Flags], well: Indices
+) -> tuple[Array, Array]:
+    """The tops beside a well that part it from others, ∓ infinity where there is no other."""
+    is_well, is_top = turns
+    index = np.arange(len(is_well))[:, None, None]
+    lower, upper = np.full(well.shape, -np.inf), np.full(well.shape, np.inf)
+    has_lesser = (is_well & (index < well)).any(axis=0)
+    if has_lesser.any():
+        last = np.where(is_top & (index < well), index, 0).max(axis=0)
+        lower = np.where(has_lesser, _bisected(finger, places, last, rises=False), lower)
+    has_further = (is_well & (index > well)).any(axis=0)
+    if has_further.any():
+        first = (is_top & (index > well)).argmax(axis=0)
+        upper = np.where(has_further, _bisected(finger, places, first, rises=False), upper)
+    return lower, upper
+
+
+def _largest(values: Array, at: Flags) -> Array:
+    """The largest of some values by unit, (place, unit, design); infinite where there are none."""
+    return np.where(at.any(axis=0), np.where(at, values, -np.inf).max(axis=0), np.inf)
+
+
+def _bisected(finger: Finger, places: Array, index: Indices, *, rises: bool) -> Array:
+    """Where the force changes its sign between a place and the next."""
+    low, high = (np.take_along_axis(places, (index + k)[None], axis=0)[0] for k in (0, 1))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_beyond = (rigid_unit(finger, middle).force >= 0.0) == rises
+        low, high = np.where(is_beyond, low, middle), np.where(is_beyond, middle, high)
+    return np.asarray(0.5 * (low + high))
