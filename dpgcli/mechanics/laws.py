@@ -286,34 +286,4 @@ class Held(Attached):
         return Rests(nowhere, nowhere)
 
 
-class Softened(Attached):
-    """A law beside a wall of a compliance c so small that its square does not count, (unit, batch).
-
-    In series they have the least E + w²/(2c) over what the wall yields, E − ½ c F² to first order.
-    A complex step from a rigid wall needs it: √(c k_b), by which `walls` count, has no slope there.
-    """
-
-    description = "softened domes"
-    curve = None
-
-    def __init__(self, law: DomeLaw, compliance: Array) -> None:
-        self.law = law
-        self.compliance = compliance
-
-    def response(self, extension: Array, dome: Dome) -> Response:
-        """Energy and force to first order in c; the stiffness is that of the dome.
-
-        >>> spring = Dome(np.array(2.0), np.array(1.0), np.array(1.0), np.array(0.0))  # α = 1
-        >>> float(Softened(PUBLISHED, np.array(1e-3)).response(np.array(3.0), spring).force)
-        5.988
-        """
-        energy, force, stiffness = self.law.response(extension, dome)
-        yielded = self.compliance * force
-        return Response(energy - 0.5 * yielded * force, force - yielded * stiffness, stiffness)
-
-    def rests(self, dome: Dome) -> Rests:
-        """Those of the dome: without force no wall yields."""
-        return self.law.rests(dome)
-
-
 PUBLISHED, HELD = Published(), Held()
