@@ -139,7 +139,7 @@ def explain(
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> plan = explain(uniform_finger(5, **STUDY))
-    >>> plan.n_states, plan.terms, plan.omissions[1].why.partition(";")[0]
+    >>> plan.n_states, plan.terms, plan.omissions[2].why.partition(";")[0]
     (32, ('bistable', 'hinge'), 'k_L is infinite')
     """
     given = scene_input(spec, settings)
