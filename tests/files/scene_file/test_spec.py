@@ -103,6 +103,7 @@ def test_the_study_s_finger_has_the_published_lattice_exactly():
         "hinge_stiffness": [[24.2]],
         "linear_stiffness": [[1e4]],
         "dome_travel": [[0.0]],
+        "wall_compliance": [[0.0]],
     }
 
 
@@ -317,7 +318,7 @@ def test_settings_reach_overrides_written_as_numbers(read):
         (
             "zzz=3",
             "settings: zzz: expected a known key, found zzz "
-            "(known here: finger, gripper, data, uncertainty, model_error)",
+            "(known here: finger, gripper, uncertainty, model_error, data)",
         ),
     ],
 )
