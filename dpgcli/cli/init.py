@@ -45,7 +45,7 @@ def _write_sweep(path: Path, text: str, base_name: str, base_text: str, *, force
     from dpgcli.errors import UsageError
 
     base = path.parent / base_name
-    if path == base:
+    if os.path.realpath(path) == os.path.realpath(base):
         raise UsageError(f"{path} is the base of the sweep: give the sweep another name")
     if not _write(path, text, force=force):
         return
