@@ -84,7 +84,7 @@ PAGES = {"README": ROOT / "README.md"} | {
 MANUAL = "\n".join(path.read_text(encoding="utf-8") for path in PAGES.values())
 FENCED = re.compile(r"^```(\w+)(.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 LAST_DIGITS = re.compile(r"\d\.\de[-+]\d\d")  # rounding differs between processors
-PROGRESS = re.compile(r"^.*, \d+ s( left)?\n", re.MULTILINE)  # while one waits
+PROGRESS = re.compile(r"^.*, [\d,]+ s( left)?\n", re.MULTILINE)  # while one waits
 TIMES = re.compile(r"[\d.,]+ (?=s\b|states/s|% of the workers|% in )")
 
 

@@ -35,13 +35,17 @@ LISTS = ("states", "designs")
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT, N_DESIGNS = "dpg.fingerprint", "dpg.designs"
-BASE = "dpg.base"  # a name only: nothing depends on it
+BASE = "dpg.base"  # a name only: no result depends on it
+SHA256 = "sha256"  # of all texts in sweep.json, the name of the base as well
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
     """The SHA-256 of a sweep's metadata, but for the name of its base."""
-    rest = {key: text for key, text in said.items() if key not in (FINGERPRINT, BASE)}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+    return _sha256({key: text for key, text in said.items() if key not in (FINGERPRINT, BASE)})
+
+
+def _sha256(texts: Mapping[str, str]) -> str:
+    return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).hexdigest()
 
 
 def write_part(
@@ -140,7 +144,8 @@ class PartStore:
             raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
             with whole_file(self.folder / SAID, Mark.ANY) as temporary:
-                temporary.write_text(json.dumps(said, indent=2), encoding="utf-8", newline="\n")
+                text = json.dumps({**said, SHA256: _sha256(said)}, indent=2)
+                temporary.write_text(text, encoding="utf-8", newline="\n")
 
     def said(self) -> dict[str, str]:
         """The sweep's metadata (sweep.json); empty where the file is missing or damaged.
@@ -157,7 +162,10 @@ class PartStore:
             raise UsageError(f"cannot read {path}: {error.strerror}") from error
         except (ValueError, RecursionError):
             return {}
-        return said if _is_sweep(said) and said[FINGERPRINT] == fingerprint(said) else {}
+        if not _is_sweep(said):
+            return {}
+        is_whole = said.pop(SHA256, None) == _sha256(said)
+        return said if is_whole and said[FINGERPRINT] == fingerprint(said) else {}
 
     def drop(self) -> None:
         """Remove what belongs to the sweep, and the folder if that was all."""

@@ -8,7 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dpgcli.files.parts import FINGERPRINT, SAID, PartStore, fingerprint, write_part
+from dpgcli.files.parts import (
+    FINGERPRINT,
+    SAID,
+    SHA256,
+    PartStore,
+    _sha256,
+    fingerprint,
+    write_part,
+)
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.states.columns import Column, Group, Kind
 
@@ -89,9 +97,10 @@ def test_a_part_of_other_designs_is_none(tmp_path: Path) -> None:
     "said", [{}, {"dpg.designs": "0"}, {"dpg.designs": 3}, {"dpg.designs": "3", "dpg.x": 1}, [1]]
 )
 def test_a_description_by_hand_is_none(tmp_path: Path, said: Any) -> None:
-    """Also one whose fingerprint is right."""
+    """Also one whose fingerprint and sum are right."""
     if isinstance(said, dict):
         said = {**said, FINGERPRINT: fingerprint(said)}
+        said = {**said, SHA256: _sha256(said)}
     (tmp_path / SAID).write_text(json.dumps(said))
     assert PartStore(tmp_path).said() == {}
 
@@ -99,5 +108,5 @@ def test_a_description_by_hand_is_none(tmp_path: Path, said: Any) -> None:
 def test_a_description_with_its_designs_is_one(tmp_path: Path) -> None:
     said = {"dpg.designs": "3"}
     said |= {FINGERPRINT: fingerprint(said)}
-    (tmp_path / SAID).write_text(json.dumps(said))
+    (tmp_path / SAID).write_text(json.dumps({**said, SHA256: _sha256(said)}))
     assert PartStore(tmp_path).said() == said
