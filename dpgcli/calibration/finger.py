@@ -58,7 +58,8 @@ class FingerFit:
     loss_scale: float | None = None
 
     def __post_init__(self) -> None:
-        values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
+        fitted = {key: array for key, array in KEYS.items() if array != "wall_compliance"}
+        values = {key: getattr(self.finger, array) for key, array in fitted.items()}
         for key in self.free:
             if key not in values or not self._has(key):
                 known = ", ".join(filter(self._has, values))

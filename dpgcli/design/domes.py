@@ -30,23 +30,29 @@ NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
 class Domes:
     """How domes answer, and by which rules their values come about.
 
-    `calibration` has the curve, if there is one. `travel` is that of the inverted dome at rest
-    (mm), at a dome height of `height` (mm, if it is known), for domes with a travel of their own;
-    else 0.
+    `calibration` has the curve, if there is one, and `measures` are the keys of its values that the
+    curve is measured by. `travel` is that of the inverted dome at rest (mm), at a dome height of
+    `height` (mm, if it is known), for domes with a travel of their own; else 0.
     """
 
     law: DomeLaw = PUBLISHED
     derivations: tuple[Derivation, ...] = DERIVATIONS
     calibration: Calibration | None = None
+    measures: tuple[str, ...] = ()
     travel: float = 0.0
     height: float | None = None
 
-    def carries(self, key: str, calibration: str | Calibration) -> bool:
-        """Whether a fitted value's standard error reaches the finger.
+    def measure_error(self, key: str) -> float | None:
+        """Relative standard error of what the curve is measured by; None for other keys.
 
-        The k_b and stroke of the file that gives the curve only normalize it: their errors cancel.
+        Domes answer by E = (k_b/k_f) (d/d_f)² E_f(x d_f/d), with the k_f and d_f of the curve's own
+        file; those that push only do so with the travel for d, which the curve itself tells. An
+        error of k_f or d_f is therefore one of k_b or d by the same share, the other way.
         """
-        return calibration is not self.calibration or key not in NORMALS
+        if self.calibration is None or key not in self.measures:
+            return None
+        value, error = self.calibration.values[key]
+        return (error or 0.0) / value
 
     def travel_at(self, height: Array | None) -> Array:
         """Travel of an inverted dome of another height, which it grows with (finite elements)."""
@@ -110,7 +116,7 @@ def _tabulated(
     if not np.isfinite(shape.rests[1]):
         return _no_well(calibration)
     rules = tuple(d for d in DERIVATIONS if d is not FORCE_LINEARITY)
-    return Domes(Tabulated(shape), rules, calibration)
+    return Domes(Tabulated(shape), rules, calibration, NORMALS)
 
 
 def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Domes | Issue:
@@ -119,7 +125,8 @@ def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Do
         return _no_well(calibration)
     shape = spline(*_points(curve, travel, stiffness * travel**2))
     height = calibration.geometry.get("dome_height_mm")
-    domes = Domes(PushOnly(Tabulated(shape)), (), calibration, travel, height)
+    measures = (BISTABLE_STIFFNESS.key,)
+    domes = Domes(PushOnly(Tabulated(shape)), (), calibration, measures, travel, height)
     stroke = replace(
         STROKE,
         value=partial(_stroke_in_contact, domes),

@@ -114,7 +114,8 @@ class Resolution:
         """What is known of the model's own error, for a single design."""
         values = [value for pairs in self.values.values() for _, value in pairs]
         lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
-        if WALL_COMPLIANCE in self.values:  # nothing is known of a lever beside walls
+        walls = self.values.get(WALL_COMPLIANCE, ())
+        if any(value.numbers.any() for _, value in walls):  # nothing is known of a lever beside
             lever = None
         return known_model_error(self.design, lever, values)
 
@@ -173,16 +174,26 @@ class Resolution:
         return uncertainty_of(design.calibrations, [*self._shares()], [*steps], share or 0.0)
 
     def _shares(self) -> Iterator[Share]:
-        """Standard errors of what comes from calibration files, unit by unit."""
-        calibrations, units = self.design.calibrations, self.design.units
+        """Standard errors by those of calibration files, unit by unit."""
         for key, pairs in self.values.items():
-            errors = {
-                place: [(g, _error(v) if v.file == place else np.zeros(1)) for g, v in pairs]
-                for place in {v.file for _, v in pairs if v.file is not None and _error(v).any()}
-            }
-            for place, by_group in errors.items():
-                if self.domes.carries(key, calibrations[place]):
-                    yield Share(place, key, _by_unit(units, by_group))
+            for place in range(len(self.design.calibrations)):
+                errors = [(group, self._error_by(place, key, value)) for group, value in pairs]
+                if any(error.any() for _, error in errors):
+                    yield Share(place, key, _by_unit(self.design.units, errors))
+
+    def _error_by(self, place: int, key: str, value: Value) -> Array:
+        """How far a value is off by the error of a file's value of that key.
+
+        That of what a curve is measured by cancels where the value is taken from the same file, as
+        it is or scaled. Elsewhere the curve is off: as if the value were, the other way.
+        """
+        is_own, none = value.file == place, np.zeros(1)
+        measure = None
+        if self.design.calibrations[place] is self.domes.calibration:
+            measure = self.domes.measure_error(key)
+        if measure is None:
+            return _error(value) if is_own else none
+        return none if is_own else -measure * value.numbers
 
 
 def resolve(design: Design) -> Resolution:
@@ -215,7 +226,7 @@ def resolve(design: Design) -> Resolution:
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
     values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
     walls = [(group, _walls(group)) for group in groups]
-    if any(value.numbers.any() for _, value in walls):
+    if any(_may_yield(value, WALL_COMPLIANCE in design.tolerances) for _, value in walls):
         values[WALL_COMPLIANCE] = walls
     resolution = Resolution(design, domes, values, problems)
     for issue in tolerance_issues(design, [*values]):
@@ -259,6 +270,13 @@ def _walls(group: UnitGroup) -> Value:
         return all_by(group.lattice[WALL_COMPLIANCE], Origin.GIVEN, "as given")
     rigid = all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
     return _fitted(WALL_COMPLIANCE, group) or rigid
+
+
+def _may_yield(value: Value, is_tolerated: bool) -> bool:
+    """Whether walls give way, or may do so by a standard error or a tolerance of what they have."""
+    assumed = ORIGINS.index(Origin.ASSUMED)
+    is_known = bool((value.origin != assumed).any())
+    return bool(value.numbers.any() or _error(value).any() or (is_tolerated and is_known))
 
 
 def _fitted(key: str, group: UnitGroup) -> Value | None:

@@ -8,7 +8,14 @@ import numpy as np
 
 from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import Design, GivenValues, Sizes, Tolerance, unit_of
+from dpgcli.design.dimensions import (
+    WALL_COMPLIANCE,
+    Design,
+    GivenValues,
+    Sizes,
+    Tolerance,
+    unit_of,
+)
 from dpgcli.design.problems import Issue, number, of_design
 from dpgcli.design.scene import FITTED, Step, Uncertainty
 from dpgcli.mechanics.finger import KEYS
@@ -76,6 +83,8 @@ def tolerance_issues(design: Design, valued: Sequence[str]) -> Iterator[Issue]:
 def _missing(key: str) -> str:
     if key in (SPACING, ANGLE):
         return "there is no gripper"
+    if key == WALL_COMPLIANCE:
+        return "walls are rigid: give finger.wall_compliance_mm_per_N, 0 perhaps"
     return "the law has none" if key in KEYS else "finger.geometry does not give it"
 
 

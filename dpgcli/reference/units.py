@@ -75,7 +75,7 @@ def inverted_rest(unit: Unit) -> tuple["mpf", "mpf"]:
     the opening, w = c_w h'(x) and F(y) + h'(x) = 0. The left side of the second has one least value
     beyond half a stroke, and the well beyond that (our derivation).
     """
-    from mpmath import asin, sqrt
+    from mpmath import asin, eps, sqrt
 
     if not unit.wall:
         return inverted_angle(unit), unit.wall
@@ -87,8 +87,15 @@ def inverted_rest(unit: Unit) -> tuple["mpf", "mpf"]:
         return 2 * k * unit.height * m / cosine, k / cosine**2 * (1 + m * sine / cosine)
 
     def opening(y: "mpf") -> "mpf":
-        highest = min(y, 1.99 * unit.height)
-        return _bisected(lambda x: x + unit.wall * pull(x)[0] - y, y * 0, highest)
+        """From above, where the excess is convex, each step of Newton's method stays above."""
+        x = min(y, 1.99 * unit.height)
+        for _ in range(BISECTIONS):
+            moment, stiffness = pull(x)
+            step = (x + unit.wall * moment - y) / (1 + unit.wall * stiffness)
+            x -= step
+            if abs(step) <= 8 * eps * x:
+                break
+        return x
 
     def force(y: "mpf") -> "mpf":
         u, softening = y / unit.stroke, 1 - unit.linearity

@@ -222,11 +222,13 @@ def _check(scene: Scene, request: Request) -> None:
 
 def _check_uncertainty(scene: Scene, request: Request) -> None:
     if scene.uncertainty is None:
-        cancels = " (those of the curve's own k_b and d cancel)" if scene.finger.law.curve else ""
+        measures = dict.fromkeys(s.key for s in scene.sources if s.standard_error)
+        cancels = f" but {' and '.join(measures)}: it cancels, the curve is of the same file"
         raise UsageError(
             Field("uncertainty"),
-            f": no value of the spec has a standard error{cancels}; calibrate it by a file of "
-            "dpg fit, or say uncertainty (tolerances by key) or model_error in the spec",
+            f": no value of the spec has a standard error{cancels if measures else ''}; "
+            "calibrate it by a file of dpg fit, or say uncertainty (tolerances by key) or "
+            "model_error in the spec",
         )
     if request.formulation != "chain":
         raise UsageError(

@@ -7,15 +7,17 @@ every value is covered by the one formula that states are solved with.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
 from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.equilibrium.banded import backward, forward
+from dpgcli.equilibrium.contracts import Response
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import Attached, Dome, DomeLaw, Rests
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Settled
 
@@ -32,6 +34,38 @@ class Sensitivities:
 
     pose: Array
     strut_angles: Array
+
+
+class Softened(Attached):
+    """A law beside a wall of a compliance c so small that its square does not count, (unit, batch).
+
+    In series they have the least E + w²/(2c) over what the wall yields, E − ½ c F² to first order.
+    A complex step from a rigid wall needs it: √(c k_b), by which `walls` count, has no slope there.
+    """
+
+    description = "softened domes"
+    curve = None
+
+    def __init__(self, law: DomeLaw, compliance: Array) -> None:
+        self.law = law
+        self.pulling = law.pulling
+        self.compliance = compliance
+
+    def response(self, extension: Array, dome: Dome) -> Response:
+        """Energy and force to first order in c; the stiffness is that of the dome.
+
+        >>> from dpgcli.mechanics.laws import PUBLISHED
+        >>> spring = Dome(np.array(2.0), np.array(1.0), np.array(1.0), np.array(0.0))  # α = 1
+        >>> float(Softened(PUBLISHED, np.array(1e-3)).response(np.array(3.0), spring).force)
+        5.988
+        """
+        energy, force, stiffness = self.law.response(extension, dome)
+        yielded = self.compliance * force
+        return Response(energy - 0.5 * yielded * force, force - yielded * stiffness, stiffness)
+
+    def rests(self, dome: Dome) -> Rests:
+        """Those of the dome: without force no wall yields."""
+        return self.law.rests(dome)
 
 
 def sensitivities(settled: Settled, directions: Sequence[Direction]) -> Sensitivities:
@@ -74,5 +108,9 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
 def _moved(settled: Settled, direction: Direction) -> Finger:
     """The finger an imaginary step along a direction."""
     finger = settled.finger
-    rates = direction.items()
-    return finger.changed(**{n: getattr(finger, n) + 1j * COMPLEX_STEP * rate for n, rate in rates})
+    steps = {name: 1j * COMPLEX_STEP * rate for name, rate in direction.items()}
+    rigid = finger.wall_compliance == 0.0
+    if "wall_compliance" in steps and (softened := rigid * steps["wall_compliance"]).any():
+        finger = replace(finger, law=Softened(finger.law, softened))
+        steps["wall_compliance"] = ~rigid * steps["wall_compliance"]
+    return finger.changed(**{name: getattr(finger, name) + step for name, step in steps.items()})
