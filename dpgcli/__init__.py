@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from dpgcli.api.bench import bench
     from dpgcli.api.check import check
     from dpgcli.api.compare import compare
+    from dpgcli.api.explain import explain
     from dpgcli.api.fits.bistable import fit_bistable
     from dpgcli.api.fits.finger import fit_finger
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
-    from dpgcli.api.predict import explain, predict
+    from dpgcli.api.predict import predict
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
@@ -71,7 +72,7 @@ _HOMES = {
     "bench": "api.bench",
     "check": "api.check",
     "compare": "api.compare",
-    "explain": "api.predict",
+    "explain": "api.explain",
     "fit_bistable": "api.fits.bistable",
     "fit_finger": "api.fits.finger",
     "fit_grid": "api.fits.grid",

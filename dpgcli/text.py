@@ -59,3 +59,12 @@ def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     """
     head = printable(text[: limit + 1])
     return head if len(head) <= limit else head[: limit - 3] + "..."
+
+
+def counted(number: int, what: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "design"), counted(2500, "design")
+    ('1 design', '2,500 designs')
+    """
+    return f"{number:,} {what}{'s' * (number != 1)}"

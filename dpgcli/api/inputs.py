@@ -25,8 +25,8 @@ from dpgcli.files.scene_file import (
     canonical,
     canonical_json,
     checked,
-    read_scene,
     recalibrated,
+    scene_in,
     scene_of,
 )
 from dpgcli.files.scene_file.models import DataSpec
@@ -100,13 +100,19 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
             return spec
         return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
     if isinstance(spec, Mapping):
-        name, own = "spec", tuple[Path, ...]()
-        document = spec_document(spec, settings)
-    else:
-        name, own = str(spec), (path_of("spec", spec),)
-        document = read_scene(spec, setting_texts(settings))
-    found = checked(document)
-    return SceneInput(name, scene_of(found), found, document, files_of(*own, *document.files))
+        return _scene("spec", spec_document(spec, settings))
+    path = path_of("spec", spec)
+    return scene_input_in(read_document(spec), path, settings)
+
+
+def scene_input_in(document: Document, path: Path, settings: Settings = ()) -> SceneInput:
+    """The same, of a document that was read from this path."""
+    return _scene(str(path), scene_in(document, path, setting_texts(settings)), path)
+
+
+def _scene(name: str, document: Document, *own: Path) -> SceneInput:
+    spec = checked(document)
+    return SceneInput(name, scene_of(spec), spec, document, files_of(*own, *document.files))
 
 
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:

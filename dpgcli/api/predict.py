@@ -1,4 +1,4 @@
-"""`predict` and `explain`: the stable states of a finger or gripper."""
+"""`predict`: the stable states of a finger or gripper."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,6 @@ from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
-from dpgcli.states import plan
 from dpgcli.states import predict as states
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.plan import Plan, Request
@@ -123,28 +122,6 @@ def predict(
     request = request_of(patterns, columns, formulation, tolerance, target_error)
     prediction = states.predict(given.scene, request)
     return PredictResult(given, prediction, tuple(prediction.blocks()))
-
-
-def explain(
-    spec: SpecInput,
-    *,
-    settings: Settings = (),
-    patterns: str | Sequence[str] = (),
-    columns: str | Sequence[str] = "default",
-    formulation: str = "chain",
-    tolerance: float | None = None,
-    target_error: float | None = None,
-) -> Plan:
-    """Decide what `predict` would do, and leave out, and why; arguments and errors are the same.
-
-    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
-    >>> plan = explain(uniform_finger(5, **STUDY))
-    >>> plan.n_states, plan.terms, plan.omissions[2].why.partition(";")[0]
-    (32, ('bistable', 'hinge'), 'k_L is infinite')
-    """
-    given = scene_input(spec, settings)
-    request = request_of(patterns, columns, formulation, tolerance, target_error)
-    return plan.explain(given.scene, request)
 
 
 def request_of(

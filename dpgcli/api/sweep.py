@@ -1,7 +1,7 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,27 +9,15 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import Any
 
-from dpgcli.api.inputs import (
-    Settings,
-    check_numbers,
-    check_whole,
-    path_of,
-    plain,
-    setting_texts,
-    spec_document,
-)
+from dpgcli.api.given import SweepInput, sweep_input
+from dpgcli.api.inputs import Settings, check_numbers, check_whole, path_of, setting_texts
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
 from dpgcli.cores import cores
-from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
-from dpgcli.files.frames import frame_of
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
-from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in
 from dpgcli.files.table_reader import read_undamaged
-from dpgcli.files.yaml_file import Document, without_free_keys
-from dpgcli.mechanics.finger import Finger
 from dpgcli.reports.summary import DesignSpace
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.studies.run import run
@@ -94,7 +82,7 @@ class SweepResult:
 
 
 def sweep(
-    sweep: str | Path | Mapping[str, Any],
+    sweep: SweepInput,
     output: str | Path | None = None,
     *,
     settings: Settings = (),
@@ -173,7 +161,7 @@ def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
 
 
 def study_of(
-    sweep: str | Path | Mapping[str, Any],
+    sweep: SweepInput,
     folder: Path,
     settings: Settings = (),
     tolerance: float | None = None,
@@ -183,41 +171,7 @@ def study_of(
     check_numbers(tolerance=tolerance, target_error=target_error)
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target_error)
-    return Study(_read(sweep, settings), folder, exactness, target_error)
-
-
-def _read(sweep: str | Path | Mapping[str, Any], settings: Settings) -> Sweep:
-    texts = setting_texts(settings)
-    if not isinstance(sweep, Mapping):
-        return read_sweep(path_of("sweep", sweep), texts)
-    base = sweep.get("base")
-    if isinstance(base, Finger | Scene):
-        raise UsageError("base: a finger's values have no keys that could vary: give a spec")
-    data = without_free_keys(plain({**sweep, "space": _axes(sweep.get("space"))}))
-    if not isinstance(base, Mapping):
-        return sweep_in(Document("sweep", data, {}), Path(), texts)
-    document = Document("sweep", {**data, "base": "base"}, {})
-    return sweep_in(document, Path(), texts, base=spec_document(base, settings))
-
-
-def _axes(space: Any) -> Any:
-    """Axes of a space, data frames among them as values that go together."""
-    if not isinstance(space, list | tuple):
-        return space
-    return [{"paired": _columns(axis["table"])} if _is_frame(axis) else axis for axis in space]
-
-
-def _is_frame(axis: Any) -> bool:
-    """Whether an axis is a table of pandas, of Arrow, or ours."""
-    table = axis.get("table") if isinstance(axis, Mapping) else None
-    return hasattr(table, "to_dict") or hasattr(table, "to_pandas")
-
-
-def _columns(table: Any) -> dict[Any, list[Any]]:
-    frame = frame_of(table)
-    if twice := [str(name) for name in frame.columns[frame.columns.duplicated()]]:
-        raise UsageError(f"table: expected each column once, found {', '.join(twice)} again")
-    return {name: frame[name].tolist() for name in frame}
+    return Study(sweep_input(sweep, settings), folder, exactness, target_error)
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:

@@ -12,6 +12,7 @@ EXAMPLES = {
     ),
     "explain": (
         "dpg explain finger.yaml",
+        "dpg explain sweep.yaml",
         "dpg explain finger.yaml --columns default,stiffness --target-error 0.01mm",
     ),
     "sweep": (
@@ -37,8 +38,16 @@ EXAMPLES = {
         "dpg stress finger.yaml",
         "dpg stress --only crossed --format csv > cases.csv",
     ),
-    "validate": ("dpg validate finger.yaml", "dpg validate finger.yaml --format github"),
-    "init": ("dpg init", "dpg init my_finger.yaml"),
+    "validate": (
+        "dpg validate finger.yaml sweep.yaml",
+        "dpg validate finger.yaml --format github",
+    ),
+    "init": (
+        "dpg init",
+        "dpg init my_finger.yaml",
+        "dpg init --gripper",
+        "dpg init --sweep heights.yaml",
+    ),
     "help": ("dpg help", "dpg help tutorial"),
     "schema": ("dpg schema > finger.schema.json",),
     "fit bistable": (

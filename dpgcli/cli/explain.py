@@ -1,7 +1,8 @@
-"""`dpg explain`: what a scene needs and leaves out, before any work."""
+"""`dpg explain`: what a spec or a sweep comes to, before any work."""
 
 from collections.abc import Iterator
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -13,7 +14,6 @@ from dpgcli.cli.options import (
     Nodes,
     Patterns,
     Settings,
-    SpecPath,
     TargetError,
     Tolerance,
     WithUncertainty,
@@ -21,11 +21,17 @@ from dpgcli.cli.options import (
 )
 from dpgcli.cli.spelling import with_options
 from dpgcli.cli.streams import put, put_json
+from dpgcli.text import counted
 
 if TYPE_CHECKING:
     from dpgcli.design.scene import Source
     from dpgcli.states.omissions import Omission
     from dpgcli.states.plan import Plan
+
+
+SpecOrSweep = Annotated[
+    Path, typer.Argument(metavar="SPEC", help="YAML spec or sweep; - reads standard input")
+]
 
 
 class PlanFormat(StrEnum):
@@ -36,7 +42,7 @@ class PlanFormat(StrEnum):
 
 
 def explain(
-    spec: SpecPath,
+    spec: SpecOrSweep,
     settings: Settings = None,
     patterns: Patterns = None,
     columns: ColumnNames = "default",
@@ -49,21 +55,33 @@ def explain(
         PlanFormat, typer.Option("--format", help="How to print the plan")
     ] = PlanFormat.TEXT,
 ) -> None:
-    """Say what predict will do, and leave out, and why."""
-    from dpgcli.api.inputs import scene_input
-    from dpgcli.states import plan
+    """Say what predict or sweep will do, and leave out, and why."""
+    from dpgcli.api.explain import plan_of
+    from dpgcli.api.given import scene_or_sweep
+    from dpgcli.states.plan import Plan
 
-    given = scene_input(spec, settings or ())
+    given = scene_or_sweep(spec, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
-    made = plan.explain(given.scene, request)
-    if printed_as is PlanFormat.JSON:
-        import json
-
-        put_json(json.dumps(facts(made), indent=2) + "\n")
+    made = plan_of(given, request)
+    is_json = printed_as is PlanFormat.JSON
+    if isinstance(made, Plan):
+        _print(facts(made) if is_json else _lines(str(spec), made))
     else:
-        put("\n".join(_lines(str(spec), made)))
+        from dpgcli.cli import sweep_plan
+
+        _print(sweep_plan.facts(made) if is_json else sweep_plan.lines(str(spec), made))
+
+
+def _print(said: dict[str, Any] | list[str]) -> None:
+    """Facts as JSON, lines as they are."""
+    if isinstance(said, list):
+        put("\n".join(said))
+        return
+    import json
+
+    put_json(json.dumps(said, indent=2) + "\n")
 
 
 def facts(plan: "Plan") -> dict[str, Any]:
@@ -139,8 +157,8 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  energy terms    {', '.join(plan.terms)} ({plan.scene.finger.law.description})",
         f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
         f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
-        f"  solves          {_count(plan.n_unit_solves, 'unit well')}, "
-        f"{_count(plan.n_finger_solves, 'finger')}",
+        f"  solves          {counted(plan.n_unit_solves, 'unit well')}, "
+        f"{counted(plan.n_finger_solves, 'finger')}",
         f"  certificate     residual up to {plan.residual_limit:.1e} N "
         f"({plan.request.tolerance:g} of the forces in play), positive pivots, "
         "every unit in its own well",
@@ -182,7 +200,7 @@ def _error(source: "Source") -> str:
 
 def _what(plan: "Plan") -> str:
     alike = "equal" if plan.scene.finger.is_uniform else "graded"
-    finger = f"finger of {_count(plan.n_units, f'{alike} unit')}"
+    finger = f"finger of {counted(plan.n_units, f'{alike} unit')}"
     return (
         f"a gripper of two mirrored fingers, each a {finger}"
         if plan.scene.gripper
@@ -204,10 +222,6 @@ def _bound(plan: "Plan") -> str:
         f"{plan.accuracy_level.name}, chosen for the target error: " if plan.accuracy_level else ""
     )
     return f"{level}the tip's numerical error will be below {plan.error_bound:.1e} mm"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"
 
 
 def _column_names(plan: "Plan") -> str:

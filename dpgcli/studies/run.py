@@ -10,7 +10,7 @@ from dpgcli.files.output import check_outputs
 from dpgcli.files.parts import FINGERPRINT
 from dpgcli.files.table_writer import write_run
 from dpgcli.studies.sweep import RUN, Progress, Shard, Study, drop_parts, outputs
-from dpgcli.sweeps.extent import size_text
+from dpgcli.sweeps.extent import size_text, time_text
 
 LONG = 30.0  # s of one core: what takes longer is said before
 MOST_NAMED = 20  # failed designs with a command for each
@@ -53,7 +53,8 @@ def run(
         study.drop_unfinished()
     study.check_unfinished()
     if not force:
-        study.check_room()
+        study.check_memory()
+        study.check_disk()
     if study.extent.seconds > LONG:
         tell(cost(study))
     progress = compute()
@@ -83,7 +84,7 @@ def cost(study: Study) -> str:
     less = ", less what constraints exclude" if study.sweep.constraints else ""
     return (
         f"{study.folder}: {study.sweep.space.size:,} designs, {extent.n_states:,} states"
-        f"{less}: about {extent.seconds / 60:,.1f} min of one core, "
+        f"{less}: about {time_text(extent.seconds)} of one core, "
         f"{size_text(extent.bytes_needed)} of disk, {size_text(extent.bytes_in_memory)} of "
         "memory (rough: a factor of two either way)"
     )

@@ -156,8 +156,8 @@ class Study:
         batches = (batch for part in self.store.parts() for batch in part.batches(1))
         return sum(batch["status"].to_pylist().count(DesignStatus.FAILED) for batch in batches)
 
-    def check_room(self) -> None:
-        """Refuse what memory, or the disk, cannot hold; raises UsageError."""
+    def check_memory(self) -> None:
+        """Refuse what this machine's memory cannot hold; raises UsageError."""
         memory = _memory()
         if memory is not None and self.extent.bytes_in_memory > memory:
             raise UsageError(
@@ -166,6 +166,9 @@ class Study:
                 "take fewer values, or go on with ",
                 Field("force"),
             )
+
+    def check_disk(self) -> None:
+        """Refuse what the disk cannot hold; raises UsageError."""
         missing = self.store.missing([(0, self.sweep.space.size)])
         n_designs = sum(stop - start for start, stop in missing)
         n_states = self.extent.n_states * n_designs // self.sweep.space.size

@@ -177,6 +177,14 @@ class Evaluation:
             allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
         return allowed
 
+    def exist(self, values: Mapping[str, Values]) -> tuple[Flags, Flags]:
+        """Which designs meet all constraints, and which of these can exist; nothing is solved."""
+        allowed = self.allowed(values)
+        right = allowed & self._are_possible(values)
+        for places, design in self._designs(values, np.flatnonzero(right)):
+            right[places] = ~resolve(design).are_wrong
+        return allowed, right
+
     def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
         found = exactnesses(UnitSolutions.of(scene.finger), self.tolerance, self.target_error)
         for some, exactness in found:

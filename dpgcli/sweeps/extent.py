@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from dpgcli.design.dimensions import MAX_UNITS, UNITS
 from dpgcli.errors import UsageError
-from dpgcli.states.costs import UNIT_STATE_SECONDS
+from dpgcli.states.costs import START_SECONDS, UNIT_STATE_SECONDS
 from dpgcli.states.patterns import MOST_SELECTED
 from dpgcli.sweeps.executors import chunked
 from dpgcli.sweeps.space import Space
 
 DESIGN_SECONDS = 2e-5  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
+FILE_BYTES, DESIGN_FILE_BYTES = 40 * 2**10, 14  # of empty tables and parts, of a design; measured
 PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
 MOST_CHUNKS = 10**6  # days of work, and a file each
 MOST_SENT = 2**22  # states of a design, about 250 MB
@@ -55,8 +56,12 @@ class Extent:
 
     @property
     def bytes_needed(self) -> int:
-        """Bytes on the disk, at most at once."""
-        return 2 * self.n_states * BYTES_PER_STATE
+        """Bytes on the disk, at most at once: parts, and the tables that are made of them."""
+        return self.bytes_of(self.n_states)
+
+    def bytes_of(self, n_states: int) -> int:
+        """The same, with another number of states."""
+        return FILE_BYTES + self.space.size * DESIGN_FILE_BYTES + 2 * n_states * BYTES_PER_STATE
 
     @property
     def bytes_in_memory(self) -> int:
@@ -72,8 +77,12 @@ class Extent:
     @property
     def seconds(self) -> float:
         """Seconds of one core, good to a factor of two either way."""
-        of_states = self.n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
-        return self.space.size * DESIGN_SECONDS + of_states
+        return self.seconds_of(self.n_states)
+
+    def seconds_of(self, n_states: int) -> float:
+        """The same, with another number of states."""
+        of_states = n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
+        return START_SECONDS + self.space.size * DESIGN_SECONDS + of_states
 
     def check(self, chunk_size: int, *, is_sent: bool) -> None:
         """Refuse what no machine should begin; raises UsageError.
@@ -123,6 +132,18 @@ def size_text(n_bytes: float) -> str:
             return f"{n_bytes:.2g} {unit}" if n_bytes < 10 else f"{n_bytes:.0f} {unit}"
         n_bytes /= 1024
     return f"{n_bytes:,.4g} TiB"
+
+
+def time_text(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> time_text(0.42), time_text(90), time_text(1e6)
+    ('0.42 s', '1.5 min', '11.6 days')
+    """
+    for unit, size in (("days", 86_400), ("h", 3600), ("min", 60)):
+        if seconds >= size:
+            return f"{seconds / size:,.1f} {unit}"
+    return f"{seconds:.2g} s"
 
 
 def _counted(units: NDArray[Any]) -> dict[int, int]:

@@ -13,7 +13,7 @@ Call = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 SHIPPED = sorted(
-    [*(ROOT / "configs").rglob("*.yaml"), ROOT / "dpgcli/files/scene_file/starter.yaml"]
+    [*(ROOT / "configs").rglob("*.yaml"), *(ROOT / "dpgcli" / "files").rglob("starter.yaml")]
 )
 
 
@@ -56,6 +56,97 @@ def test_a_place_that_cannot_be_written(
     assert result.exit_code == 2
     assert "Traceback" not in result.output
     assert not list(folder.glob(".*.tmp"))
+
+
+@pytest.mark.parametrize("options", [(), ("--gripper",)])
+def test_a_new_sweep_comes_with_its_base_and_runs(
+    call: Call, folder: Path, options: tuple[str, ...]
+) -> None:
+    base = "gripper.yaml" if options else "finger.yaml"
+    (folder / "gripper.yaml").unlink()
+    result = call("init", "--sweep", *options)
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert f"wrote sweep.yaml, around {base}, written with it" in result.stderr
+    assert call("validate", base, "sweep.yaml").exit_code == 0
+    plan = json.loads(call("explain", "sweep.yaml", "--format", "json").stdout)
+    assert (plan["base"], plan["n_invalid"]) == (base, 0)
+    assert 0 < plan["n_excluded"] < plan["n_designs"]
+    swept = call("sweep", "sweep.yaml", "-o", "out", "-q", "--executor", "serial")
+    assert swept.exit_code == 0
+    alone = call("init", "-", *options).stdout
+    assert (folder / base).read_text(encoding="utf-8") == alone
+    assert ("\ngripper:\n" in alone) == bool(options)
+
+
+def test_a_new_gripper_differs_from_a_new_finger_by_its_section(call: Call, folder: Path) -> None:
+    (folder / "gripper.yaml").unlink()
+    assert "wrote gripper.yaml" in call("init", "--gripper").stderr
+    finger = call("init", "-").stdout.splitlines()
+    gripper = (folder / "gripper.yaml").read_text(encoding="utf-8").splitlines()
+    changed = [(old, new) for old, new in zip(finger, gripper, strict=True) if old != new]
+    assert changed == [
+        ("# gripper:", "gripper:"),
+        ("  # base_spacing_mm: 60", "  base_spacing_mm: 60"),
+        ("  # mounting_angle_deg: 0", "  mounting_angle_deg: 0"),
+    ]
+    assert call("validate", "gripper.yaml").exit_code == 0
+    assert "aperture_mm" in call("predict", "gripper.yaml", "--format", "csv").stdout
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_the_base_of_a_new_sweep_is_never_replaced(
+    call: Call, folder: Path, force: tuple[str, ...]
+) -> None:
+    (folder / "finger.yaml").write_text("mine", encoding="utf-8")
+    result = call("init", "--sweep", "wide.yaml", *force)
+    assert (result.exit_code, "as it was there" in result.stderr) == (0, True)
+    assert (folder / "finger.yaml").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_sweep_that_is_there_is_kept_and_gets_no_base(call: Call, folder: Path) -> None:
+    (folder / "sweep.yaml").write_text("mine", encoding="utf-8")
+    result = call("init", "--sweep")
+    assert (result.exit_code, "sweep.yaml exists" in result.stderr) == (2, True)
+    assert (folder / "sweep.yaml").read_text(encoding="utf-8") == "mine"
+    assert not (folder / "finger.yaml").exists()
+
+
+@pytest.mark.parametrize("path", ["finger.yaml", "./finger.yaml", "link.yaml"])
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_a_sweep_is_not_its_own_base(
+    call: Call, folder: Path, path: str, force: tuple[str, ...]
+) -> None:
+    (folder / "link.yaml").symlink_to("finger.yaml")
+    result = call("init", "--sweep", path, *force)
+    assert (result.exit_code, "give the sweep another name" in result.stderr) == (2, True)
+    assert not (folder / "finger.yaml").exists()
+
+
+def test_a_sweep_in_a_folder_has_its_base_there(call: Call, folder: Path) -> None:
+    (folder / "studies").mkdir()
+    assert call("init", "--sweep", "studies/wide.yaml").exit_code == 0
+    assert {path.name for path in (folder / "studies").iterdir()} == {"wide.yaml", "finger.yaml"}
+    assert call("validate", "studies/wide.yaml").exit_code == 0
+
+
+def test_a_sweep_on_standard_output_is_alone(call: Call, folder: Path) -> None:
+    printed = call("init", "--sweep", "-").stdout
+    assert not (folder / "finger.yaml").exists()
+    call("init", "--sweep")
+    assert (folder / "sweep.yaml").read_text(encoding="utf-8") == printed
+
+
+def test_every_axis_in_the_comments_of_a_new_sweep_is_right(call: Call, folder: Path) -> None:
+    call("init", "--sweep")
+    path = folder / "sweep.yaml"
+    text = path.read_text(encoding="utf-8")
+    (folder / "designs.csv").write_text("finger.geometry.limiting_layer_thickness_mm\n1.5\n2\n")
+    whole = re.sub(r"^  # (?=- (?:key|paired|sample|table):|  +\w+[:.])", "  ", text, flags=re.M)
+    path.write_text(whole, encoding="utf-8")
+    assert call("validate", "sweep.yaml").output == "sweep.yaml: ok\n"
+    plan = json.loads(call("explain", "sweep.yaml", "--format", "json").stdout)
+    assert [axis["n_values"] for axis in plan["axes"]] == [5, 3, 3, 2, 2, 16, 2]
+    assert 0 < plan["n_invalid"] + plan["n_excluded"] < plan["n_designs"]
 
 
 def faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str]:
@@ -183,7 +274,8 @@ def test_other_readers_find_the_same_in_the_manual_and_in_calibrations(
 @pytest.mark.parametrize("number", ["1e4", "1.0e4", "1.0e+4", "1E+4", "10000"])
 def test_all_forms_of_a_number_are_read(call: Call, folder: Path, number: str) -> None:
     text = (folder / "three_unit.yaml").read_text()
-    (folder / "other.yaml").write_text(text.replace("1.0e+4", number, 1))
+    said = f"finger:\n  linear_stiffness_N_per_mm: {number}\n"
+    (folder / "other.yaml").write_text(text.replace("finger:\n", said, 1))
     assert number in (folder / "other.yaml").read_text()
     assert call("predict", "other.yaml").stdout == call("predict", "three_unit.yaml").stdout
 

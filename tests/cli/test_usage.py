@@ -107,16 +107,17 @@ def carry_out(folder: Path, name: str) -> None:
     )
     lines = [*EXAMPLES.get(PREPARED.get(name, ""), ()), *EXAMPLES[name]]
     if name == "init":
-        (folder / "finger.yaml").unlink()
+        for path in folder.glob("*.yaml"):
+            path.unlink()
     if name == "merge":
         lines.insert(0, EXAMPLES["sweep"][1].replace("part1", "part2").replace("1/2", "2/2"))
-    path = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
+    search = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
     for line in lines:
         done = subprocess.run(
             line,
             shell=True,
             cwd=folder,
-            env={**os.environ, "NO_COLOR": "1", "PATH": path},
+            env={**os.environ, "NO_COLOR": "1", "PATH": search},
             capture_output=True,
             text=True,
             check=False,

@@ -65,6 +65,19 @@ def test_make_does_what_is_out_of_date_and_no_more(checkout: Path) -> None:
     assert "dpg sweep" in changed.stdout
 
 
+def test_the_plan_computes_nothing(checkout: Path) -> None:
+    said = make(checkout, "plan")
+    assert said.returncode == 0, said.stderr
+    assert "designs  78: 70 to solve" in said.stdout
+    assert not (checkout / "configs" / "pipeline" / "out").exists()
+    sweep = checkout / "configs" / "sweeps" / "height_separation.yaml"
+    sweep.write_text(sweep.read_text().replace("dome_height_mm,", "dome_hight_mm,"))
+    wrong = make(checkout, "plan")
+    assert wrong.returncode == 2
+    assert "did you mean dome_height_mm?" in wrong.stdout
+    assert "dpg explain" not in wrong.stdout
+
+
 @pytest.mark.parametrize("out", ["g/", "g//h", "$PWD/../pipeline/g"])
 def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path, out: str) -> None:
     said = (

@@ -96,10 +96,10 @@ def test_more_than_the_memory_of_the_machine_is_refused(
         pages = {"SC_PAGE_SIZE": 1, "SC_PHYS_PAGES": memory}
         monkeypatch.setattr(studies.os, "sysconf", pages.__getitem__)
         if is_enough:
-            made.check_room()
+            made.check_memory()
         else:
             with pytest.raises(UsageError, match="764 MiB"):
-                made.check_room()
+                made.check_memory()
 
 
 def test_one_long_design_takes_the_memory_of_a_block(

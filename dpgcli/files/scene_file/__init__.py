@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -26,10 +27,13 @@ __all__ = [
     "read_spec",
     "reason_against",
     "recalibrated",
+    "scene_in",
     "scene_of",
     "spelled",
     "starter",
 ]
+
+GRIPPER = re.compile(r"^( *)# (?=gripper:|base_spacing_mm:|mounting_angle_deg:)", re.MULTILINE)
 
 
 def read_spec(path: str | Path, settings: Sequence[str] = ()) -> Spec:
@@ -51,8 +55,13 @@ def read_keys(path: str | Path, settings: Sequence[str] = ()) -> Spec:
 
 def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
     """The data of a spec, as `settings` change it, with the calibrations it names."""
+    return scene_in(read_document(path), path, settings)
+
+
+def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ()) -> Document:
+    """The same, of a document that was read from this path."""
     folder = Path() if str(path) == "-" else Path(path).parent
-    return with_calibrations(with_settings(read_document(path), settings), folder)
+    return with_calibrations(with_settings(document, settings), folder)
 
 
 def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
@@ -77,10 +86,11 @@ def canonical_json(spec: Spec) -> str:
     return json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def starter() -> str:
-    """A commented spec to start from."""
-    text = resources.files("dpgcli.files.scene_file").joinpath("starter.yaml")
-    return text.read_text(encoding="utf-8")
+def starter(*, has_gripper: bool = False) -> str:
+    """A commented spec to start from: of a finger, or of a gripper of two."""
+    resource = resources.files("dpgcli.files.scene_file").joinpath("starter.yaml")
+    text = resource.read_text(encoding="utf-8")
+    return GRIPPER.sub(r"\1", text) if has_gripper else text
 
 
 def canonical(value: Any) -> Any:

@@ -3,8 +3,10 @@
 import json
 import math
 from collections.abc import Container, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from dpgcli.files.scene_file import Spec, canonical, canonical_json, read_scene
 from dpgcli.files.scene_file.problems import checked
 from dpgcli.files.scene_file.settings import SETTING
 from dpgcli.files.sweep_file.models import (
+    MOST_AXES,
     MOST_DESIGNS,
     AxisSpec,
     Between,
@@ -30,7 +33,7 @@ from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
 from dpgcli.text import KeyPath
 
-__all__ = ["Sweep", "read_sweep", "sweep_in"]
+__all__ = ["Sweep", "read_sweep", "starter", "sweep_in", "sweep_of"]
 
 MOST_DIGITS = 30
 TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
@@ -62,9 +65,14 @@ class Sweep:
 def read_sweep(path: Path, settings: Sequence[str] = ()) -> Sweep:
     """Read and check a sweep; `settings` change its base spec.
 
-    Raises SpecError with all problems of both files at once, those of content after those of form.
+    Raises SpecError with all problems of both files at once.
     """
-    found = sweep_in(read_document(path), path.parent, settings)
+    return sweep_of(read_document(path), path, settings)
+
+
+def sweep_of(document: Document, path: Path, settings: Sequence[str] = ()) -> Sweep:
+    """The same, of a document that was read from this path."""
+    found = sweep_in(document, path.parent, settings)
     return replace(found, files=(path, *found.files))
 
 
@@ -80,24 +88,20 @@ def sweep_in(
     base_files: tuple[Path, ...] = ()
     base_spec = None
     if base is not None:
-        base_spec = checked(base)
+        base_spec = _checked(base, problems)
     elif isinstance(document.data.get("base"), str):
         base, base_spec = _base(base_path, settings, problems)
         base_files = (base_path,)
-    if spec is None or base is None:
-        raise SpecError(in_order([*document.problems, *problems]))
-    reader = SpaceReader(document, folder, "gripper" in base.data)
-    axes = [reader.axis(place, axis) for place, axis in enumerate(spec.space)]
-    rules = [
-        reader.constraint(place, text, base.data)
-        for place, text in enumerate(spec.constraints or ())
-    ]
+    reader = SpaceReader(document, folder, base is None or "gripper" in base.data)
+    axes = [reader.axis(place, axis) for place, axis in _axes(document)]
+    known = None if base is None or spec is None else base.data
+    rules = [reader.constraint(place, text, known) for place, text in _constraints(document)]
     problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
     space = Space(tuple(axis for axis in axes if axis is not None))
     if space.size > MOST_DESIGNS:
         expected, found = f"at most {MOST_DESIGNS:,} designs", _many(space.size)
         problems.append(document.problem(("space",), expected, found, "take fewer values"))
-    if problems or base_spec is None:
+    if problems or spec is None or base is None or base_spec is None:
         raise SpecError(in_order(problems))
     return Sweep(
         base_spec,
@@ -109,6 +113,23 @@ def sweep_in(
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(reader.files.values()),
     )
+
+
+def _axes(document: Document) -> Iterator[tuple[int, AxisSpec]]:
+    """The axes whose keys are right, each with its place; the others are problems already."""
+    said = document.data.get("space")
+    if not isinstance(said, list) or len(said) > MOST_AXES:
+        return
+    for place, axis in enumerate(said):
+        with suppress(ValidationError):
+            yield place, AxisSpec.model_validate(axis)
+
+
+def _constraints(document: Document) -> Iterator[tuple[int, str]]:
+    said = document.data.get("constraints")
+    for place, text in enumerate(said if isinstance(said, list) else ()):
+        if isinstance(text, str):
+            yield place, text
 
 
 def _base(
@@ -123,6 +144,20 @@ def _base(
     except SpecError as error:
         problems += error.problems
     return document, None
+
+
+def _checked(base: Document, problems: list[Problem]) -> Spec | None:
+    try:
+        return checked(base)
+    except SpecError as error:
+        problems += error.problems
+    return None
+
+
+def starter(base: str) -> str:
+    """A commented sweep to start from, around the spec of this name."""
+    resource = resources.files("dpgcli.files.sweep_file").joinpath("starter.yaml")
+    return resource.read_text(encoding="utf-8").replace("base: finger.yaml", f"base: {base}", 1)
 
 
 def _many(number: int) -> str:

@@ -218,8 +218,8 @@ class SpaceReader:
                 self.wrong(path, "each key on one axis", f"{key} again")
             self.keys.add(key)
 
-    def constraint(self, place: int, text: str, data: dict[str, Any]) -> Expression | None:
-        """The rule, with names that are keys of the space or of the base spec."""
+    def constraint(self, place: int, text: str, data: dict[str, Any] | None) -> Expression | None:
+        """The rule, with names that are keys of the space or of the base spec, if it is known."""
         path: KeyPath = ("constraints", place)
         try:
             rule = expression(text)
@@ -228,6 +228,8 @@ class SpaceReader:
             return None
         if not rule.is_comparison:
             self.wrong(path, "a comparison, such as dome_height_mm > 5", shown(text))
+        if data is None:
+            return rule
         known = self.keys | numbers_of(data).keys()
         last = Counter(name.rsplit(".", 1)[-1] for name in known)
         short = {name for name, count in last.items() if count == 1}
