@@ -123,7 +123,7 @@ def test_a_bug_is_3_and_keeps_its_traceback(call: Call, monkeypatch: pytest.Monk
     def broken(*_: object) -> None:
         raise ZeroDivisionError("oh")
 
-    monkeypatch.setattr("dpgcli.api.inputs.read_scene", broken)
+    monkeypatch.setattr("dpgcli.api.inputs.read_document", broken)
     result = call("predict", "three_unit.yaml")
     assert result.exit_code == ExitCode.INTERNAL
     assert "ZeroDivisionError: oh" in result.stderr
@@ -149,7 +149,7 @@ def test_rigid_bars_have_no_node_coordinates(call: Call) -> None:
 
 
 def test_a_problem_is_one_line_with_place_expected_and_found(call: Call, folder: Path) -> None:
-    (folder / "bad.yaml").write_text("finger:\n  units: 0\n", encoding="utf-8")
+    (folder / "bad.yaml").write_text("finger:\n  units: 0\n  colour: red\n", encoding="utf-8")
     result = call("predict", "bad.yaml")
     assert result.exit_code == ExitCode.USAGE
     first = result.stderr.splitlines()[0]
@@ -259,9 +259,9 @@ def test_what_is_no_time(text: str) -> None:
 
 def test_warnings_of_libraries_reach_only_those_who_ask(run: Callable[..., Any]) -> None:
     before = (
-        "import warnings, dpgcli.api.inputs as inputs; read = inputs.read_scene\n"
+        "import warnings, dpgcli.api.inputs as inputs; read = inputs.read_document\n"
         "def warned(*given): warnings.warn('of a library', RuntimeWarning); return read(*given)\n"
-        "inputs.read_scene = warned"
+        "inputs.read_document = warned"
     )
     usual = run("predict", "three_unit.yaml", "-q", env={"PYTHONWARNINGS": ""}, before=before)
     assert (usual.returncode, usual.stderr) == (0, "")
@@ -301,7 +301,7 @@ def test_a_system_that_has_no_more_is_no_bug(
     def refused(*_: object) -> None:
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr("dpgcli.api.inputs.read_scene", refused)
+    monkeypatch.setattr("dpgcli.api.inputs.read_document", refused)
     result = call("predict", "three_unit.yaml")
     assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
     assert result.stderr == f"dpg: the system refuses: [Errno {code}] {os.strerror(code)}\n"

@@ -9,15 +9,12 @@ import pytest
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SCRIPT = """
-import sys
+import atexit, sys
 from pathlib import Path
 from dpgcli.cli.main import main
 report = Path(sys.argv.pop(1))
-try:
-    main()
-except SystemExit as end:
-    assert not end.code, end.code
-report.write_text(" ".join(sys.modules))
+atexit.register(lambda: report.write_text(" ".join(sys.modules)))
+main()
 """
 AT_START = {"numpy", "scipy", "pandas", "pyarrow", "matplotlib", "pydantic", "numba"}
 PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba", "rich", "shapely", "filelock"}

@@ -36,8 +36,8 @@ Outcome.is_failure = property(lambda self: True)
 BREAKS = (
     ""
     "def broken(*_): raise BrokenPipeError('of a socket')\n"
-    "import dpgcli.api.inputs as specs\n"
-    "specs.read_scene = broken"
+    "import dpgcli.api.given as specs\n"
+    "specs.read_document = broken"
 )
 FEW = (
     "from dpgcli.states.predict import Prediction\n"
