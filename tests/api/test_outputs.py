@@ -69,6 +69,7 @@ def test_grids_and_domes(folder: Path) -> None:
             fit.save(path)
 
 
+@pytest.mark.slow
 def test_a_record_is_not_replaced_by_what_was_compared_with_it(folder: Path) -> None:
     result = dpg.bench(FINGER, repeats=1)
     result.record("record.json")

@@ -173,6 +173,7 @@ def test_a_pipe_that_does_not_wait_gets_all() -> None:
         assert read.result(30) == content
 
 
+@pytest.mark.slow
 def test_who_only_prints_stops_when_nobody_reads(unread: Unread) -> None:
     words = ("predict", "twenty_unit.yaml", "--format", "csv")
     done = unread(*words, before=FEW)

@@ -89,6 +89,7 @@ def own(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_no_beginning_of_a_fitted_file_is_believed(path: Path, own: str) -> None:
     for length in range(len(own) - 1):
         with pytest.raises(SpecError):

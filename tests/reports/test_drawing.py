@@ -45,6 +45,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (folder / "states.svg").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("environment", "files"),
     [
@@ -70,6 +71,7 @@ def test_figures_are_the_same_whatever_is_set(
     assert (tmp_path / "states.svg").read_bytes() == plain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -90,6 +92,7 @@ def test_so_are_those_of_other_commands(tmp_path: Path, arguments: tuple[str, ..
     assert contents[0] == contents[1]
 
 
+@pytest.mark.slow
 def test_so_are_those_of_reports(tmp_path: Path) -> None:
     sweep = f"base: {SPEC}\nspace: [{{key: finger.geometry.dome_height_mm, values: [6, 6.5, 7]}}]"
     (tmp_path / "sweep.yaml").write_text(sweep)

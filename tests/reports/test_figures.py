@@ -109,6 +109,7 @@ def check_seen(figure: Any) -> None:
     assert min(sizes) >= 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overlay", [False, True], ids=["panels", "overlay"])
 @pytest.mark.parametrize("case", CASES)
 def test_nothing_is_cut_off_or_hidden(draw: Any, case: str, overlay: bool) -> None:
