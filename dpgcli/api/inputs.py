@@ -17,7 +17,7 @@ from dpgcli.calibration.choices import MOST_RESAMPLES
 from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
-from dpgcli.errors import Field, UsageError
+from dpgcli.errors import Field, SpecError, UsageError
 from dpgcli.files.calibration import Calibration, read_calibration
 from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
@@ -102,7 +102,11 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
     if isinstance(spec, Mapping):
         return _scene("spec", spec_document(spec, settings))
     path = path_of("spec", spec)
-    return scene_input_in(read_document(spec), path, settings)
+    document = read_document(spec)
+    if "space" in document.data and "finger" not in document.data:
+        said = "a spec, with the key finger", "a sweep", "dpg sweep and dpg explain take it"
+        raise SpecError([document.problem(("space",), *said)])
+    return scene_input_in(document, path, settings)
 
 
 def scene_input_in(document: Document, path: Path, settings: Settings = ()) -> SceneInput:

@@ -370,3 +370,15 @@ def test_functions_take_sweeps(call: Call, write: Any, folder: Path) -> None:
         dpg.explain(data, patterns="1*")
     with pytest.raises(dpg.SpecError, match="found finger beside space"):
         dpg.explain({"finger": {}, "space": []})
+
+
+def test_what_takes_specs_alone_says_what_takes_a_sweep(call: Any, folder: Path) -> None:
+    (folder / "wide.yaml").write_text("base: three_unit.yaml\nspace: []\n", encoding="utf-8")
+    for command in (("predict",), ("bench",), ("compare",)):
+        more = ("three.csv",) if command == ("compare",) else ()
+        result = call(*command, "wide.yaml", *more)
+        assert result.exit_code == 2
+        assert result.stderr.startswith(
+            "wide.yaml:2:1: space: expected a spec, with the key finger, found a sweep "
+            "(dpg sweep and dpg explain take it)"
+        )
