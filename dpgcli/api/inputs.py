@@ -105,7 +105,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
     document = read_document(spec)
     if "space" in document.data and "finger" not in document.data:
         said = "a spec, with the key finger", "a sweep", "dpg sweep and dpg explain take it"
-        raise SpecError([document.problem(("space",), *said)])
+        raise SpecError((document.problem(("space",), *said),))
     return scene_input_in(document, path, settings)
 
 
