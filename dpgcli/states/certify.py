@@ -17,7 +17,7 @@ from dpgcli.states.wells import Wells
 MARGINAL_CURVATURE = float(np.sqrt(np.finfo(float).eps))  # below it, rounding may decide
 SMALL_SHARE = 0.1  # of a unit's holding force: a smaller residual cannot make it snap
 LARGEST_CURVATURE = 1.0  # a larger one is far from any loss of stability
-FINEST_BALANCE = 1e-13  # of the finger's forces in play: rounding leaves so much of them
+FINEST_BALANCE = 3e-13  # of the finger's forces in play: rounding leaves so much of them
 
 
 class Status(IntEnum):

@@ -12,7 +12,7 @@ from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
 
 SHORT_OF_LEVER = 1.0 - 1e-9  # of 2H, where bars end all opening
-NEWTON_STEPS = 12  # for an opening: quadratic from a start that is off by the wall's share
+NEWTON_STEPS = 60  # for an opening; a handful does but where bars nearly end it
 
 
 def rigid_unit(finger: Finger, extension: Array) -> Response:
@@ -51,18 +51,34 @@ def _with_wall(finger: Finger, stiffness: Array) -> Array:
 def opening_of(finger: Finger, extension: Array) -> Array:
     """The opening x of a unit with rigid bars whose dome's spring extends by y, mm.
 
-    Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. The right
-    side is convex, so that Newton's method from above reaches the root monotonically.
+    Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. With
+    x = 2H sin m, and times cos m, nothing in it grows without bound where bars end the opening:
+    (y − 2H sin m) cos m = 2 m c_w k_θ/H, whose left side less the right falls from m = 0 to its
+    root. Newton's method, kept between what is known to be below the root and above it.
     """
     if not finger.has_walls:
         return extension
-    opening = np.minimum(extension, SHORT_OF_LEVER * 2.0 * finger.segment_height)
+    lever = 2.0 * finger.segment_height
+    softness = 2.0 * finger.wall_compliance * finger.hinge_stiffness / finger.segment_height
+    reached, lever, softness = np.broadcast_arrays(np.abs(extension), lever, softness)
+    low, high = np.zeros(reached.shape), np.full(reached.shape, 0.5 * np.pi)
+    turn = np.arcsin(np.minimum(reached / (lever + softness), SHORT_OF_LEVER))
+    is_running = np.ones(reached.shape, bool)
     for _ in range(NEWTON_STEPS):
-        _, pull, stiffness = _hinge(finger, opening)
-        excess = opening - extension + finger.wall_compliance * pull
-        step = excess / (1.0 + finger.wall_compliance * stiffness)
-        opening = opening - np.maximum(step, 0.0)  # not at all where bars end it
-    return np.asarray(opening)
+        sine, cosine = np.sin(turn), np.cos(turn)
+        excess = (reached - lever * sine) * cosine - softness * turn
+        slope = -lever * cosine * cosine - (reached - lever * sine) * sine - softness
+        low = np.where(excess >= 0.0, turn, low)
+        high = np.where(excess <= 0.0, turn, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            further = turn - excess / slope
+        inside = (further > low) & (further < high)
+        further = np.where(inside, further, 0.5 * (low + high))
+        is_running &= np.abs(further - turn) > 1e-16 * turn  # what has arrived stays
+        if not is_running.any():
+            break
+        turn = np.where(is_running, further, turn)
+    return np.asarray(np.copysign(lever * np.sin(turn), extension))
 
 
 def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
