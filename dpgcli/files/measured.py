@@ -229,7 +229,7 @@ def _is_numeric(sheet: Sheet, name: str) -> bool:
     """Whether at least one cell of a column is a number, so that all should be."""
     for cell in sheet.cells(name):
         try:
-            float(cell)
+            float(cell.replace(",", "."))  # whatever the decimal mark
         except ValueError:
             continue
         return True

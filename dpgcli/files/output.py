@@ -113,11 +113,14 @@ def check_apart(paths: Iterable[Path]) -> None:
 
 
 def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
-    """Raise UsageError for a file to write that is one of those that are read."""
+    """Raise UsageError for a file to write that is one of those that are read, or would be next."""
     read = [source for source in sources if source.exists()]
+    folders = [source.resolve() for source in read if source.is_dir()]
     for path in paths:
         if path.exists() and any(path.samefile(source) for source in read):
             raise UsageError(f"{path} is the spec or data that is read: give another name")
+        if any(path.resolve().is_relative_to(folder) for folder in folders):
+            raise UsageError(f"{path} would lie in a folder that is read: give another name")
 
 
 def run_file(table: Path) -> Path:

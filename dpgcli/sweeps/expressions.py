@@ -115,10 +115,26 @@ def expression(text: str) -> Expression:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"not an expression: {text!r}{_hint(text)}") from error
-    is_comparison = isinstance(body, ast.Compare | ast.BoolOp) or (
-        isinstance(body, ast.UnaryOp) and isinstance(body.op, ast.Not)
-    )
-    return Expression(text.strip(), names, is_comparison)
+    return Expression(text.strip(), names, _is_comparison(body))
+
+
+def _is_comparison(node: ast.expr) -> bool:
+    """Whether a node is true or false, and not a number."""
+    is_negation = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
+    return is_negation or isinstance(node, ast.Compare | ast.BoolOp)
+
+
+def _check_truths(nodes: list[ast.expr]) -> None:
+    """Refuse a number beside and, or and not: any but 0 would count as true.
+
+    >>> expression("a == 3 or 5")
+    Traceback (most recent call last):
+        ...
+    dpgcli.sweeps.expressions.ExpressionError: and, or and not take comparisons, found 5
+    """
+    for node in nodes:
+        if not _is_comparison(node):
+            raise ExpressionError(f"and, or and not take comparisons, found {ast.unparse(node)}")
 
 
 def _hint(text: str) -> str:
@@ -160,8 +176,11 @@ def _parts(node: ast.expr) -> list[ast.expr]:
     if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC:
         return [node.left, node.right]
     if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+        if isinstance(node.op, ast.Not):
+            _check_truths([node.operand])
         return [node.operand]
     if isinstance(node, ast.BoolOp):
+        _check_truths(node.values)
         return node.values
     if isinstance(node, ast.Compare) and all(type(op) in _COMPARISONS for op in node.ops):
         return [node.left, *node.comparators]

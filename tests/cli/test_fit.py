@@ -351,3 +351,11 @@ def test_the_geometry_of_a_spec_whose_calibration_is_yet_to_be_made(
     options = ("--travel-to-opening", "stroke:3.5", "--spec", "new.yaml", "-o", "dome.yaml", "-q")
     assert fit("bistable", PATH, *options).exit_code == ExitCode.DONE
     assert call("predict", "new.yaml", "-q").exit_code == ExitCode.DONE
+
+
+def test_columns_with_decimal_commas_are_no_labels(call: Any, folder: Path) -> None:
+    rows = "\n".join(f"0,{n:02};{2.5 * n:.2f}".replace(".", ",") for n in range(1, 11))
+    (folder / "comma.csv").write_text(f"rotation_rad;moment_N_mm\n{rows}\n", encoding="utf-8")
+    result = call("fit", "hinge", "comma.csv")
+    assert result.exit_code == ExitCode.DONE
+    assert "are fitted as one hinge" not in result.stderr

@@ -382,3 +382,15 @@ def test_what_takes_specs_alone_says_what_takes_a_sweep(call: Any, folder: Path)
             "wide.yaml:2:1: space: expected a spec, with the key finger, found a sweep "
             "(dpg sweep and dpg explain take it)"
         )
+
+
+@pytest.mark.parametrize("output", ["tables", "tables/out"])
+def test_no_output_lies_in_a_folder_that_is_read(call: Any, folder: Path, output: str) -> None:
+    key = "finger.geometry.dome_height_mm"
+    (folder / "tables").mkdir()
+    (folder / "tables" / "a.csv").write_text(f"{key}\n6.5\n", encoding="utf-8")
+    (folder / "wide.yaml").write_text("base: three_unit.yaml\nspace: [{table: tables}]\n")
+    result = call("sweep", "wide.yaml", "-o", output)
+    assert result.exit_code == 2
+    assert "would lie in a folder that is read" in result.stderr
+    assert sorted(path.name for path in (folder / "tables").iterdir()) == ["a.csv"]

@@ -255,3 +255,25 @@ def test_functions_of_truths_are_of_full_precision(text: str) -> None:
 def test_a_threshold_on_a_function_of_a_truth() -> None:
     """In half precision e is 2.719: the other verdict."""
     assert bool(expression("100 * exp(height_mm > 1) <= 271.83")({"height_mm": 6.5}))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "n == 3 or 5",
+        "n > 9 or min(1, 2)",
+        "n and m",
+        "not n",
+        "n > 1 and (2 or n > 3)",
+        "n > 1 or m",
+    ],
+)
+def test_a_number_is_no_operand_of_and_or_not(text: str) -> None:
+    """Any but 0 would count as true, and the gate would always pass."""
+    with pytest.raises(ExpressionError, match="and, or and not take comparisons, found "):
+        expression(text)
+
+
+def test_comparisons_are() -> None:
+    rule = expression("n == 3 or n == 5 and not (m > 1 or n < 2)")
+    assert [bool(rule({"n": n, "m": 0})) for n in (3, 4, 5)] == [True, False, True]

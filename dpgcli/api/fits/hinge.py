@@ -17,6 +17,7 @@ from dpgcli.api.inputs import Texts, check_resampling, chosen, files_of, table_c
 from dpgcli.calibration import hinge
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.hinge import HingeFit
+from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import fitted, method_of
 from dpgcli.files.csv_file import Tabular, name_of
@@ -51,6 +52,8 @@ def fit_hinge(
     24.2
     """
     check_resampling(bootstrap, seed)
+    if not isinstance(where, str | None):
+        raise UsageError(Field("where"), f" {where!r}: expected a text, COLUMN=TEXT")
     at = geometry_from(geometry, spec)
     data = read_moments(curve, where, table_choice(column, skip, units))
     weighted = chosen(Loss, "loss", loss)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dpgcli.files.layout import NUMBER
 from dpgcli.files.sweep_file.tables import NoTableError
 
 SUFFIXES = (".parquet", ".csv")
@@ -48,20 +49,28 @@ def joined(folder: Path, frames: dict[Path, pd.DataFrame]) -> pd.DataFrame:
     parts = []
     for path, frame in frames.items():
         folders = path.relative_to(folder).parts[:-1]
-        named = dict(name.split("=", 1) for name in folders if "=" in name)
-        parts.append(frame.assign(**{key: _number(value) for key, value in named.items()}))
-    columns = list(parts[0].columns)
-    for path, part in zip(frames, parts, strict=True):
-        if list(part.columns) != columns:
+        named = [name.split("=", 1) for name in folders if "=" in name]
+        twice = {key for key, _ in named if key in frame or [k for k, _ in named].count(key) > 1}
+        if twice:
+            raise NoTableError(f"{', '.join(sorted(twice))} twice, for {path.name}", "name it once")
+        parts.append(frame.assign(**{key: _number(value) for key, value in named}))
+    _check_alike(dict(zip(frames, parts, strict=True)))
+    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+
+
+def _check_alike(parts: dict[Path, pd.DataFrame]) -> None:
+    """Raise NoTableError for parts of other columns, or types, than the first that has rows."""
+    first = next((part for part in parts.values() if len(part)), next(iter(parts.values())))
+    for path, part in parts.items():
+        if list(part.columns) != list(first.columns):
             raise NoTableError(f"other columns in {path.name} than in the first part")
-    return pd.concat(parts, ignore_index=True)
+        kinds = ({part[name].dtype.kind, first[name].dtype.kind} for name in part)
+        if len(part) and any(len(kind) > 1 and kind != {"i", "f"} for kind in kinds):
+            raise NoTableError(f"other types in {path.name} than in the first part")
 
 
 def _number(text: str) -> float | int | str:
-    """A number where a text is one."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
+    """A number where a text is one, as in a cell."""
+    if NUMBER.fullmatch(text) is None:
+        return text
+    return int(text) if text.lstrip("+-").isdigit() else float(text)

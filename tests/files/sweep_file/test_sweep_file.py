@@ -609,6 +609,27 @@ def test_what_is_wrong_with_a_folder(read: Read, folder: Path, tmp_path: Path) -
     assert len(problems(read, "table: d.parquet")) == 1
 
 
+def test_a_column_has_one_source(read: Read, tmp_path: Path) -> None:
+    """The name of a folder does not replace the column of a file, nor another folder's."""
+    inner = tmp_path / "d" / f"{HEIGHT}=2.5"
+    inner.mkdir(parents=True)
+    (inner / "a.csv").write_text(f"{HEIGHT}\n4\n")
+    assert f"{HEIGHT} twice, for a.csv" in problems(read, "table: d")[0]
+    (inner / "a.csv").unlink()
+    twice = inner / f"{HEIGHT}=3"
+    twice.mkdir()
+    (twice / "b.csv").write_text(f"{SEPARATION}\n3\n")
+    assert f"{HEIGHT} twice, for b.csv" in problems(read, "table: d")[0]
+
+
+def test_parts_have_the_types_of_the_first(read: Read, folder: Path) -> None:
+    wrong = pa.table({HEIGHT: [True], SEPARATION: [3.0]})
+    pq.write_table(wrong, folder / "part-2.parquet")
+    assert "other types in part-2.parquet" in problems(read, "table: d.parquet")[0]
+    pq.write_table(wrong.slice(0, 0), folder / "part-2.parquet")
+    assert designs(read("table: d.parquet"))[HEIGHT] == [6.5, 7], "an empty part has none"
+
+
 def test_the_parts_of_a_folder_have_room_together(
     read: Read, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
