@@ -99,11 +99,14 @@ def _named(titles: Sequence[str], found: Mapping[str, tuple[int, bool]]) -> list
 
 
 def _units(titles: Sequence[str], row: Sequence[str]) -> list[str]:
-    """The unit of each column, by the row of units, or else by its title."""
+    """The unit of each column, by the row of units or by its title; both where they differ.
+
+    What is said twice, and not alike, is no unit that is known: it will be asked about.
+    """
     below = [bare(cell) for cell in row[: len(titles)]]
     below += [""] * (len(titles) - len(below))
-    pairs = zip(titles, below, strict=True)
-    return [unit or name_and_unit(title)[1] for title, unit in pairs]
+    both = ((name_and_unit(title)[1], unit) for title, unit in zip(titles, below, strict=True))
+    return [" and ".join(dict.fromkeys(filter(None, pair))) for pair in both]
 
 
 def _width(names: Sequence[str], rows: Sequence[Row], needed: Container[str]) -> int:

@@ -359,3 +359,12 @@ def test_columns_with_decimal_commas_are_no_labels(call: Any, folder: Path) -> N
     result = call("fit", "hinge", "comma.csv")
     assert result.exit_code == ExitCode.DONE
     assert "are fitted as one hinge" not in result.stderr
+
+
+def test_units_that_contradict_each_other_are_asked_about(call: Any, folder: Path) -> None:
+    rows = "0;0\n0,5;0,005\n1;0,008\n2;-0,002\n3;-0,003\n4;0,006\n"
+    (folder / "kn.csv").write_text(f"Weg (mm);Kraft (kN)\n(mm);(N)\n{rows}", encoding="utf-8")
+    chosen = ("--column", "travel_mm=Weg", "--column", "force_N=Kraft")
+    result = call("fit", "bistable", "kn.csv", *chosen, "--travel-to-opening", "equal")
+    assert result.exit_code == ExitCode.USAGE
+    assert "found kN and N (say which: --units force=N)" in result.stderr

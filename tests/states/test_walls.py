@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
@@ -12,6 +12,7 @@ from dpgcli.mechanics.laws import PUBLISHED, PushOnly, bistable
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.certify import Settled, Status
+from dpgcli.states.rigid_unit import opening_of
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -147,3 +148,28 @@ def test_a_finger_with_rigid_walls_has_no_unknown_of_them() -> None:
         assert walls.coordinates.size == without.coordinates.size + 3
         assert "wall" not in without.kinds
         assert "wall" in walls.kinds
+
+
+@pytest.mark.parametrize("stroke", [3.5, 24.0, 30.0])  # the last beyond what bars can open, 2H
+@pytest.mark.parametrize("compliance", [1e-4, 0.1, 3.0, 100.0])
+def test_the_opening_behind_a_wall_is_the_root(stroke: float, compliance: float) -> None:
+    """By bisection, also where bars nearly end the opening."""
+    finger = uniform_finger(1, **{**STUDY, "hinge_stiffness": 300.0, "stroke": stroke})
+    finger = finger.changed(wall_compliance=np.array([[compliance]]))
+    extension = np.array([[-0.5], [1e-3], [0.7], [1.3]]) * stroke
+    opening = opening_of(finger, extension.reshape(1, -1)).ravel()
+    for y, x in zip(extension.ravel(), opening, strict=True):
+
+        def excess(m: float, y: float = float(abs(y))) -> float:
+            return (y - 21.5 * np.sin(m)) * np.cos(m) - 600.0 * compliance / 10.75 * m
+
+        m = brentq(excess, 0.0, np.pi / 2.0, xtol=1e-300, rtol=1e-14)
+        assert x == pytest.approx(np.copysign(21.5 * np.sin(m), y), rel=1e-11)
+
+
+def test_the_barrier_of_a_dome_that_opens_beyond_its_bars() -> None:
+    """By a scan of the dome's extension, wall and hinge in series."""
+    finger = uniform_finger(
+        1, **{**STUDY, "stroke": 24.0, "force_linearity": 0.02, "hinge_stiffness": 300.0}
+    ).changed(wall_compliance=np.array([[3.0]]))
+    assert barriers(finger, inverted_wells(finger))[0] == pytest.approx(118.364, abs=1e-3)
