@@ -153,7 +153,7 @@ def test_a_traceback_is_shown_and_not_obeyed(
         raise RuntimeError("x\n::stop-commands::y\n\x1b[2J")
 
     monkeypatch.setattr("dpgcli.api.inputs.scene_input", broken)
-    result = call("explain", "three_unit.yaml")
+    result = call("predict", "three_unit.yaml")
     assert result.exit_code == ExitCode.INTERNAL
     assert "RuntimeError: x\n\\x3a:stop-commands::y\n\\x1b[2J\ndpg: this is a bug" in result.stderr
 

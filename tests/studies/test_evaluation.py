@@ -207,7 +207,8 @@ def test_an_absurd_number_of_units_is_an_invalid_design(
     study: Any, tables: Any, value: str
 ) -> None:
     made = study(f"{{key: finger.units, values: [3, {value}]}}")
-    made.check_room()
+    made.check_memory()
+    made.check_disk()
     _, designs = tables(made)
     assert designs["status"].tolist() == ["stable", "invalid"]
 

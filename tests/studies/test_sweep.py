@@ -295,16 +295,19 @@ def test_a_space_that_the_disk_cannot_hold_is_refused(
     with pytest.raises(
         UsageError, match=r"9,000,000 designs .* 72,000,000 states.*16 GiB.*with force"
     ):
-        made.check_room()
+        made.check_memory()
+        made.check_disk()
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, 50 * 2**30))
-    made.check_room()
+    made.check_memory()
+    made.check_disk()
 
 
 def test_sizes_below_a_gibibyte_are_said(study: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     made = study("{key: finger.geometry.dome_height_mm, linear: {from: 5, to: 7, count: 9000}}")
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, 10_000_000))
     with pytest.raises(UsageError) as refused:
-        made.check_room()
+        made.check_memory()
+        made.check_disk()
     assert " 0 GiB" not in str(refused.value)
 
 
@@ -314,7 +317,9 @@ def test_what_is_done_needs_no_room_again(study: Any, monkeypatch: pytest.Monkey
         study(*AXES).compute(serial(), stopping_after(18))
     needed = 2 * 76 * 16 * BYTES_PER_STATE
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, int(0.6 * needed)))
-    study(*AXES).check_room()
+    made = study(*AXES)
+    made.check_memory()
+    made.check_disk()
 
 
 def test_the_room_that_is_asked_for_is_enough_and_not_ten_times_too_much(
@@ -336,7 +341,8 @@ def test_a_vast_space_is_refused_at_once(study: Any) -> None:
     ]
     made = study(*axes)
     with pytest.raises(UsageError, match="with force"):
-        made.check_room()
+        made.check_memory()
+        made.check_disk()
     assert not made.is_up_to_date
     made.check_unfinished()
 
