@@ -183,7 +183,7 @@ def test_wells_behind_walls_are_told_from_barriers_next_to_a_fold(
     assert (inside.barrier < inside.extension).all()
 
 
-@pytest.mark.parametrize(("share", "is_balanced"), [(3e-15, True), (3e-14, False)])
+@pytest.mark.parametrize(("share", "is_balanced"), [(9e-15, True), (9e-14, False)])
 def test_a_weak_unit_may_feel_the_rounding_of_its_neighbors(
     share: float, is_balanced: bool
 ) -> None:
