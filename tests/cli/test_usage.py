@@ -111,6 +111,9 @@ def carry_out(folder: Path, name: str) -> None:
             path.unlink()
     if name == "merge":
         lines.insert(0, EXAMPLES["sweep"][1].replace("part1", "part2").replace("1/2", "2/2"))
+    if name == "stress":  # one family for all or for a longer one: minutes less
+        lines = [line.replace("crossed", "mirror") for line in lines]
+        lines = [line if "--only" in line else f"{line} --only mirror" for line in lines]
     search = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
     for line in lines:
         done = subprocess.run(
