@@ -104,7 +104,11 @@ def _range(finger: Finger, own_well: Array) -> tuple[Array, Flags]:
     domes = finger.domes
     whole = domes.stroke + domes.contact
     own = own_well + domes.contact  # a travel; the unit's is shorter
-    widest = WIDEST * np.where(np.isnan(own), whole, own) - domes.contact
+    furthest = WIDEST * np.where(np.isnan(own), whole, own)
+    curve = finger.law.curve
+    if curve is not None:  # beyond its last point nothing is known, but for a well that is there
+        furthest = np.minimum(furthest, np.fmax(curve.knots[-1] * whole, own))
+    widest = furthest - domes.contact
     if not finger.has_walls:  # walls take the rest
         widest = np.minimum(widest, SHORT_OF_LEVER * 2.0 * finger.segment_height)
     within_reach = widest > 0.0

@@ -22,14 +22,16 @@ space:
         finger.overrides.2.geometry.dome_height_mm: {from: 4, to: 8}
 """
 PROGRAM = """
-import sys
+import atexit, sys
 from pathlib import Path
 from dpgcli.cli.main import main
-try:
-    main()
-finally:
+
+def say():
     status = Path("/proc/self/status").read_text()
-    print(status.partition("VmHWM:")[2].split()[0], file=sys.stderr)
+    print(status.partition("VmHWM:")[2].split()[0], file=sys.stderr, flush=True)
+
+atexit.register(say)
+main()
 """
 LIMIT = 600 * 1024  # KiB
 
