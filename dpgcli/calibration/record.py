@@ -18,6 +18,7 @@ from dpgcli.errors import Field, FitError, Message
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts
 BEYOND_REST = 0.4  # of the largest travel: where an inverted well may be
+RINGING = 0.01  # of the energy at a well: how far a dome that rings is off it
 SMALLEST_DEPTH = 0.1  # of the barrier before a well: less is noise
 FAST_RATIO = 10.0  # times the speed that three quarters of the moving time stay below
 RESTING_SPEED = 0.01  # of the mean speed, range over duration: slower is not moving
@@ -154,7 +155,8 @@ def inverted_well(record: Record) -> float | None:
     well = float(wells[0])
     is_near = np.abs(record.travel[late] - well).min() <= NEAR_WELL * largest
     on_the_way = (record.travel < well) & (record.travel > well - LARGEST_STEP * largest)
-    comes_down = not on_the_way.any() or energy[on_the_way].mean() > cubic(well)
+    level = cubic(well) - RINGING * abs(cubic(well) - energy[0])
+    comes_down = not on_the_way.any() or energy[on_the_way].mean() > level
     return well if is_near and comes_down and well > begin else None
 
 
