@@ -24,9 +24,7 @@ SELDOM = 10**5  # objects made: what imports make stays, and to look through it 
 
 def main() -> None:
     """Run the program."""
-    for number in STOPS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
-            signal.signal(number, _end)
+    answer_stops()
     gc.set_threshold(SELDOM)
     if not sys.warnoptions:  # -W, PYTHONWARNINGS: tests take each for an error
         warnings.simplefilter("ignore")  # of libraries; what users should know is said by commands
@@ -35,6 +33,13 @@ def main() -> None:
     from dpgcli.cli.main import main as run  # signals are met by commands from here on
 
     run()
+
+
+def answer_stops() -> None:
+    """Meet signals from now on, until commands do."""
+    for number in STOPS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and & in a script want it
+            signal.signal(number, _end)
 
 
 def _leave_out_working_folder() -> None:
