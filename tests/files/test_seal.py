@@ -80,7 +80,7 @@ def test_metadata_may_be_long(tmp_path: Path, length: int) -> None:
 
 def test_a_table_is_sealed_and_reads_back(table: Path) -> None:
     assert is_whole(table)
-    designs, _ = read_designs(table)
+    designs = read_designs(table).columns
     assert designs["height_mm"].tolist() == [4.5, 6.0, 6.5]
     said = pq.read_metadata(table).metadata[KEY.encode()].decode()
     assert said != UNSEALED
