@@ -131,8 +131,7 @@ def sweep(
 
     In data the `base` may be a spec's data, too. The tables go into the folder `output`, where
     another call goes on; without one they are in the result alone. The other arguments are those
-    of `dpg sweep`: where it is `strict`, a requirement on what no design should be judged by is
-    refused. `watch` sees the progress. Processes import the program that starts them: put
+    of `dpg sweep`; `watch` sees the progress. Processes import the program that starts them: put
     its work under `if __name__ == "__main__"`, or take executor="serial".
     Raises SpecError for a wrong sweep, UsageError for wrong choices, OutputError, WorkplaceError.
 
