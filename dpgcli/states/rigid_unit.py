@@ -92,8 +92,8 @@ def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
 
 
 def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
-    """Every unit of every design as a design of its own, and how many units and designs."""
+    """Every unit of every design as an unloaded design of its own; number of units, of designs."""
     arrays = {**finger.arrays(), "branch": finger.branch}
     units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
     flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
-    return finger.with_units([0]).changed(**flat), (units, designs)
+    return finger.with_units([0]).changed(**flat, end_moment=np.zeros((1, 1))), (units, designs)
