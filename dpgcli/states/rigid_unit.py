@@ -4,6 +4,8 @@ Both corners open by m, so that the opening is x = 2H sin m, and the hinge's ene
 Walls take the rest of the dome's extension y: w = y − x.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from dpgcli.arrays import Array
@@ -27,21 +29,31 @@ def rigid_unit(finger: Finger, extension: Array) -> Response:
     [[3.381735]]
     """
     if finger.has_walls:
-        return turned_unit(finger, turn_of(finger, extension))[1]
+        return turned_unit(finger, turn_of(finger, extension)).response
     return _with_hinge(finger, extension, *_hinge(finger, extension))
 
 
-def turned_unit(finger: Finger, turn: Array) -> tuple[Array, Response]:
-    """The extension y (mm) and the response by it, as of `rigid_unit`, by the corners' turn m.
+class TurnedUnit(NamedTuple):
+    """Extension y (mm), the response by it as of `rigid_unit`, and dy/dm, mm/rad."""
+
+    extension: Array
+    response: Response
+    rate: Array
+
+
+def turned_unit(finger: Finger, turn: Array) -> TurnedUnit:
+    """A unit by the turn m (rad) of either corner.
 
     y = 2H sin m + c_w h' is explicit in m and rises with it, where m by y takes a search.
     """
     lever = 2.0 * finger.segment_height
-    turn, pull, stiffness = _hinge(finger, lever * np.sin(turn))
-    extension = lever * np.sin(turn) + finger.wall_compliance * pull
-    in_series = stiffness / (1.0 + finger.wall_compliance * stiffness)
-    energy, *derivatives = _with_hinge(finger, extension, turn, pull, in_series)
-    return extension, Response(energy + 0.5 * finger.wall_compliance * pull * pull, *derivatives)
+    opening = lever * np.sin(turn)
+    turn, pull, stiffness = _hinge(finger, opening)
+    extension = opening + finger.wall_compliance * pull
+    yields = 1.0 + finger.wall_compliance * stiffness
+    energy, *derivatives = _with_hinge(finger, extension, turn, pull, stiffness / yields)
+    response = Response(energy + 0.5 * finger.wall_compliance * pull * pull, *derivatives)
+    return TurnedUnit(extension, response, lever * np.cos(turn) * yields)
 
 
 def _with_hinge(
@@ -74,11 +86,11 @@ def turn_of(finger: Finger, extension: Array) -> Array:
         high = np.where(excess <= 0.0, turn, high)
         with np.errstate(divide="ignore", invalid="ignore"):
             further = turn - excess / slope
-        inside = (further > low) & (further < high)
-        further = np.where(inside, further, 0.5 * (low + high))
-        is_running &= np.abs(further - turn) > 1e-16 * turn  # what has arrived stays
+        is_running &= ~(np.abs(further - turn) <= 1e-15 * turn)  # what has arrived stays
         if not is_running.any():
             break
+        inside = (further > low) & (further < high)
+        further = np.where(inside, further, 0.5 * (low + high))
         turn = np.where(is_running, further, turn)
     return np.asarray(np.copysign(turn, extension))
 
