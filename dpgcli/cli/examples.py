@@ -54,6 +54,7 @@ EXAMPLES = {
         "dpg fit bistable dome.csv --travel-to-opening stroke:3.5 --spec finger.yaml",
         "dpg fit bistable dome.csv --travel-to-opening equal --bootstrap 100 --output dome.yaml",
     ),
+    "fit unit": ("dpg fit unit unit.csv --spec finger.yaml --output unit.yaml",),
     "fit hinge": ("dpg fit hinge hinge.csv --spec finger.yaml --output hinge.yaml",),
     "fit finger": (
         "dpg fit finger finger.yaml tips.csv --output height.yaml",

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 from dpgcli.arrays import Array, Flags
 
 PUBLISHED = "published"
+FINITE_ELEMENTS = "finite_elements"
 
 
 class Fitted(NamedTuple):

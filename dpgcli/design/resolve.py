@@ -20,11 +20,12 @@ from dpgcli.design.dimensions import (
     range_issues,
 )
 from dpgcli.design.domes import Domes, domes_of
+from dpgcli.design.fitted import from_file
 from dpgcli.design.footing import Case, kinds
 from dpgcli.design.model_error import model_error_of
 from dpgcli.design.outputs import Trust
 from dpgcli.design.problems import Issue, Problems, number, of_design
-from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
+from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, WALLS, Value, all_by
 from dpgcli.design.scene import (
     ORIGINS,
     Chambers,
@@ -248,7 +249,8 @@ def resolve(design: Design) -> Resolution:
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
     values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
-    walls = [(group, _walls(group)) for group in groups]
+    found = [(group, _walls(group, problems)) for group in groups]
+    walls = [(group, value) for group, value in found if value is not None]
     if any(_may_yield(value, WALL_COMPLIANCE in design.tolerances) for _, value in walls):
         values[WALL_COMPLIANCE] = walls
     resolution = Resolution(design, domes, values, problems)
@@ -287,12 +289,14 @@ def _bars(design: Design, base: UnitGroup) -> Value:
     return _fitted(LINEAR_STIFFNESS, base) or assumed
 
 
-def _walls(group: UnitGroup) -> Value:
-    """How far walls give way: given, fitted, or not at all."""
+def _walls(group: UnitGroup, problems: Problems) -> Value | None:
+    """How far walls give way: given, fitted, or not at all; None where a file's does not fit."""
     if WALL_COMPLIANCE in group.lattice:
         return all_by(group.lattice[WALL_COMPLIANCE], Origin.GIVEN, "as given")
-    rigid = all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
-    return _fitted(WALL_COMPLIANCE, group) or rigid
+    for place, calibration in enumerate(group.calibrations):
+        if isinstance(calibration, Calibration) and calibration.has(WALL_COMPLIANCE):
+            return from_file(WALLS, group, calibration, place, problems)
+    return all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
 
 
 def _may_yield(value: Value, is_tolerated: bool) -> bool:

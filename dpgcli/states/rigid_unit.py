@@ -4,6 +4,8 @@ Both corners open by m, so that the opening is x = 2H sin m, and the hinge's ene
 Walls take the rest of the dome's extension y: w = y − x.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from dpgcli.arrays import Array
@@ -26,38 +28,50 @@ def rigid_unit(finger: Finger, extension: Array) -> Response:
     >>> print(rigid_unit(unit, np.array([[3.5]])).energy.round(8))  # ½ α k_b d²
     [[3.381735]]
     """
-    spring, opening = finger.springs(extension), opening_of(finger, extension)
-    turn, pull, stiffness = _hinge(finger, opening)
-    energy = spring.energy + laws.quadratic(2.0 * turn, finger.hinge_stiffness).energy
     if finger.has_walls:
-        energy = energy + 0.5 * finger.wall_compliance * pull * pull
-    stiffness = spring.stiffness + _with_wall(finger, stiffness)
-    return Response(energy, spring.force + pull, stiffness)
+        return turned_unit(finger, turn_of(finger, extension)).response
+    return _with_hinge(finger, extension, *_hinge(finger, extension))
 
 
-def rigid_stiffness(finger: Finger, extension: Array) -> Array:
-    """The stiffness alone, N/mm, of `rigid_unit`."""
-    *_, stiffness = _hinge(finger, opening_of(finger, extension))
-    return finger.springs(extension).stiffness + _with_wall(finger, stiffness)
+class TurnedUnit(NamedTuple):
+    """Extension y (mm), the response by it as of `rigid_unit`, and dy/dm, mm/rad."""
+
+    extension: Array
+    response: Response
+    rate: Array
 
 
-def _with_wall(finger: Finger, stiffness: Array) -> Array:
-    """The hinge's stiffness in series with the wall's, N/mm."""
-    if not finger.has_walls:
-        return stiffness
-    return np.asarray(stiffness / (1.0 + finger.wall_compliance * stiffness))
+def turned_unit(finger: Finger, turn: Array) -> TurnedUnit:
+    """A unit by the turn m (rad) of either corner.
+
+    y = 2H sin m + c_w h' is explicit in m and rises with it, where m by y takes a search.
+    """
+    lever = 2.0 * finger.segment_height
+    opening = lever * np.sin(turn)
+    turn, pull, stiffness = _hinge(finger, opening)
+    extension = opening + finger.wall_compliance * pull
+    yields = 1.0 + finger.wall_compliance * stiffness
+    energy, *derivatives = _with_hinge(finger, extension, turn, pull, stiffness / yields)
+    response = Response(energy + 0.5 * finger.wall_compliance * pull * pull, *derivatives)
+    return TurnedUnit(extension, response, lever * np.cos(turn) * yields)
 
 
-def opening_of(finger: Finger, extension: Array) -> Array:
-    """The opening x of a unit with rigid bars whose dome's spring extends by y, mm.
+def _with_hinge(
+    finger: Finger, extension: Array, turn: Array, pull: Array, stiffness: Array
+) -> Response:
+    spring = finger.springs(extension)
+    energy = spring.energy + laws.quadratic(2.0 * turn, finger.hinge_stiffness).energy
+    return Response(energy, spring.force + pull, spring.stiffness + stiffness)
+
+
+def turn_of(finger: Finger, extension: Array) -> Array:
+    """The turn m (rad) of either corner of a unit with rigid bars whose dome extends by y (mm).
 
     Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. With
     x = 2H sin m, and times cos m, nothing in it grows without bound where bars end the opening:
     (y − 2H sin m) cos m = 2 m c_w k_θ/H, whose left side less the right falls from m = 0 to its
     root. Newton's method, kept between what is known to be below the root and above it.
     """
-    if not finger.has_walls:
-        return extension
     lever = 2.0 * finger.segment_height
     softness = 2.0 * finger.wall_compliance * finger.hinge_stiffness / finger.segment_height
     reached, lever, softness = np.broadcast_arrays(np.abs(extension), lever, softness)
@@ -72,13 +86,13 @@ def opening_of(finger: Finger, extension: Array) -> Array:
         high = np.where(excess <= 0.0, turn, high)
         with np.errstate(divide="ignore", invalid="ignore"):
             further = turn - excess / slope
-        inside = (further > low) & (further < high)
-        further = np.where(inside, further, 0.5 * (low + high))
-        is_running &= np.abs(further - turn) > 1e-16 * turn  # what has arrived stays
+        is_running &= ~(np.abs(further - turn) <= 1e-15 * turn)  # what has arrived stays
         if not is_running.any():
             break
+        inside = (further > low) & (further < high)
+        further = np.where(inside, further, 0.5 * (low + high))
         turn = np.where(is_running, further, turn)
-    return np.asarray(np.copysign(lever * np.sin(turn), extension))
+    return np.asarray(np.copysign(turn, extension))
 
 
 def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
@@ -92,8 +106,8 @@ def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:
 
 
 def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
-    """Every unit of every design as a design of its own, and how many units and designs."""
+    """Every unit of every design as an unloaded design of its own; number of units, of designs."""
     arrays = {**finger.arrays(), "branch": finger.branch}
     units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
     flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
-    return finger.with_units([0]).changed(**flat), (units, designs)
+    return finger.with_units([0]).changed(**flat, end_moment=np.zeros((1, 1))), (units, designs)

@@ -1,6 +1,7 @@
 """Walls that give way: against extended precision and SciPy, in their limits; their cost."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +9,11 @@ from scipy.optimize import brentq, minimize
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.mechanics.laws import PUBLISHED, PushOnly, bistable
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, bistable
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.certify import Settled, Status
-from dpgcli.states.rigid_unit import opening_of
+from dpgcli.states.rigid_unit import turn_of
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -157,7 +158,7 @@ def test_the_opening_behind_a_wall_is_the_root(stroke: float, compliance: float)
     finger = uniform_finger(1, **{**STUDY, "hinge_stiffness": 300.0, "stroke": stroke})
     finger = finger.changed(wall_compliance=np.array([[compliance]]))
     extension = np.array([[-0.5], [1e-3], [0.7], [1.3]]) * stroke
-    opening = opening_of(finger, extension.reshape(1, -1)).ravel()
+    opening = 21.5 * np.sin(turn_of(finger, extension.reshape(1, -1)).ravel())
     for y, x in zip(extension.ravel(), opening, strict=True):
 
         def excess(m: float, y: float = float(abs(y))) -> float:
@@ -173,3 +174,24 @@ def test_the_barrier_of_a_dome_that_opens_beyond_its_bars() -> None:
         1, **{**STUDY, "stroke": 24.0, "force_linearity": 0.02, "hinge_stiffness": 300.0}
     ).changed(wall_compliance=np.array([[3.0]]))
     assert barriers(finger, inverted_wells(finger))[0] == pytest.approx(118.364, abs=1e-3)
+
+
+@pytest.mark.parametrize("law", [PUBLISHED, PushOnly(PUBLISHED)], ids=lambda law: law.description)
+def test_a_batch_of_soft_and_rigid_walls_has_the_wells_of_each_alone(law: DomeLaw) -> None:
+    """Next to folds, too, where places of the scan are moved: hinges up to the loss of a well."""
+    hinges, walls = np.meshgrid(np.linspace(20.0, 120.0, 41), [0.0, 0.05, 2.0])
+    finger = replace(
+        uniform_finger(1, **STUDY).changed(
+            hinge_stiffness=hinges.reshape(1, -1), wall_compliance=walls.reshape(1, -1)
+        ),
+        law=law,
+    )
+    together = inverted_wells(finger)
+    assert 0 < together.exists.sum() < together.exists.size
+    for lane in range(hinges.size):
+        alone = inverted_wells(finger.take_lanes(np.array([lane])))
+        exists = bool(alone.exists[0, 0])
+        assert exists == together.exists[0, lane]
+        if exists:
+            assert together.extension[0, lane] == pytest.approx(alone.extension[0, 0], abs=1e-9)
+            assert together.barrier[0, lane] == pytest.approx(alone.barrier[0, 0], abs=1e-9)
