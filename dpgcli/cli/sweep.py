@@ -108,20 +108,18 @@ def sweep(
     """Evaluate every design of a space, resumably."""
     folder = Path(output)
     _start_fork_server_early(executor, jobs, folder)
-    from dpgcli.api.sweep import Place, rules_of, shard_of, study_of
+    from dpgcli.api.sweep import shard_of, study_of
     from dpgcli.files.output import sole_use
     from dpgcli.studies.run import run
     from dpgcli.studies.sweep import drop_half_written
 
     part = shard_of(shard)
-    limit = None if wait is None else seconds("--wait", wait)
-    place = Place(executor.value, jobs, scheduler, limit)
+    place = _place(executor, jobs, scheduler, wait)
     _check_part(part, require, summary_file, depfile)
     target = None if target_error is None else millimeters("--target-error", target_error)
     study = study_of(spec, folder, settings or (), tolerance, target)
     _check_names(study, depfile, summary_file)
-    rules, doubts = rules_of(study, require or (), strict=strict)
-    say_warnings(doubts)
+    rules = _rules(study, require or (), strict=strict)
     described = None if depfile is None else _described(study, output, depfile)
 
     work = partial(_computed, study, place, part, quiet)
@@ -147,6 +145,24 @@ def sweep(
     check_failed(n_failed, max_failed)
     if code:
         raise typer.Exit(code)
+
+
+def _place(
+    executor: ExecutorName, jobs: int | None, scheduler: str | None, wait: str | None
+) -> "Place":
+    from dpgcli.api.sweep import Place
+
+    limit = None if wait is None else seconds("--wait", wait)
+    return Place(executor.value, jobs, scheduler, limit)
+
+
+def _rules(study: "Study", require: Sequence[str], *, strict: bool) -> "list[Expression]":
+    """Requirements over columns of designs, checked before any work; what is doubted is said."""
+    from dpgcli.api.sweep import rules_of
+
+    rules, doubts = rules_of(study, require, strict=strict)
+    say_warnings(doubts)
+    return rules
 
 
 def _check_part(

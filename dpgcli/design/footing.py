@@ -115,10 +115,15 @@ class Case:
 
     @property
     def has_fitted_walls(self) -> bool:
-        """Whether it is a finger such as was compared: pushing domes of a curve, fitted walls."""
+        """Whether it is a finger such as was compared: pushing domes of a curve, fitted walls.
+
+        And the geometric segment height, or one that is fitted too.
+        """
         is_pushed = not self.pulls and self.domes.calibration is not None
         is_fitted = self.has_walls and self.footings[WALL_COMPLIANCE].basis is Basis.FITTED
-        return is_pushed and is_fitted and self.has_geometric_height
+        height = self.footings[SEGMENT_HEIGHT.key]
+        is_compared = self.has_geometric_height or height.basis is Basis.FITTED
+        return is_pushed and is_fitted and is_compared
 
     def is_study_s(self, key: str) -> bool:
         """Whether the first value of a key is that of the study's finger."""

@@ -17,6 +17,7 @@ CURLED = "shapes curl 13–24 % too far against finite elements"
 CALIBRATE = "calibrate: dpg help calibration"
 WITH_HEIGHT = "shapes within 1–8 % of the deflection against finite elements"
 WITH_WALLS = "shapes within 1–6 % of the deflection against finite elements"
+WITH_BOTH = "shapes within 3–10 % of the deflection against finite elements"  # and a fitted height
 THE_REST = (
     "pushes within about 10 %, inverted units' stiffness within 30 %, with walls fitted to them"
 )
@@ -42,7 +43,8 @@ def _of_walls(case: Case) -> ModelError:
     if case.pulls:
         return UNKNOWN
     if case.has_fitted_walls:
-        return ModelError(f"{WITH_WALLS}{case.footings[WALL_COMPLIANCE].elsewhere}; {THE_REST}")
+        shapes = WITH_WALLS if case.has_geometric_height else WITH_BOTH
+        return ModelError(f"{shapes}{case.footings[WALL_COMPLIANCE].elsewhere}; {THE_REST}")
     return ModelError(OTHER_WALLS)
 
 

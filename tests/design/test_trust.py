@@ -441,6 +441,19 @@ def test_a_calibration_s_own_errors_come_first() -> None:
     )
 
 
+def test_walls_beside_a_height_that_is_fitted_too() -> None:
+    both = {"segment_height_mm": Fitted(10.0), **WALLS.values}
+    found = trusts(with_files(PUSHED, replace(WALLS, values=both)))
+    assert found[Output.SHAPES].known_error == (
+        "shapes within 3–10 % of the deflection against finite elements"
+    )
+    assert found[Output.INVERTED].known_error == "within 30 % of finite elements"
+    given = replace(GIVEN, calibrations=(WALLS, dome()), law="push_only")
+    lattice = {k: v for k, v in OWN.items() if k != "force_linearity"}
+    given = replace(given, finger=GivenValues(lattice=arrays(lattice)))
+    assert trusts(given)[Output.SHAPES].known_error == "unknown", "beside one that is given"
+
+
 def test_the_last_word_is_the_first_row_s() -> None:
     for design, _ in CASES.values():
         error = resolve(design).model_error.text
