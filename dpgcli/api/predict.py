@@ -57,12 +57,12 @@ class PredictResult:
     @property
     def trusts(self) -> tuple[Trust, ...]:
         """What each kind of output rests on; none of values without a spec."""
-        return self.given.scene.trusts
+        return self.plan.trusts
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings of the calibrations in use."""
-        return self.given.scene.warnings
+        return self.plan.warnings
 
     @cached_property
     def table(self) -> Table:

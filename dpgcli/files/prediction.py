@@ -94,7 +94,7 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
             [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),
         "dpg.model_error": plan.scene.model_error.text,
-        **trust_metadata(plan.scene.trusts, plan.scene.warnings),
+        **trust_metadata(plan.trusts, plan.warnings),
         **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
         "dpg.versions": versions(),
     }

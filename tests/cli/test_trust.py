@@ -386,7 +386,10 @@ def test_from_python(domes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     states = dpg.predict("three_unit.yaml", settings=settings)
     assert states.warnings == ("gap.yaml: nothing is sampled between",)
     assert [trust.output for trust in states.trusts] == [*Output]
-    assert dpg.explain("sweep.yaml", settings=settings).warnings == states.warnings
+    for name in ("sweep.yaml", "three_unit.yaml"):
+        plan = dpg.explain(name, settings=settings)
+        assert plan.warnings == states.warnings
+        assert [trust.basis for trust in plan.trusts] == [t.basis for t in states.trusts]
 
 
 def test_values_without_a_spec_rest_on_nothing_that_is_known() -> None:
