@@ -19,11 +19,13 @@ WITH_HEIGHT = "shapes within 1–8 % of the deflection against finite elements"
 WITH_WALLS = "shapes within 1–6 % of the deflection against finite elements"
 WITH_BOTH = "shapes within 3–10 % of the deflection against finite elements"  # and a fitted height
 THE_REST = (
-    "pushes within about 10 %, inverted units' stiffness within 30 %, with walls fitted to them"
+    "pushes within about 10 %, inverted units' stiffness within 30 % (60 % if walls are fitted to "
+    "shapes)"
 )
 OTHER_WALLS = (
     "unknown for these walls; fitted ones bring shapes within 1–6 % of the deflection, pushes "
-    "within about 10 % and inverted units' stiffness within 30 % of finite elements"
+    "within about 10 % and inverted units' stiffness within 30 % of finite elements (60 % if they "
+    "are fitted to shapes)"
 )
 
 

@@ -108,6 +108,7 @@ CURLED = "shapes curl 13–24 % too far against finite elements"
 SHALLOW = "a twentieth of finite elements' (3.2 mJ in an inverted dome, not 38–79)"
 TOO_STIFF = "times too stiff against finite elements"
 OF_FIT = "bistable stiffness ± 2 % (its fit)"
+WALLED = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
 PUSHES = "pushes 13–43 % off finite elements; loads meet units that are too stiff"
 CASES: dict[str, tuple[Design, str]] = {
     "published": (
@@ -221,7 +222,7 @@ CASES: dict[str, tuple[Design, str]] = {
         energies and barriers: fitted, {OF_FIT}
         barriers: fitted, {OF_FIT}
         ground stiffness: fitted, within about 20 % of finite elements
-        inverted stiffness: fitted, within 30 % of finite elements
+        inverted stiffness: fitted, {WALLED}
         stiffness along the bars: assumed!, unknown
         pressures: fitted, unknown
         forces: fitted, pushes within about 10 % of finite elements
@@ -306,7 +307,8 @@ def test_published_springs_of_a_curve_are_still_the_published_ones() -> None:
 
 @pytest.mark.parametrize("law", ["push_only", "tabulated"])
 @pytest.mark.parametrize(
-    ("gap", "is_met"), [((2.0, 8.0), True), ((9.0, 9.5), True), ((10.5, 13.0), False)]
+    ("gap", "is_met"),
+    [((2.0, 8.0), True), ((9.0, 9.5), True), ((9.0, 10.5), True), ((10.5, 13.0), False)],
 )
 def test_only_gaps_before_the_well_matter(law: str, gap: tuple[float, float], is_met: bool) -> None:
     found = trusts(replace(PUSHED, calibrations=(dome(gap), PUBLISHED), law=law))
@@ -447,7 +449,7 @@ def test_walls_beside_a_height_that_is_fitted_too() -> None:
     assert found[Output.SHAPES].known_error == (
         "shapes within 3–10 % of the deflection against finite elements"
     )
-    assert found[Output.INVERTED].known_error == "within 30 % of finite elements"
+    assert found[Output.INVERTED].known_error == WALLED
     given = replace(GIVEN, calibrations=(WALLS, dome()), law="push_only")
     lattice = {k: v for k, v in OWN.items() if k != "force_linearity"}
     given = replace(given, finger=GivenValues(lattice=arrays(lattice)))
