@@ -42,7 +42,8 @@ def process_pool(n_workers: int) -> Executor:
 
     method = "forkserver" if _has_fork_server() else "spawn"
     start_fork_server()
-    with _refusals_said(", for semaphores (/dev/shm on Linux)"):
+    # a signal between making a semaphore and noting it would leave it behind
+    with _held_signals(), _refusals_said(", for semaphores (/dev/shm on Linux)"):
         return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
 
 
