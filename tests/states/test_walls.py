@@ -37,7 +37,15 @@ def settled(finger: Finger, patterns: Flags, formulate: Formulate = chain_potent
 
 
 @pytest.mark.parametrize(("formulate", "bars"), FORMULATIONS)
-@pytest.mark.parametrize("compliance", [*COMPLIANCES, (0.0, 0.7)], ids=str)
+@pytest.mark.parametrize(
+    "compliance",
+    [
+        (0.0, 0.7),
+        *COMPLIANCES[::2],
+        *(pytest.param(c, marks=pytest.mark.slow) for c in COMPLIANCES[1::2]),
+    ],
+    ids=str,
+)
 def test_states_are_those_of_extended_precision(
     formulate: Formulate,
     bars: float,
