@@ -66,4 +66,5 @@ EXAMPLES = {
         "dpg fe dome finger.yaml --output deck --mesh coarse --run",
     ),
     "fe hinge": ("dpg fe hinge finger.yaml --output deck --mesh coarse --run",),
+    "fe unit": ("dpg fe unit finger.yaml --output deck --mesh coarse --run",),
 }

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dpgcli.studies.finite_elements import Limits
 
 app = typer.Typer(
-    help="Finite elements of a dome or a hinge: decks for CalculiX, and the curves it finds.",
+    help="Finite elements of a dome, hinge or unit: decks for CalculiX, and the curves it finds.",
     no_args_is_help=True,
 )
 
@@ -32,6 +32,7 @@ HINGE_KEYS = (
     "limiting_layer_thickness_mm",
     "elastic_modulus_MPa",
 )
+UNIT_KEYS = ("dome_height_mm", *HINGE_KEYS)
 
 
 class Mesh(StrEnum):
@@ -119,6 +120,43 @@ def hinge(
     _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
 
 
+def unit(
+    spec: SpecPath,
+    out: Out,
+    settings: Settings = None,
+    poisson: Poisson = 0.48,
+    push_stiffness: Annotated[
+        float, typer.Option("--push-stiffness", help="Spring in the dome's place, N/mm")
+    ] = 50.0,
+    moment: Annotated[
+        float, typer.Option("--moment", help="Largest end couple, N mm; half of it and both signs")
+    ] = 5.0,
+    mesh: MeshOption = Mesh.MEDIUM,
+    run: RunOption = False,
+    time_limit: TimeLimit = 3600.0,
+    threads: Threads = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Push the gap between two chambers open and bend it by end couples: hinge and walls."""
+    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.models import unit_model
+    from dpgcli.calibration.fe.pushed import Push
+    from dpgcli.design.geometry import stroke
+    from dpgcli.errors import UsageError
+
+    _check_positive({"--moment": moment, "--push-stiffness": push_stiffness})
+    _check_poisson(poisson)
+    height, length, width, lid, gap, layer, modulus = _dimensions(spec, settings, UNIT_KEYS, quiet)
+    if (push := stroke(height, gap)) <= 0.0:
+        raise UsageError(
+            f"the dome does not reach its neighbor: dome_height_mm {height:g} is not above "
+            f"unit_separation_mm {gap:g}"
+        )
+    chambers = Chambers(length, width, lid, gap, layer, modulus, poisson)
+    model = unit_model(chambers, Push(push_stiffness, push, height), mesh.value, moment)
+    _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
 def _check_positive(lengths: dict[str, float | None]) -> None:
     """Options that are neither zero nor negative, nor no number, nor beyond reason."""
     from dpgcli.design.dimensions import LARGEST, SMALLEST
@@ -193,5 +231,5 @@ def _as_before(name: str) -> str:
     return "output" if name == "out" else name
 
 
-for _function in (dome, hinge):
+for _function in (dome, hinge, unit):
     add_command(app, _function, "fe", context_settings={"token_normalize_func": _as_before})
