@@ -6,7 +6,6 @@ curves in FOLDER, goes on where it was interrupted, and writes both tables besid
 
 import itertools
 import sys
-import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +31,7 @@ class Geometry(NamedTuple):
     dome_height_mm: float = 6.5
     dome_thickness_mm: float = 0.75
     chamber_length_mm: float = 9.0
-    elastic_modulus_MPa: float = 26.0
+    elastic_modulus_MPa: float = 26.0  # noqa: N815
 
 
 FULL = [
@@ -83,9 +82,7 @@ def curve_of(at: Geometry, folder: Path) -> UnitCurve:
     studies.write_deck(model, folder)
     path = studies.curve_path(model, folder)
     if not path.exists():
-        start = time.monotonic()
         print(at, studies.run(model, folder, studies.Limits(3600.0)), flush=True)
-        (folder / "seconds").write_text(f"{time.monotonic() - start:.3g}\n")
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     cells = [line.split(",") for line in lines[1:]]
     unit, *numbers = zip(*cells, strict=True)
@@ -140,9 +137,10 @@ def write(name: str, rows: list[dict[str, float]]) -> None:
 
 COMMENTS = f"""
 # One gap between two chambers by finite elements, over its dimensions: dpg fe unit --mesh medium,
-# CalculiX 2.20, made by unit_grid.py. nu = 0.48, St Venant-Kirchhoff. Inverted: a push of the stroke
-# through a spring of {PUSH:g} N/mm on the dome's axis. Simulations, not measurements.
-# Moments are those of forces that keep their direction: they wane as the cosine of chamber2_angle_rad.
+# CalculiX 2.20, made by unit_grid.py. nu = 0.48, St Venant-Kirchhoff. Inverted: a push of the
+# stroke through a spring of {PUSH:g} N/mm on the dome's axis. Simulations, not measurements.
+# Moments are those of forces that keep their direction: they wane as the cosine of
+# chamber2_angle_rad.
 """
 
 

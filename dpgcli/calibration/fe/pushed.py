@@ -14,9 +14,11 @@ from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.hinge import Chambers, is_solid, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS
 
-PATCH_HEIGHT, PATCH_DEPTH = 1 / 6, 1 / 8
-"""Half height and half depth of the patch over the chamber's width: its corners lie 4.17 mm from
-the axis of a chamber 20 mm wide."""
+PATCH_RADIUS = 0.21
+"""Radius of the patch over the chamber's width: 4.2 mm of a chamber 20 mm wide."""
+
+LINE_HEIGHT, LINE_DEPTH = 1 / 6, 1 / 8
+"""Lines of the mesh about the patch, from the axis, over the chamber's width."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,9 @@ def _lines(chambers: Chambers, cells: Cells, n_chambers: int) -> tuple[Array, Ar
     starts = chambers.pitch * np.arange(n_chambers)
     along = starts[:, None] + np.array([0.0, wall, wall + chambers.length, outer])
     counts = ((1, cells.chamber, 1, cells.gap) * n_chambers)[:-1]
-    above, patch = width / 2 - PATCH_HEIGHT * width, PATCH_HEIGHT * width
-    heights = np.cumsum([0.0, chambers.layer_thickness, above, patch, patch, above, wall])
-    depths = np.cumsum([0.0, PATCH_DEPTH * width, width / 2 - PATCH_DEPTH * width, wall])
+    near, far = LINE_HEIGHT * width, (0.5 - LINE_HEIGHT) * width
+    heights = np.cumsum([0.0, chambers.layer_thickness, far, near, near, far, wall])
+    depths = np.cumsum([0.0, LINE_DEPTH * width, (0.5 - LINE_DEPTH) * width, wall])
     return (
         grid_lines(along.ravel(), counts),
         grid_lines(heights, (1, *cells.up, 1)),
@@ -74,17 +76,19 @@ def lid_nodes(chambers: Chambers, mesh: Bricks, gap: int) -> Indices:
 
     So far the dome's annulus reaches, out to the walls.
     """
-    is_lid = on_plane(mesh, 0, gap * chambers.pitch + chambers.outer_length)
-    up, depth = _from_axis(chambers, mesh)
-    return np.flatnonzero(is_lid & (np.hypot(up, depth) < (0.5 + 1e-9) * chambers.width))
+    return _disc(chambers, mesh, gap * chambers.pitch + chambers.outer_length, 0.5)
 
 
 def patch_nodes(chambers: Chambers, mesh: Bricks, gap: int) -> Indices:
     """Nodes of the patch of the wall behind a gap, counted from 0."""
-    is_wall = on_plane(mesh, 0, (gap + 1) * chambers.pitch)
-    up, depth = _from_axis(chambers, mesh)
-    is_high = np.abs(up) < (PATCH_HEIGHT + 1e-9) * chambers.width
-    return np.flatnonzero(is_wall & is_high & (depth < (PATCH_DEPTH + 1e-9) * chambers.width))
+    return _disc(chambers, mesh, (gap + 1) * chambers.pitch, PATCH_RADIUS)
+
+
+def _disc(chambers: Chambers, mesh: Bricks, place: float, radius: float) -> Indices:
+    """Nodes on a plane across the dome's axis, about it; the radius over the chamber's width."""
+    axis = chambers.layer_thickness / 2 + lever(chambers)
+    away = np.hypot(mesh.nodes[:, 1] - axis, mesh.nodes[:, 2])
+    return np.flatnonzero(on_plane(mesh, 0, place) & (away < (radius + 1e-9) * chambers.width))
 
 
 def ends(chambers: Chambers, push: Push, gap: int) -> Array:
@@ -132,11 +136,6 @@ def clamped(mesh: Bricks) -> Flags:
 def loaded(mesh: Bricks) -> Flags:
     """Flags of the nodes of the last chamber's end face."""
     return on_plane(mesh, 0, mesh.nodes[:, 0].max())
-
-
-def _from_axis(chambers: Chambers, mesh: Bricks) -> tuple[Array, Array]:
-    axis = chambers.layer_thickness / 2 + lever(chambers)
-    return mesh.nodes[:, 1] - axis, mesh.nodes[:, 2]
 
 
 def _is_at(mesh: Bricks, point: tuple[float, float, float]) -> Flags:
