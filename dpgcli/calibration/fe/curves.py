@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.decks import Pulse
 from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
@@ -49,7 +49,7 @@ class UnitCurve(NamedTuple):
     push_N: Array
 
 
-Curve = DomeCurve | HingeCurve | UnitCurve
+Curve = DomeCurve | HingeCurve | UnitCurve | Columns
 
 
 def dome_curve(
@@ -180,10 +180,11 @@ def hinge_finding(curve: HingeCurve) -> str:
 
 def csv_text(comments: Sequence[str], curve: Curve) -> str:
     """Comment lines, a line of names, and a line for each row with ten digits."""
-    rows = zip(*(column.tolist() for column in curve), strict=True)
+    columns = curve if isinstance(curve, dict) else curve._asdict()
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     lines = [
         *(f"# {comment}" for comment in comments),
-        ",".join(curve._fields),
+        ",".join(columns),
         *(",".join(map(_cell, row)) for row in rows),
     ]
     return "\n".join(lines) + "\n"

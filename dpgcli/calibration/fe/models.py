@@ -1,9 +1,11 @@
 """The models: their decks, and the curves that their runs give."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.fe.cards import UNITS
@@ -26,6 +28,12 @@ from dpgcli.calibration.fe.decks import (
     pulse_words,
 )
 from dpgcli.calibration.fe.dome import DomeShape, dome_mesh
+from dpgcli.calibration.fe.finger import (
+    finger_finding,
+    finger_states,
+    frame_words,
+    in_gray_order,
+)
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
 from dpgcli.calibration.fe.pushed import Cells, Push, lever, pushed_bricks
 from dpgcli.calibration.fe.pushed_deck import Step, pushed_deck, pushed_words
@@ -138,13 +146,42 @@ def unit_model(chambers: Chambers, push: Push, fineness: str, largest_moment: fl
     )
 
     def outcome(time: Array, moved: Array) -> RunOutcome:
-        if len(time) != len(steps):
-            raise SolverError(f"ccx wrote {len(time)} states of {len(steps)}")
+        _check_states(len(time), len(steps))
         curve = unit_curve(chambers, mesh, push, steps, moved)
         return RunOutcome(curve, unit_finding(unit_stiffness(curve, lever(chambers))))
 
     deck = pushed_deck(chambers, mesh, push, steps, ("dpg fe unit", *words))
     return Model("unit", deck, words, len(mesh.nodes), float(len(steps)), outcome)
+
+
+def finger_model(
+    chambers: Chambers, push: Push, fineness: str, patterns: Sequence[tuple[bool, ...]]
+) -> Model:
+    """Chambers on their layer in states, each a pattern of gaps that are pushed open.
+
+    At least one gap of one pattern is. One state follows the other by few changes.
+    """
+    n_chambers = len(patterns[0]) + 1
+    mesh = pushed_bricks(chambers, PUSHED_CELLS[fineness], n_chambers)
+    steps = [Step(pattern) for pattern in in_gray_order(patterns)]
+    at_rest = [step for step in steps if not any(step.pattern)]
+    pushed = [step for step in steps if any(step.pattern)]
+    size = _size(fineness, len(mesh.elements), "C3D20R", len(mesh.nodes))
+    words = (*pushed_words(chambers, push, n_chambers), *frame_words(chambers), size, UNITS)
+
+    def outcome(time: Array, moved: Array) -> RunOutcome:
+        _check_states(len(time), len(pushed))
+        moved = np.concatenate([np.zeros((len(at_rest), *moved.shape[1:])), moved])
+        states = finger_states(chambers, mesh, push, [*at_rest, *pushed], moved)
+        return RunOutcome(states, finger_finding(states))
+
+    deck = pushed_deck(chambers, mesh, push, pushed, ("dpg fe finger", *words))
+    return Model("finger", deck, words, len(mesh.nodes), float(len(pushed)), outcome)
+
+
+def _check_states(found: int, expected: int) -> None:
+    if found != expected:
+        raise SolverError(f"ccx wrote {found} states of {expected}")
 
 
 def _size(fineness: str, n_elements: int, kind: str, n_nodes: int) -> str:

@@ -1,8 +1,8 @@
 """Chambers that pushes on their domes' axes open: mesh, patches, openings and angles.
 
-What stands for a dome is one spring between its apex, which moves with the lid that bears the
-dome, and the mean position of a patch of the neighbor's wall, so that the push can turn freely.
-At rest the apex lies the dome's height behind the lid; the spring is a stroke too long.
+What stands for a dome is one spring between its apex and the mean position of a patch of the
+neighbor's wall, so that the push can turn freely. The apex lies the dome's height behind the lid
+that bears the dome, as at rest, and shifts and turns with the lid; the spring is a stroke too long.
 """
 
 from dataclasses import dataclass
@@ -71,44 +71,56 @@ def lever(chambers: Chambers) -> float:
     return (chambers.width + chambers.layer_thickness) / 2
 
 
-def lid_nodes(chambers: Chambers, mesh: Bricks, gap: int) -> Indices:
-    """Nodes of the lid before a gap, counted from 0, that move the dome: within W_c/2 of its axis.
+@dataclass(frozen=True)
+class End:
+    """An end of a spring: a point that shifts by the mean of nodes and turns with them.
+
+    Its displacement is (sum s u_x - r u_y, sum s u_y + r u_x), linear, and that of a body where
+    the nodes move as one, however far they turn. `place` (3,) in mm at rest; `shifts` and `turns`
+    are s and r of the nodes.
+    """
+
+    place: Array
+    nodes: Indices
+    shifts: Array
+    turns: Array
+
+    def moved(self, displacements: Array) -> Array:
+        """The place (..., 2) in mm at displacements (..., n, 3).
+
+        The other half of the model moves as this one in the plane of symmetry.
+        """
+        x, y = displacements[..., self.nodes, 0], displacements[..., self.nodes, 1]
+        across = self.place[0] + x @ self.shifts - y @ self.turns
+        up = self.place[1] + y @ self.shifts + x @ self.turns
+        return np.stack([across, up], axis=-1)
+
+
+def apex(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> End:
+    """The apex of the dome before a gap, counted from 0; nodes of the lid within W_c/2 of its axis.
 
     So far the dome's annulus reaches, out to the walls.
     """
-    return _disc(chambers, mesh, gap * chambers.pitch + chambers.outer_length, 0.5)
-
-
-def patch_nodes(chambers: Chambers, mesh: Bricks, gap: int) -> Indices:
-    """Nodes of the patch of the wall behind a gap, counted from 0."""
-    return _disc(chambers, mesh, (gap + 1) * chambers.pitch, PATCH_RADIUS)
-
-
-def _disc(chambers: Chambers, mesh: Bricks, place: float, radius: float) -> Indices:
-    """Nodes on a plane across the dome's axis, about it; the radius over the chamber's width."""
-    axis = chambers.layer_thickness / 2 + lever(chambers)
-    away = np.hypot(mesh.nodes[:, 1] - axis, mesh.nodes[:, 2])
-    return np.flatnonzero(on_plane(mesh, 0, place) & (away < (radius + 1e-9) * chambers.width))
-
-
-def ends(chambers: Chambers, push: Push, gap: int) -> Array:
-    """Places at rest (2, 3) in mm of apex and patch of a gap, counted from 0."""
     lid = gap * chambers.pitch + chambers.outer_length
-    axis = chambers.layer_thickness / 2 + lever(chambers)
-    wall = lid + chambers.separation
-    return np.array([[lid - push.dome_height, axis, 0.0], [wall, axis, 0.0]])
+    nodes = _disc(chambers, mesh, lid, 0.5)
+    up = mesh.nodes[nodes, 1] - _axis(chambers)
+    place = np.array([lid - push.dome_height, _axis(chambers), 0.0])
+    return End(place, nodes, _equal(nodes), push.dome_height * up / (up @ up))
+
+
+def patch(chambers: Chambers, mesh: Bricks, gap: int) -> End:
+    """The middle of the patch of the wall behind a gap, counted from 0."""
+    wall = (gap + 1) * chambers.pitch
+    nodes = _disc(chambers, mesh, wall, PATCH_RADIUS)
+    place = np.array([wall, _axis(chambers), 0.0])
+    return End(place, nodes, _equal(nodes), np.zeros(len(nodes)))
 
 
 def opening(chambers: Chambers, mesh: Bricks, push: Push, displacements: Array, gap: int) -> Array:
     """How much farther apart in mm apex and patch are than at rest; displacements (..., n, 3)."""
-    nodes = (lid_nodes(chambers, mesh, gap), patch_nodes(chambers, mesh, gap))
-    rest = ends(chambers, push, gap)
-    # z is a plane of symmetry: the other half moves the other way
-    apex, patch = (
-        rest[end, :2] + displacements[..., nodes[end], :2].mean(axis=-2) for end in (0, 1)
-    )
-    length = np.linalg.norm(patch - apex, axis=-1)
-    return np.asarray(length - np.linalg.norm(rest[1] - rest[0]))
+    start, end = apex(chambers, mesh, push, gap), patch(chambers, mesh, gap)
+    length = np.linalg.norm(end.moved(displacements) - start.moved(displacements), axis=-1)
+    return np.asarray(length - (chambers.separation + push.dome_height))
 
 
 def floor_angle(chambers: Chambers, mesh: Bricks, displacements: Array, number: int) -> Array:
@@ -136,6 +148,21 @@ def clamped(mesh: Bricks) -> Flags:
 def loaded(mesh: Bricks) -> Flags:
     """Flags of the nodes of the last chamber's end face."""
     return on_plane(mesh, 0, mesh.nodes[:, 0].max())
+
+
+def _axis(chambers: Chambers) -> float:
+    """Height in mm of the domes' axis over the lower face of the layer."""
+    return chambers.layer_thickness / 2 + lever(chambers)
+
+
+def _disc(chambers: Chambers, mesh: Bricks, place: float, radius: float) -> Indices:
+    """Nodes on a plane across the domes' axis, about it; the radius over the chamber's width."""
+    away = np.hypot(mesh.nodes[:, 1] - _axis(chambers), mesh.nodes[:, 2])
+    return np.flatnonzero(on_plane(mesh, 0, place) & (away < (radius + 1e-9) * chambers.width))
+
+
+def _equal(nodes: Indices) -> Array:
+    return np.full(len(nodes), 1 / len(nodes))
 
 
 def _is_at(mesh: Bricks, point: tuple[float, float, float]) -> Flags:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array
 from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.cards import (
     END_OF_STEP,
@@ -17,7 +17,7 @@ from dpgcli.calibration.fe.cards import (
     set_lines,
 )
 from dpgcli.calibration.fe.hinge import Chambers, end_couple, on_plane
-from dpgcli.calibration.fe.pushed import Push, clamped, ends, lid_nodes, loaded, patch_nodes
+from dpgcli.calibration.fe.pushed import End, Push, apex, clamped, loaded, patch
 from dpgcli.design.geometry import WALL_THICKNESS
 
 OFF, SLACK, ON = 0.0, 1.0, 2.0
@@ -44,7 +44,8 @@ def pushed_deck(
     `words` become its comments.
     """
     gaps = range(len(steps[0].pattern))
-    forces = end_couple(mesh, loaded(mesh))
+    is_bent = any(step.moment for step in steps)
+    forces = end_couple(mesh, loaded(mesh)) if is_bent else np.zeros(len(mesh.nodes))
     lines = [
         *(f"** {line}" for line in words),
         *mesh_lines(mesh.nodes, mesh.elements, "C3D20R"),
@@ -78,34 +79,42 @@ def pushed_words(chambers: Chambers, push: Push, n_chambers: int) -> tuple[str, 
         f"St Venant-Kirchhoff, E = {chambers.elastic_modulus:g} MPa, nu = {chambers.poisson:g}; "
         "reduced integration, large displacements.",
         f"An inverted dome is a spring of {push.stiffness:g} N/mm and {length:g} mm, "
-        f"{push.stroke:g} mm too long, on the dome's axis: from its apex, which",
-        "moves with the lid, to the mean position of a patch of the neighbor's wall.",
+        f"{push.stroke:g} mm too long, on the dome's axis: from its apex,",
+        f"{push.dome_height:g} mm behind the lid and rigid with it, to the middle of a patch "
+        "of the neighbor's wall.",
         "The first chamber's face at x = 0 is clamped.",
     )
 
 
 def _spring_lines(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> Iterator[str]:
-    """Apex, patch and the spring between them, whose ends are means of nodes."""
+    """Apex, patch and the spring between them."""
     first = len(mesh.nodes) + 1 + 2 * gap
+    ends = {first: apex(chambers, mesh, push, gap), first + 1: patch(chambers, mesh, gap)}
     yield "*NODE, NSET=ENDS"
-    for node, place in enumerate(ends(chambers, push, gap), start=first):
-        yield ", ".join([str(node), *map(digits, place)])
+    for node, end in ends.items():
+        yield ", ".join([str(node), *map(digits, end.place)])
     yield "*ELEMENT, TYPE=SPRINGA, ELSET=PUSHES"
     yield f"{len(mesh.elements) + 1 + gap}, {first}, {first + 1}"
     yield f"*NSET, NSET=GAP{gap + 1}"
     yield f"{first}, {first + 1}"
-    yield from _mean_lines(first, lid_nodes(chambers, mesh, gap))
-    yield from _mean_lines(first + 1, patch_nodes(chambers, mesh, gap))
+    for node, end in ends.items():
+        yield from _equation_lines(node, 1, end, -end.turns)
+        yield from _equation_lines(node, 2, end, end.turns)
 
 
-def _mean_lines(node: int, nodes: Indices) -> Iterator[str]:
-    """A node whose displacement in the plane is the mean of others'."""
-    for axis in (1, 2):
-        yield "*EQUATION"
-        yield str(len(nodes) + 1)
-        yield f"{node}, {axis}, -1"
-        for other in nodes.tolist():
-            yield f"{other + 1}, {axis}, {digits(1 / len(nodes))}"
+def _equation_lines(node: int, axis: int, end: End, turns: Array) -> Iterator[str]:
+    """A displacement of an end by those of its nodes, along the same axis and the other one."""
+    shifts = zip(end.nodes.tolist(), end.shifts.tolist(), strict=True)
+    turned = zip(end.nodes.tolist(), turns.tolist(), strict=True)
+    terms = [
+        *((other + 1, axis, weight) for other, weight in shifts),
+        *((other + 1, 3 - axis, weight) for other, weight in turned if weight),
+    ]
+    yield "*EQUATION"
+    yield str(len(terms) + 1)
+    yield f"{node}, {axis}, -1"
+    for other, along, weight in terms:
+        yield f"{other}, {along}, {digits(weight)}"
 
 
 def _law_lines(chambers: Chambers, push: Push) -> Iterator[str]:
@@ -130,6 +139,7 @@ def _step_lines(step: Step, forces: Array, *, is_snap: bool) -> Iterator[str]:
     yield "*TEMPERATURE"
     for gap, is_pushed in enumerate(step.pattern, start=1):
         yield f"GAP{gap}, {digits(ON if is_pushed else OFF)}"
-    yield from force_lines(forces, step.moment)
+    if forces.any():
+        yield from force_lines(forces, step.moment)
     yield "*NODE PRINT, NSET=ALL, FREQUENCY=1000"
     yield from END_OF_STEP[1:]
