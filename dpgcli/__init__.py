@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.finger import fit_finger
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
+    from dpgcli.api.fits.unit import fit_unit
     from dpgcli.api.predict import predict
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
@@ -58,6 +59,7 @@ __all__ = [
     "fit_finger",
     "fit_grid",
     "fit_hinge",
+    "fit_unit",
     "merge",
     "predict",
     "read_calibration",
@@ -77,6 +79,7 @@ _HOMES = {
     "fit_finger": "api.fits.finger",
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
+    "fit_unit": "api.fits.unit",
     "merge": "api.sweep",
     "predict": "api.predict",
     "read_calibration": "files.calibration",

@@ -80,8 +80,8 @@ class CompareResult:
         """Seconds a state: of the data, where they say, and of the prediction."""
         if not np.isfinite(self.known.seconds).any():
             return
-        patterns = self.known.patterns
-        taken = measured(lambda: lattice_states(self.finger, patterns, Frame()), REPEATS)
+        patterns, moments = self.known.patterns, self.known.moments
+        taken = measured(lambda: lattice_states(self.finger, patterns, Frame(), moments), REPEATS)
         own = taken.wall / patterns.shape[1]
         theirs = float(np.nanmean(self.known.seconds))
         ratio = f"{theirs / own:,.0f} times as long"

@@ -9,7 +9,10 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
 )
 
 MOST_RESAMPLES = 100_000  # of a bootstrap: minutes
-FITTED_BY_DEFAULT = "segment_height_mm"  # what is fitted to known states if nothing is named
+HINGES = "hinge_stiffness_N_mm_per_rad"
+WALLS = "wall_compliance_mm_per_N"
+LEVER = "segment_height_mm"
+FITTED_BY_DEFAULT = LEVER  # what is fitted to known states if nothing is named
 
 
 class Loss(StrEnum):
@@ -59,3 +62,5 @@ class Target(StrEnum):
 
     TIPS = "tips"
     ANGLES = "angles"
+    OPENINGS = "openings"
+    PUSHES = "pushes"

@@ -24,7 +24,9 @@ class Comparison:
     `distance` (mm) between the tips, `deflection` (mm) of the known tip from where the straight
     finger's is, `tip_angle` the difference of the tip angles (rad), and largest differences over
     units: `angle` of the phalanges (rad; where more than the last is known), `opening` (mm), `push`
-    (N). `shape` (2, state) is the
+    (N). `stiffness` is the relative error of the stiffness against an end moment: what the known
+    tip turns by under it, over what the predicted one does, less 1; of states that are in the data
+    without a moment, too. `shape` (2, state) is the
     largest and the root mean square distance (mm) of the known points from the predicted layer.
     """
 
@@ -35,6 +37,7 @@ class Comparison:
     angle: Array
     opening: Array
     push: Array
+    stiffness: Array
     shape: Array
 
     @property
@@ -55,7 +58,7 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
     >>> float(compare(finger, known, Frame()).distance[0])
     1.0
     """
-    states = lattice_states(finger, known.patterns, frame)
+    states = lattice_states(finger, known.patterns, frame, known.moments)
     straight = frame.tips(np.array([finger.straight_length, [0.0], [0.0]]))
     angles = np.abs(states.angles - known.angles)
     has_more = np.isfinite(known.angles[:-1]).any(axis=0)  # than that of the tip
@@ -67,6 +70,7 @@ def compare(finger: Finger, known: KnownStates, frame: Frame) -> Comparison:
         angle=np.where(has_more, _largest(angles), np.nan),
         opening=_largest(np.abs(states.openings - known.openings)),
         push=_largest(np.abs(states.pushes - known.pushes)),
+        stiffness=_stiffness_errors(known, states.angles[-1]),
         shape=_shape_errors(
             _from_clamp(states.layer, float(finger.straight_length[0])), known.shapes
         ),
@@ -81,7 +85,8 @@ def frame_misfit(finger: Finger, known: KnownStates, found: Comparison, frame: F
     """
     off = known.tip - found.states.tip
     off = off[:, np.isfinite(off).all(axis=0)]
-    straight = ~known.patterns.any(axis=0) & np.isfinite(known.tip - found.states.tip).all(axis=0)
+    straight = ~known.patterns.any(axis=0) & (known.moments == 0.0)
+    straight &= np.isfinite(known.tip - found.states.tip).all(axis=0)
     if straight.any():
         shift, what = (known.tip - found.states.tip)[:, straight][:, 0], "the straight state is off"
     elif off.shape[1] > 1:
@@ -101,6 +106,15 @@ def frame_misfit(finger: Finger, known: KnownStates, found: Comparison, frame: F
         Field("tip_offset"),
         f" {tip}, or a part of it in each",
     )
+
+
+def _stiffness_errors(known: KnownStates, angle: Array) -> Array:
+    """Δθ known over Δθ predicted, less 1, from the pattern's row without a moment, (state,)."""
+    unloaded = {p.tobytes(): i for i, p in enumerate(known.patterns.T) if known.moments[i] == 0.0}
+    own = np.array([unloaded.get(p.tobytes(), i) for i, p in enumerate(known.patterns.T)])
+    turned, predicted = (a - a[own] for a in (known.angles[-1], angle))
+    has_turned = predicted != 0.0
+    return np.where(has_turned, turned / np.where(has_turned, predicted, 1.0) - 1.0, np.nan)
 
 
 def _largest(errors: Array) -> Array:
@@ -152,6 +166,7 @@ COLUMNS = (
     Column("status", "", "stable where certified, else why not", kind=Kind.STATUS),
     _number_column("tip_x_mm", "mm", "predicted tip"),
     _number_column("tip_y_mm", "mm", "predicted tip"),
+    _number_column("moment_N_mm", "N mm", "end moment, positive where it opens the gaps"),
     _number_column("known_x_mm", "mm", "known tip"),
     _number_column("known_y_mm", "mm", "known tip"),
 )
@@ -162,6 +177,9 @@ ERRORS = (
     _number_column("max_angle_error_rad", "rad", "largest difference of the phalanges' angles"),
     _number_column("max_opening_error_mm", "mm", "largest difference of the openings"),
     _number_column("max_push_error_N", "N", "largest difference of the domes' pushes"),
+    _number_column(
+        "stiffness_error_percent", "%", "of the stiffness against the end moment, from no moment"
+    ),
     _number_column("max_shape_error_mm", "mm", "largest distance of a known point from the layer"),
     _number_column("rms_shape_error_mm", "mm", "root mean square of these distances"),
 )
@@ -176,6 +194,7 @@ def rows(known: KnownStates, found: Comparison, calibrated: Comparison | None = 
     table = {
         "pattern": texts(known.patterns),
         "status": found.states.status,
+        **({"moment_N_mm": known.moments} if known.moments.any() else {}),
         "tip_x_mm": found.states.tip[0],
         "tip_y_mm": found.states.tip[1],
         "known_x_mm": known.tip[0],
@@ -196,6 +215,7 @@ def _errors(found: Comparison) -> Columns:
         found.angle,
         found.opening,
         found.push,
+        100.0 * found.stiffness,
         *found.shape,
     )
     return {column.name: values for column, values in zip(ERRORS, errors, strict=True)}

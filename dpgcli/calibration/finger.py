@@ -4,20 +4,21 @@ The residuals are those of states that are solved and certified at every trial; 
 are exact (`states.sensitivities`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import COMPLEX_STEP, Array, Flags
-from dpgcli.calibration.choices import Loss, Target
+from dpgcli.arrays import Array, Flags
+from dpgcli.calibration.choices import HINGES, WALLS, Loss, Target
 from dpgcli.calibration.comparison import Comparison, compare, frame_misfit
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
+from dpgcli.calibration.observations import SMALLEST_ERROR, Observations, rms
 from dpgcli.calibration.search import Parameter
 from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -26,6 +27,7 @@ from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import sensitivities
 
 EDGE_FRACTION = 1e-3  # of a value: ending so close to where a state ceases to exist is no fit
+LARGEST_YIELD = 1e3  # times the start of walls: next to nothing holds them
 LARGEST_FACTOR = 5.0  # between the start and a bound: beyond it a value means nothing
 LARGE_ERROR = 0.3  # of the deflection
 LARGE_ERROR_WARNING = Message(
@@ -41,25 +43,35 @@ BAR_STIFFNESS_RATIOS = (
 )  # times the stiffest bistable spring: bounds of the bars' stiffness
 
 
+FIRST_YIELD = 0.1  # of H²/k_θ, what a hinge yields at the dome's axis: where walls begin
+ALIKE = 0.95  # correlation: beyond it data hardly tell values apart
+TELL_APART = (
+    "turns under an end moment tell hinges and walls apart: rows with moment_N_mm, of a ground "
+    "unit for the hinge and of an inverted one for both"
+)
+
+
 @dataclass(frozen=True)
 class FingerFit:
-    """Fits values, the same in all units, to known tips (mm) or angles of phalanges (rad).
+    """Fits values, the same in all units, to quantities of known states.
 
     `free` names values by the keys of `mechanics.finger.KEYS`; the finger has the others, and
-    where to start. Raises FitError where units differ in a free value.
+    where to start. `errors` are those that quantities are taken to have, in mm, rad or N; of
+    several quantities those that have none get one that is estimated, see `observations`.
+    Raises FitError where units differ in a free value.
     """
 
     finger: Finger
     known: KnownStates
     frame: Frame
     free: tuple[str, ...]
-    target: Target = Target.TIPS
+    targets: tuple[Target, ...] = (Target.TIPS,)
     loss: Loss = Loss.LINEAR
     loss_scale: float | None = None
+    errors: Mapping[Target, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        fitted = {key: array for key, array in KEYS.items() if array != "wall_compliance"}
-        values = {key: getattr(self.finger, array) for key, array in fitted.items()}
+        values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
         for key in self.free:
             if key not in values or not self._has(key):
                 known = ", ".join(filter(self._has, values))
@@ -78,17 +90,49 @@ class FingerFit:
         nothing to fit to, and as `fits.fit` does.
         """
         self._check_start()
-        found = fit(
+        try:
+            found = self._fit(self.observations, resamples, seed)
+        except FitError as error:
+            if {WALLS, HINGES} <= {*self.free} and "apart" in error.message:
+                raise FitError(f"{error.message}; {TELL_APART}") from None
+            raise
+        return replace(found, warnings=(*found.warnings, *self._edges(found), *_alike(found)))
+
+    def _fit(self, observed: Observations, resamples: int = 0, seed: int = 0) -> Fit:
+        def jacobian(values: Array) -> Array:
+            states = self._states(values)
+            free = [place for place, p in enumerate(self._parameters) if p.is_free]
+            steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
+            slopes = observed.jacobian(states, sensitivities(states.settled, steps))
+            whole = np.zeros((len(slopes), len(self._parameters)))
+            whole[:, free] = slopes
+            return whole
+
+        return fit(
             self._parameters,
-            self._residual,
-            self._jacobian,
-            observed=(self._observed - self._straight)[self._given],
+            lambda values: observed.residual(self._states(values)),
+            jacobian,
+            observed=observed.deflections(self._straight),
             loss=self.loss,
             loss_scale=self.loss_scale,
             resamples=resamples,
             seed=seed,
         )
-        return replace(found, warnings=(*found.warnings, *self._edges(found)))
+
+    @cached_property
+    def observations(self) -> Observations:
+        """What is to be met, every quantity over its error; one alone is not weighted."""
+        plain = Observations(self.known, self.frame, self.targets, {})
+        stated = replace(plain, errors=self.errors)
+        wanted = [target for target in self.targets if target not in self.errors]
+        if len(self.targets) == 1 or not wanted:
+            return stated
+        deflections = dict(plain.by_target(plain.deflections(self._straight)))
+        sizes = {target: rms(deflections[target]) or 1.0 for target in wanted}
+        by_size = replace(plain, errors={**self.errors, **sizes})
+        left = dict(by_size.by_target(self._fit(by_size).residuals))
+        estimated = {t: max(rms(left[t]), SMALLEST_ERROR * sizes[t]) for t in wanted}
+        return replace(plain, errors={**self.errors, **estimated})
 
     def _edges(self, found: Fit) -> Iterator[str]:
         """Warnings of values at the edge of existence of a known state."""
@@ -124,39 +168,41 @@ class FingerFit:
 
         NaN for states that hardly move, and where the others do not suffice.
         """
-        errors = np.full(self.known.patterns.shape[1], np.nan)
+        left_out = np.full(self.known.patterns.shape[1], np.nan)
+        errors = self.observations.errors
         for state in np.flatnonzero(np.isfinite(self.compared(None).relative)):
-            others = np.delete(np.arange(len(errors)), state)
+            others = np.delete(np.arange(len(left_out)), state)
             with suppress(FitError):
-                found = replace(self, known=self.known.chosen(others)).fit()
-                errors[state] = self.compared(found).relative[state]
-        return errors
+                found = replace(self, known=self.known.chosen(others), errors=errors).fit()
+                left_out[state] = self.compared(found).relative[state]
+        return left_out
 
-    @cached_property
-    def _observed(self) -> Array:
-        return self.known.tip if self.target == Target.TIPS else self.known.angles
-
-    @cached_property
+    @property
     def _straight(self) -> Array:
-        """The observations of the straight finger, (…, 1): R² is that of the deflections."""
-        if self.target == Target.ANGLES:
-            return np.zeros((1, 1))
-        return self.frame.tips(np.array([self.finger.straight_length, [0.0], [0.0]]))
-
-    @cached_property
-    def _given(self) -> Flags:
-        return np.isfinite(self._observed)
+        """The pose (3, 1) of the straight finger: R² is that of the deflections."""
+        return np.array([self.finger.straight_length, [0.0], [0.0]])
 
     @cached_property
     def _parameters(self) -> tuple[Parameter, ...]:
         """Values that all units share, the infinite ones left out."""
         values = {key: getattr(self.finger, array) for key, array in KEYS.items()}
         stiffest = float(self.finger.bistable_stiffness.max())
-        return tuple(
+        parameters = [
             _parameter(key, float(value[0, 0]), key in self.free, stiffest)
             for key, value in values.items()
-            if value.size == 1 and np.isfinite(value).all() and self._has(key)
-        )
+            if key != WALLS and value.size == 1 and np.isfinite(value).all() and self._has(key)
+        ]
+        walls = self.finger.wall_compliance
+        if WALLS in self.free or (walls.size == 1 and walls.any()):
+            parameters.append(self._walls(float(walls[0, 0])))
+        return tuple(parameters)
+
+    def _walls(self, start: float) -> Parameter:
+        """Walls may turn out to be rigid; those that are rigid begin with what a hinge yields."""
+        yields = self.finger.segment_height**2 / self.finger.hinge_stiffness
+        begin = start or FIRST_YIELD * float(np.min(yields, initial=1e3, where=np.isfinite(yields)))
+        is_free = WALLS in self.free
+        return Parameter(WALLS, begin if is_free else start, 0.0, LARGEST_YIELD * begin, is_free)
 
     def _has(self, key: str) -> bool:
         """A law with a curve of its own has no force linearity."""
@@ -168,7 +214,7 @@ class FingerFit:
         if self._last.get("key") != key:
             keys = (parameter.key for parameter in self._parameters)
             changed = self.finger.with_values(dict(zip(keys, values.tolist(), strict=True)))
-            states = lattice_states(changed, self.known.patterns, self.frame)
+            states = lattice_states(changed, self.known.patterns, self.frame, self.known.moments)
             self._last.update(key=key, states=states)
         last: LatticeStates = self._last["states"]
         return last
@@ -177,32 +223,23 @@ class FingerFit:
     def _last(self) -> dict[str, Any]:
         return {}
 
-    def _residual(self, values: Array) -> Array:
-        states = self._states(values)
-        found = states.tip if self.target == Target.TIPS else states.angles
-        return np.asarray((found - self._observed)[self._given])
-
-    def _jacobian(self, values: Array) -> Array:
-        """Derivatives of the fitted observations by the values, (point, value)."""
-        states = self._states(values)
-        free = [place for place, p in enumerate(self._parameters) if p.is_free]
-        steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
-        found = sensitivities(states.settled, steps)
-        slopes = found.strut_angles
-        if self.target == Target.TIPS:
-            moved = states.pose[:, None] + 1j * COMPLEX_STEP * found.pose
-            slopes = self.frame.tips(moved).imag / COMPLEX_STEP
-        jacobian = np.zeros((int(self._given.sum()), len(self._parameters)))
-        jacobian[:, free] = slopes.transpose(0, 2, 1)[self._given]
-        return jacobian
-
     def _check_start(self) -> None:
-        if not self._given.any():
-            raise FitError(f"the data have no {self.target} to fit to")
-        states = lattice_states(self.finger, self.known.patterns, self.frame)
+        observed = Observations(self.known, self.frame, self.targets, {})
+        if lacking := [target for target in self.targets if not observed.given(target).any()]:
+            raise FitError(f"the data have no {' and no '.join(lacking)} to fit to")
+        states = lattice_states(self.finger, self.known.patterns, self.frame, self.known.moments)
         missing = _missing(self.known.patterns, states.status)
         if missing:
             raise FitError(f"at the start not every known state exists: {', '.join(missing)}")
+
+
+def _alike(found: Fit) -> Iterator[str]:
+    """A warning of hinges and walls that the data hardly tell apart."""
+    keys = [parameter.key for parameter in found.parameters]
+    if {HINGES, WALLS} <= {*keys}:
+        together = float(found.correlation[keys.index(HINGES), keys.index(WALLS)])
+        if abs(together) > ALIKE:
+            yield f"hinges and walls are correlated by {together:.3f}: {TELL_APART}"
 
 
 def _missing(patterns: Flags, status: NDArray[np.uint8]) -> list[str]:

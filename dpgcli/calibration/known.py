@@ -21,10 +21,11 @@ class KnownStates:
 
     `patterns` (unit, state), `tip` x and y (2, state) in mm, by unit (unit, state) the `angles` of
     the phalanges beyond them (rad), their `openings` at the domes' axis (mm) and the `pushes` of
-    their domes (N), `seconds` (state,) that each state took. `shapes` are the limiting layer's
-    points from base to tip, (2, point) in mm, by state. `unused` names what else the data have,
-    `sha256` is that of their file; `first_station` and `tip_offset` (mm) are a `Frame`'s, None
-    where the data do not say them.
+    their domes (N), `seconds` (state,) that each state took, `moments` (state,) the end couple that
+    it is under (N mm, 0 where the data name none; a positive one opens the gaps). `shapes` are the
+    limiting layer's points from base to tip, (2, point) in mm, by state. `unused` names what else
+    the data have, `sha256` is that of their file; `first_station` and `tip_offset` (mm) are a
+    `Frame`'s, None where the data do not say them.
     """
 
     patterns: Flags
@@ -33,6 +34,7 @@ class KnownStates:
     openings: Array
     pushes: Array
     seconds: Array
+    moments: Array
     shapes: tuple[Array, ...] = ()
     unused: tuple[str, ...] = ()
     sha256: str = ""
@@ -48,6 +50,7 @@ class KnownStates:
             self.openings[:, states],
             self.pushes[:, states],
             self.seconds[states],
+            self.moments[states],
             tuple(self.shapes[state] for state in states) if self.shapes else (),
         )
 
@@ -58,7 +61,7 @@ class KnownStates:
         angles = unknown.copy()
         if tip_angle is not None:
             angles[-1] = tip_angle
-        return cls(patterns, tip, angles, unknown, unknown, unknown[0])
+        return cls(patterns, tip, angles, unknown, unknown, unknown[0], np.zeros(patterns.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class LatticeStates:
 
     `pose` (3, state) of the last station in the lattice's own frame; `tip` (2, state) and `layer`
     (2, n + 2, state), the layer's line from the first station to the tip, in the data's;
-    `angles`, `openings` and `pushes` as in `KnownStates`.
+    `angles`, `openings` (with what walls yield) and `pushes` as in `KnownStates`.
     """
 
     settled: Settled
@@ -108,12 +111,15 @@ class LatticeStates:
         return self.settled.status
 
 
-def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStates:
+def lattice_states(
+    finger: Finger, patterns: Flags, frame: Frame, moments: Array | float = 0.0
+) -> LatticeStates:
     """Solve and certify patterns (unit, state) of one finger, in the frame of some data.
 
-    The layer's line lies as far to the left of the stations as the data's tip does.
+    `moments` (state,) are end couples, N mm; a positive one opens the gaps. The layer's line lies
+    as far to the left of the stations as the data's tip does.
     """
-    units = UnitSolutions.of(finger)
+    units = UnitSolutions.of(finger.changed(end_moment=np.atleast_2d(moments)))
     settled = settle(units, chain_potential, patterns, DEFAULT_TOLERANCE)
     is_state = settled.status == Status.STABLE
     chain, values = settled.potential.coordinates, settled.equilibrium.coordinates
@@ -127,8 +133,8 @@ def lattice_states(finger: Finger, patterns: Flags, frame: Frame) -> LatticeStat
     poses = np.stack([np.concatenate((base, rows)) for rows in (x, y, angles)])
     line = Frame(frame.first_station, (0.0, frame.tip[1])).tips(poses)
     tip = frame.tips(pose)
-    openings = chain.openings(values)
-    pushes = -settled.finger.springs(chain.springs(values).extension).force
+    openings = chain.springs(values).extension
+    pushes = -settled.finger.springs(openings).force
     return LatticeStates(
         settled=settled,
         pose=pose,

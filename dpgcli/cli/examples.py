@@ -54,6 +54,7 @@ EXAMPLES = {
         "dpg fit bistable dome.csv --travel-to-opening stroke:3.5 --spec finger.yaml",
         "dpg fit bistable dome.csv --travel-to-opening equal --bootstrap 100 --output dome.yaml",
     ),
+    "fit unit": ("dpg fit unit unit.csv --spec finger.yaml --output unit.yaml",),
     "fit hinge": ("dpg fit hinge hinge.csv --spec finger.yaml --output hinge.yaml",),
     "fit finger": (
         "dpg fit finger finger.yaml tips.csv --output height.yaml",
@@ -65,4 +66,9 @@ EXAMPLES = {
         "dpg fe dome finger.yaml --output deck --mesh coarse --run",
     ),
     "fe hinge": ("dpg fe hinge finger.yaml --output deck --mesh coarse --run",),
+    "fe unit": ("dpg fe unit finger.yaml --output deck --mesh coarse --run",),
+    "fe finger": (
+        "dpg fe finger finger.yaml --output deck --mesh coarse --run",
+        "dpg fe finger finger.yaml --output deck --pattern '1?1' --run",
+    ),
 }

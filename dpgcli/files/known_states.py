@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,16 @@ from dpgcli.mechanics.finger import Finger
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
 SECONDS = "seconds"
+MOMENT = "moment_N_mm"
+UNIT = "unit"  # in place of the pattern of a single one
+PATTERN_OF = {"ground": "0", "inverted": "1"}
+OF_ONE_UNIT = {UNIT: "pattern", "opening_mm": "opening1_mm", "push_N": "push1_N"}
+CLAMPED = "chamber1_angle_rad"  # the first chamber, whose turn counts as none
 STATION, OFFSET = "first_station_mm", "tip_offset_mm"
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
+UNLIKELY = 30.0  # times what hinge and dome say, or as little of it: another unit
 FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
@@ -28,21 +35,26 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
     """Known states of a finger of n units; empty cells are not known.
 
     Columns: `pattern`; `tip_x_mm` and `tip_y_mm`; `tip_angle_rad`; `chamber2_angle_rad` …, of the
-    phalanges after the first; `opening1_mm` …; `push1_N` …; `seconds`. A second file has the
+    phalanges after the first; `opening1_mm` …; `push1_N` …; `moment_N_mm`, the end couple of a row,
+    positive where it opens the gaps; `seconds`. In a table of one unit `unit`, ground or inverted,
+    may stand for the pattern, `opening_mm` and `push_N` for those of unit 1. A second file has the
     points of the limiting layer, from base to tip: `pattern`, `x_mm`, `y_mm`. Comments above the
     header may say the frame: `# first_station_mm: 5.375, 0.75`, `# tip_offset_mm: 5.375, -0.75`.
     Raises SpecError with every problem of a file.
     """
-    names = _names(n_units)
-    sheet = read_sheet(source, names)
-    sheet.check_names(("pattern",))
+    sheet = read_sheet(source, _names(n_units) | {*OF_ONE_UNIT})
+    if n_units == 1 and UNIT in sheet.names and "pattern" not in sheet.names:
+        sheet = _of_one_unit(sheet)
+    elif "pattern" not in sheet.names:
+        hint = "of one unit? then of a finger with finger.units 1" if UNIT in sheet.names else ""
+        raise SpecError((sheet.missing("pattern", hint=hint),))
     if len(sheet.rows) * n_units > MOST_UNITS:
         expected = f"at most {MOST_UNITS // n_units:,} states of {n_units} units"
         wrong = sheet.problem(None, "file", expected, f"{len(sheet.rows):,}", "a part at a time")
         raise SpecError((wrong,))
     patterns = sheet.cells("pattern")
     frame, problems = _frame(sheet)
-    problems += [*_pattern_problems(sheet, n_units), *_repeated(sheet, patterns)]
+    problems += _pattern_problems(sheet, n_units)
     if not {*TIP} <= {*sheet.names} and not _known_angles(sheet, n_units):
         problems.append(sheet.missing("tip_x_mm and tip_y_mm, or tip_angle_rad"))
     try:
@@ -51,6 +63,10 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         problems += error.problems
     if problems:
         raise SpecError(in_order(problems))
+    moments = _columns(sheet, [MOMENT])[0]
+    moments = np.where(np.isnan(moments), 0.0, moments)
+    if problems := _repeated(sheet, patterns, moments):
+        raise SpecError(in_order(problems))
     known = KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
         tip=_columns(sheet, TIP),
@@ -58,6 +74,7 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         openings=_columns(sheet, _by_unit("opening{}_mm", n_units)),
         pushes=_columns(sheet, _by_unit("push{}_N", n_units)),
         seconds=_columns(sheet, [SECONDS])[0],
+        moments=moments,
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
@@ -96,11 +113,58 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
 def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
     """Known states that can be those of this finger, in mm and rad.
 
-    Raises SpecError as `read_states` and `check_scale` do.
+    Raises SpecError as `read_states`, `check_scale` and `check_loads` do.
     """
     known = read_states(source, finger.n_units, shapes)
     check_scale(source, known, float(finger.straight_length[0]))
+    check_loads(source, known, finger)
     return known
+
+
+def check_loads(source: Tabular, known: KnownStates, finger: Finger) -> None:
+    """Raise SpecError for moments and pushes of the wrong sign, or of another unit.
+
+    What a moment turns a finger by is between that of its hinges and that of its domes as well;
+    a push has the moment of a hinge that is as far open as the stroke.
+    """
+    place = Location(str(source) if isinstance(source, str | Path) else FRAME)
+    problems = []
+    hinge, lever = finger.hinge_stiffness.mean(), finger.segment_height.mean()
+    dome = finger.bistable_stiffness.mean() * lever**2
+    turned, under = _turns(known)
+    if len(turned) and hinge > 0.0:
+        stiffness = float(under @ turned / (turned @ turned)) * finger.n_units
+        expected = "moments in N mm, positive where they open the gaps (angles fall)"
+        found = f"{stiffness:.3g} N mm/rad a unit"
+        if stiffness <= 0.0:
+            problems.append(located(place, MOMENT, expected, found, "is the sign the other one?"))
+        elif not hinge / UNLIKELY < stiffness < UNLIKELY * (hinge + dome):
+            hint = "N m?" if stiffness < hinge else "N um?"
+            problems.append(located(place, MOMENT, expected, found, hint))
+    pushes = known.pushes[known.patterns & np.isfinite(known.pushes)]
+    usual = hinge * finger.stroke.mean() / lever**2
+    if len(pushes) and hinge > 0.0:
+        expected = f"pushes of domes in N, positive, about {usual:.2g}"
+        found, push = f"{np.median(pushes):.3g} in the median", float(np.median(pushes))
+        if push < 0.0:
+            problems.append(located(place, "push1_N", expected, found, "is the sign the other?"))
+        elif not usual / UNLIKELY < push < UNLIKELY * usual:
+            problems.append(located(place, "push1_N", expected, found, "is the unit another one?"))
+    if problems:
+        raise SpecError(tuple(problems))
+
+
+def _turns(known: KnownStates) -> tuple[Array, Array]:
+    """How far the end curls beyond its mean for the pattern (rad), and under which moments."""
+    turned, under = [], []
+    for pattern in np.unique(known.patterns, axis=1).T:
+        same = (known.patterns == pattern[:, None]).all(axis=0) & np.isfinite(known.angles[-1])
+        if same.any():
+            curl, moments = -known.angles[-1, same], known.moments[same]
+            turned.append(curl - curl.mean())
+            under.append(moments - moments.mean())
+    together = np.concatenate([*turned, np.zeros(0)]), np.concatenate([*under, np.zeros(0)])
+    return together if together[1].any() else (np.zeros(0), np.zeros(0))
 
 
 def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
@@ -127,11 +191,11 @@ def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
 def _names(n_units: int) -> set[str]:
     """The columns that a table of states may have."""
     by_unit = (*_by_unit("opening{}_mm", n_units), *_by_unit("push{}_N", n_units))
-    return {"pattern", *TIP, TIP_ANGLE, SECONDS, *_angle_names(n_units), *by_unit}
+    return {"pattern", *TIP, TIP_ANGLE, MOMENT, SECONDS, *_angle_names(n_units), *by_unit}
 
 
 def _unused(sheet: Sheet, n_units: int) -> tuple[str, ...]:
-    used = _names(n_units)
+    used = _names(n_units) | {CLAMPED}
     used -= set() if {*TIP} <= {*sheet.names} else {*TIP}  # one coordinate places no tip
     return tuple(name for name in sheet.names if name and name not in used)
 
@@ -144,12 +208,31 @@ def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
     ]
 
 
-def _repeated(sheet: Sheet, patterns: Sequence[str]) -> list[Problem]:
-    first = {pattern: row for row, pattern in reversed(list(enumerate(patterns)))}
+def _of_one_unit(sheet: Sheet) -> Sheet:
+    """A table of one unit, with the names that a table of states has."""
+    names = tuple(OF_ONE_UNIT.get(name, name) for name in sheet.names)
+    place = sheet.names.index(UNIT)
+    rows = [[*row] for row in sheet.rows]
+    problems = []
+    for line, row in enumerate(rows):
+        said = row[place]
+        row[place] = PATTERN_OF.get(said, said)
+        if row[place] == said:
+            problems.append(sheet.problem(line, UNIT, " or ".join(PATTERN_OF), repr(said)))
+    if problems:
+        raise SpecError(tuple(problems))
+    return replace(sheet, names=names, rows=rows)
+
+
+def _repeated(sheet: Sheet, patterns: Sequence[str], moments: Array) -> list[Problem]:
+    """Problems of states that are there twice: the same pattern under the same moment."""
+    states = list(zip(patterns, moments.tolist(), strict=True))
+    first = {state: row for row, state in reversed(list(enumerate(states)))}
+    expected = f"each pattern once, or once for each {MOMENT}"
     return [
-        sheet.problem(row, "pattern", "each pattern once", f"{pattern} for the second time")
-        for row, pattern in enumerate(patterns)
-        if row > first[pattern]
+        sheet.problem(row, "pattern", expected, f"{state[0]} for the second time")
+        for row, state in enumerate(states)
+        if row > first[state]
     ]
 
 
@@ -160,7 +243,8 @@ def _by_unit(name: str, n_units: int) -> list[str]:
 def _check_numbers(sheet: Sheet, n_units: int) -> None:
     """Read all columns at once, so that one message has the problems of all."""
     openings, pushes = (_by_unit(name, n_units) for name in ("opening{}_mm", "push{}_N"))
-    _columns(sheet, [*TIP, TIP_ANGLE, *_angle_names(n_units), *openings, *pushes, SECONDS])
+    more = (*openings, *pushes, MOMENT, SECONDS)
+    _columns(sheet, [*TIP, TIP_ANGLE, *_angle_names(n_units), *more])
 
 
 def _columns(sheet: Sheet, names: Sequence[str]) -> Array:

@@ -52,6 +52,7 @@ class Finger:
     `acting` (unit, design) is the state of the domes, given beside the energy: 1 where a dome acts
     on its neighbor, 0 where it does not, a dome that only pushes and stands in its ground state.
     So is `branch`, the stretch of its curve that a dome which only pushes is on; see `laws.Dome`.
+    `end_moment` (1, design), N mm, is a couple on the end phalanx; a positive one opens the gaps.
     `law` says how the domes answer.
     """
 
@@ -67,6 +68,7 @@ class Finger:
     wall_compliance: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
     branch: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    end_moment: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: DomeLaw = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -83,9 +85,9 @@ class Finger:
         """Every array by name, in the order of the fields."""
         return {name: getattr(self, name) for name in ARRAYS}
 
-    def states_of_domes(self) -> dict[str, Array]:
-        """What is given beside the energy, by name."""
-        return {"acting": self.acting, "branch": self.branch}
+    def conditions(self) -> dict[str, Array]:
+        """What a finger of these arrays is under, by name."""
+        return {"acting": self.acting, "branch": self.branch, "end_moment": self.end_moment}
 
     @property
     def n_designs(self) -> int:
@@ -164,7 +166,7 @@ class Finger:
         >>> uniform_finger(3, **STUDY).with_units([0, 0, 1, 2]).n_units
         4
         """
-        arrays = {**self.arrays(), **self.states_of_domes()}.items()
+        arrays = {**self.arrays(), **self.conditions()}.items()
         picked = {k: v if len(v) == 1 else v[list(places)] for k, v in arrays}
         return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
 
@@ -192,7 +194,7 @@ class Finger:
 
     def take_lanes(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
-        arrays = {**self.arrays(), **self.states_of_domes()}.items()
+        arrays = {**self.arrays(), **self.conditions()}.items()
         return self.changed(**{k: take_lanes(v, index) for k, v in arrays})
 
     def section(self, first: int, stop: int) -> "Finger":

@@ -48,14 +48,29 @@ class Quadratic:
         return type(self)(take_lanes(self.stiffness, index))
 
 
-def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
-    """The terms of a finger's springs: domes; walls; two corners per hinge, each of 2 k_θ; bars.
+@dataclass(frozen=True)
+class DeadLoad:
+    """A load that stays as it is, E = −F q; F of shape (1 or cell, 1 or batch)."""
 
-    Rigid walls, hinges without stiffness, and rigid bars are no terms. Two springs of 2 k_θ in
-    series are the hinge's k_θ.
+    force: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness."""
+        return Response(-self.force * scalar, 0.0 * scalar - self.force, 0.0 * scalar)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same load for some lanes of the batch."""
+        return type(self)(take_lanes(self.force, index))
+
+
+def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
+    """The terms of a finger: domes; walls; two corners per hinge, each of 2 k_θ; bars; loads.
+
+    Rigid walls, hinges without stiffness, rigid bars and loads of zero are no terms. Two springs
+    of 2 k_θ in series are the hinge's k_θ.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
-    >>> [term.kind for term in spring_terms(Chain(uniform_finger(1, **STUDY)))]  # rigid bars
+    >>> [term.kind for term in finger_terms(Chain(uniform_finger(1, **STUDY)))]  # rigid bars
     ['bistable', 'hinge', 'hinge']
     """
     finger = coordinates.finger
@@ -67,11 +82,19 @@ def spring_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
         *(Term("wall", yielding, wall) for yielding in coordinates.walls),
         *(Term("hinge", angle, corner) for angle in hinges),
         *(Term("bar", extension, bar) for extension in coordinates.bars),
+        *_loads(coordinates),
     )
 
 
+def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
+    """The terms of an end moment M, if there is one: −M by the sum of corners, the end's turn."""
+    moment = coordinates.finger.end_moment
+    turning = coordinates.corners if moment.any() else ()
+    return tuple(Term("load", angle, DeadLoad(moment)) for angle in turning)
+
+
 def chain_potential(finger: Finger) -> FingerPotential:
-    """The energy of an unloaded finger in internal coordinates, the default.
+    """The energy of a finger in internal coordinates, the default.
 
     >>> import numpy as np
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -83,7 +106,7 @@ def chain_potential(finger: Finger) -> FingerPotential:
 
 
 def lattice_potential(finger: Finger) -> FingerPotential:
-    """The energy of an unloaded finger in node coordinates; raises ValueError for rigid bars.
+    """The energy of a finger in node coordinates; raises ValueError for rigid bars.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> lattice_potential(uniform_finger(2, **STUDY, linear_stiffness=1e4)).coordinates.size
@@ -95,4 +118,4 @@ def lattice_potential(finger: Finger) -> FingerPotential:
 def _potential(frame: FingerCoordinates) -> FingerPotential:
     """The energy in these coordinates, and in those of walls that give way, if there are any."""
     coordinates = Walled(frame) if frame.finger.has_walls else frame
-    return Potential(coordinates, spring_terms(coordinates))
+    return Potential(coordinates, finger_terms(coordinates))

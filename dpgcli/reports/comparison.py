@@ -44,6 +44,7 @@ def _errors(found: "Comparison", what: str) -> Iterator[str]:
         ("angles", found.angle, "rad"),
         ("openings", found.opening, "mm"),
         ("pushes", found.push, "N"),
+        ("stiffness against end moments", 100.0 * np.abs(found.stiffness), "%"),
         ("shapes", found.shape[0], "mm"),
     )
     said = [

@@ -7,7 +7,10 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, law
+from dpgcli.calibration.finger import FingerFit
+from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.hinge import HingeFit
+from dpgcli.calibration.known import Frame, lattice_states
 from dpgcli.files.measured import Moments
 from dpgcli.reports.drawing import figure_to, titled
 
@@ -80,3 +83,36 @@ def hinge_figure(found: HingeFit, data: Moments, name: str) -> FitFigure:
         y_label="moment (N mm)",
         unit="N mm",
     )
+
+
+def draw_turns(study: FingerFit, found: Fit, name: str, path: Path) -> None:
+    """Draw what moments turn a unit by, ground and inverted: the data and the fit."""
+    known = study.known
+    finger = study.finger.with_values(found.by_key)
+    reach = 1.1 * (np.abs(known.moments).max() or 1.0)
+    along = np.linspace(-reach, reach, 101)
+    with figure_to(path, 7.0, 5.0, name, f"turn over end moment: {name}, the fit") as drawn:
+        axes = drawn.subplots()
+        for text, inverted, color, mark in (
+            ("ground", False, "#21918c", "o"),
+            ("inverted", True, "#440154", "^"),
+        ):
+            rows = known.patterns[0] == inverted
+            if rows.any():
+                patterns = np.full((1, len(along)), inverted)
+                line = lattice_states(finger, patterns, Frame(), along).angles[0]
+                axes.plot(along, -line, color=color, lw=1.5, label=f"{text}, fit")
+                axes.plot(
+                    known.moments[rows],
+                    -known.angles[0, rows],
+                    mark,
+                    color=color,
+                    label=f"{text}, data",
+                )
+        axes.set(
+            title=titled(name),
+            xlabel="end moment, positive where it opens the gap (N mm)",
+            ylabel="turn of the second chamber, positive where it curls (rad)",
+        )
+        axes.grid(visible=True, alpha=0.25)
+        axes.legend()

@@ -8,16 +8,17 @@ import numpy as np
 
 from dpgcli.arrays import Columns
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, rests
-from dpgcli.calibration.choices import GridMethod, Rule, Target
+from dpgcli.calibration.choices import GridMethod, Rule
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import GridLaw
 from dpgcli.calibration.hinge import HingeFit
+from dpgcli.calibration.observations import UNITS as UNITS_OF_TARGETS
+from dpgcli.calibration.observations import residual_unit, rms
 from dpgcli.design.dimensions import unit_of
 from dpgcli.files.measured import GridTable
 from dpgcli.states.columns import Column, Kind
 
-FINGER_UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad"}
 VALUE_COLUMNS = (
     Column("key", "", "key of a spec's lattice section", kind=Kind.TEXT),
     Column("value", "", "the fitted or fixed value"),
@@ -120,7 +121,7 @@ def hinge_summary(found: HingeFit) -> Iterator[str]:
 
 def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
     """Quality, and errors of the tips before and after, and of each state from the others."""
-    yield quality(found, FINGER_UNITS[study.target])
+    yield from _weighted_quality(study, found)
     for what, values in (("before", None), ("after", found)):
         relative = 100.0 * study.compared(values).relative
         if np.isfinite(relative).any():
@@ -134,6 +135,32 @@ def finger_summary(study: FingerFit, found: Fit) -> Iterator[str]:
             f"each state from the others alone: {np.nanmax(left_out):.3g} % at worst, "
             f"{np.nanmean(left_out):.3g} % in the mean"
         )
+
+
+def unit_summary(study: FingerFit, found: Fit) -> Iterator[str]:
+    """Quality, the push of the data, and the errors of what moments turn the unit by."""
+    yield from _weighted_quality(study, found)
+    if study.known.patterns.any():
+        spring, too_long = study.finger.bistable_stiffness.item(), study.finger.stroke.item()
+        yield f"the push of the data: a spring of {spring:.4g} N/mm, {too_long:.4g} mm too long"
+    else:
+        yield "no inverted unit in the data: they do not say how walls yield"
+    errors = 100.0 * np.abs(study.compared(found).stiffness)
+    for name, is_in in (("ground", False), ("inverted", True)):
+        of_unit = errors[(study.known.patterns[0] == is_in) & np.isfinite(errors)]
+        if len(of_unit):
+            worst, mean = of_unit.max(), of_unit.mean()
+            yield f"stiffness, {name}: {worst:.3g} % off at worst, {mean:.3g} % in the mean"
+
+
+def _weighted_quality(study: FingerFit, found: Fit) -> Iterator[str]:
+    """Quality of a fit, and what is left in each of several quantities."""
+    yield quality(found, residual_unit(study.targets))
+    if len(study.targets) > 1:
+        for target, left in study.observations.by_target(found.residuals):
+            how = "stated" if target in study.errors else "estimated"
+            error, unit = study.observations.errors[target], UNITS_OF_TARGETS[target]
+            yield f"{target}: rms residual {rms(left):.3g} {unit}, error {error:.3g} {unit} ({how})"
 
 
 def grid_summary(law: GridLaw, table: GridTable) -> Iterator[str]:

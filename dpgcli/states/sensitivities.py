@@ -28,12 +28,15 @@ Direction = Mapping[str, Array]
 class Sensitivities:
     """Derivatives by a step along each direction, arrays of shape (…, direction, batch).
 
-    `pose` (3, …) of tip x, y (mm) and angle (rad), and `strut_angles` (unit, …) of all stations
-    (rad), each per unit of the direction.
+    `pose` (3, …) of tip x, y (mm) and angle (rad), `strut_angles` (unit, …) of all stations (rad),
+    `gaps` (unit, …), the openings at the domes' axis (mm), and `pushes` (unit, …) of the domes (N),
+    each per unit of the direction.
     """
 
     pose: Array
     strut_angles: Array
+    gaps: Array
+    pushes: Array
 
 
 class Softened(Attached):
@@ -91,7 +94,8 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
     equilibrium = settled.equilibrium
     coordinates = equilibrium.coordinates
     here = cast("Array", coordinates + 0j)
-    moved = chain_potential(_moved(settled, direction))
+    finger, softened = _moved(settled, direction)
+    moved = chain_potential(finger)
     with np.errstate(divide="ignore", invalid="ignore"):  # lanes that are no states
         forces = moved.evaluate(here).gradient.imag / COMPLEX_STEP
         change = forward(equilibrium.factorization, -forces)
@@ -101,16 +105,21 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
         stations = moved.coordinates.stations(stepped)
         shape = internal(moved.coordinates.without_walls(change), settled.finger.is_rigid)
         turns = -np.cumsum(shape.near_angle + shape.far_angle, axis=0)
+        extension = moved.coordinates.springs(stepped).extension
+        push = -finger.springs(extension).force
+        gaps = extension + softened * push  # the dome's, and what a rigid wall begins to yield
     x, y = (nodes[-1].imag / COMPLEX_STEP for nodes in (stations.base_x, stations.base_y))
-    return np.stack((x, y, turns[-1])), turns
+    return np.stack((x, y, turns[-1])), turns, gaps.imag / COMPLEX_STEP, push.imag / COMPLEX_STEP
 
 
-def _moved(settled: Settled, direction: Direction) -> Finger:
-    """The finger an imaginary step along a direction."""
+def _moved(settled: Settled, direction: Direction) -> tuple[Finger, Array]:
+    """The finger an imaginary step along a direction, and the compliance that rigid walls get."""
     finger = settled.finger
     steps = {name: 1j * COMPLEX_STEP * rate for name, rate in direction.items()}
     rigid = finger.wall_compliance == 0.0
-    if "wall_compliance" in steps and (softened := rigid * steps["wall_compliance"]).any():
+    softened = rigid * steps.get("wall_compliance", np.zeros((1, 1)))
+    if softened.any():
         finger = replace(finger, law=Softened(finger.law, softened))
         steps["wall_compliance"] = ~rigid * steps["wall_compliance"]
-    return finger.changed(**{name: getattr(finger, name) + step for name, step in steps.items()})
+    moved = {name: getattr(finger, name) + step for name, step in steps.items()}
+    return finger.changed(**moved), softened

@@ -64,7 +64,13 @@ def test_openings_pushes_and_phalanges_beside_themselves(reference_finger: Finge
     patterns = np.array([[1, 0], [0, 1], [1, 1]], bool)
     own = lattice_states(finger, patterns, Frame())
     known = KnownStates(
-        patterns, own.tip, own.angles + 0.01, own.openings - 0.02, own.pushes + 0.03, own.pose[0]
+        patterns,
+        own.tip,
+        own.angles + 0.01,
+        own.openings - 0.02,
+        own.pushes + 0.03,
+        own.pose[0],
+        np.zeros(2),
     )
     found = compare(finger, known, Frame())
     assert found.angle == pytest.approx(np.full(2, 0.01))

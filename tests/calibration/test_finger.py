@@ -27,7 +27,7 @@ def known_of(finger: Finger, noise: float = 0.0, seed: int = 0) -> KnownStates:
     own = lattice_states(finger, PATTERNS, FRAME)
     random = np.random.default_rng(seed)
     known = KnownStates.of_tips(PATTERNS, own.tip + noise * random.normal(size=own.tip.shape))
-    return replace(known, angles=own.angles)
+    return replace(known, angles=own.angles, openings=own.openings, pushes=own.pushes)
 
 
 ONE = ({"segment_height_mm": 12.0}, {"stroke_mm": 3.1}, {"hinge_stiffness_N_mm_per_rad": 40.0})
@@ -43,7 +43,7 @@ def test_values_come_back_from_their_own_states(
     reference_finger: Fingers, truth: dict[str, float], target: Target
 ) -> None:
     start = reference_finger(3, 1e4)
-    study = FingerFit(start, known_of(start.with_values(truth)), FRAME, tuple(truth), target)
+    study = FingerFit(start, known_of(start.with_values(truth)), FRAME, tuple(truth), (target,))
     found = study.fit()
     for key, value in truth.items():
         assert found.by_key[key] == pytest.approx(value, rel=1e-6)
@@ -199,13 +199,17 @@ def test_data_without_what_is_to_be_met(reference_finger: Fingers) -> None:
     finger = reference_finger(3, 1e4)
     known = KnownStates.of_tips(PATTERNS, known_of(finger).tip)
     with pytest.raises(FitError, match="no angles to fit to"):
-        FingerFit(finger, known, FRAME, ("segment_height_mm",), Target.ANGLES).fit()
+        FingerFit(finger, known, FRAME, ("segment_height_mm",), (Target.ANGLES,)).fit()
 
 
 def test_angles_do_not_tell_the_length_of_segments(reference_finger: Fingers) -> None:
     finger = reference_finger(3)
     study = FingerFit(
-        finger, known_of(finger), FRAME, ("segment_height_mm", "segment_length_mm"), Target.ANGLES
+        finger,
+        known_of(finger),
+        FRAME,
+        ("segment_height_mm", "segment_length_mm"),
+        (Target.ANGLES,),
     )
     with pytest.raises(FitError, match="do not depend on segment_length_mm"):
         study.fit()

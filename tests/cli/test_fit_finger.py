@@ -257,7 +257,11 @@ def test_a_fit_that_cannot_be_writes_nothing(
     ("states", "options", "said"),
     [
         ("pattern,tip_x_mm,tip_y_mm\n000,52,0\n", (), "do not depend on segment_height_mm"),
-        ("pattern,tip_angle_rad\n100,-0.26\n", (), "the data have no tips to fit to"),
+        (
+            "pattern,tip_angle_rad\n100,-0.26\n",
+            ("--target", "tips"),
+            "the data have no tips to fit to",
+        ),
         (
             "pattern,tip_x_mm,tip_y_mm\n100,50,-10\n",
             ("--target", "angles"),

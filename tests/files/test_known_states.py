@@ -147,7 +147,10 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
         (HEAD + "10,1\n", ["2: row: expected 3 cells, found 2"]),
         (
             HEAD + "10,1,2\n10,1,2\n",
-            ["3: pattern: expected each pattern once, found 10 for the second time"],
+            [
+                "3: pattern: expected each pattern once, or once for each moment_N_mm, "
+                "found 10 for the second time"
+            ],
         ),
         (
             HEAD + "1,1,2\n101,1,2\n12,1,2\n,1,2\n10,1,2\n",

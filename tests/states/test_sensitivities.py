@@ -33,20 +33,26 @@ def solved(finger: Finger) -> Settled:
 def outputs(finger: Finger) -> dict[str, Array]:
     """Poses and angles of states solved anew."""
     batch = solved(finger)
-    _, near, far, *_ = internal(batch.equilibrium.coordinates, finger.is_rigid)
+    chain, values = batch.potential.coordinates, batch.equilibrium.coordinates
+    _, near, far, *_ = internal(chain.without_walls(values), finger.is_rigid)
+    gaps = chain.springs(values).extension
     return {
         "pose": tip(batch, with_compliance=False).pose,
         "strut_angles": -np.cumsum(near + far, axis=0),
+        "gaps": gaps,
+        "pushes": -batch.finger.springs(gaps).force,
     }
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
+@pytest.mark.parametrize("compliance", [0.0, 0.05])
 @pytest.mark.parametrize("stiffness", [1e2, np.inf, pytest.param(1e4, marks=pytest.mark.slow)])
 def test_they_are_the_slopes_of_states_that_are_solved_again(
-    graded_finger: Fingers, stiffness: float, law: DomeLaw
+    graded_finger: Fingers, stiffness: float, compliance: float, law: DomeLaw
 ) -> None:
     """By fourth-order central differences with a step of 1e-3 of the value, where it matters."""
     finger = replace(graded_finger(3, 3, linear_stiffness=stiffness), law=law)
+    finger = finger.changed(wall_compliance=np.array([[compliance]]))
     for name in ARRAYS:
         value = getattr(finger, name)
         if not value.any() or np.isinf(value).any():

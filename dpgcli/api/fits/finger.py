@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
+
 from dpgcli.api.fits.result import (
     NO_GEOMETRY,
     FitResult,
@@ -22,16 +24,18 @@ from dpgcli.api.inputs import (
     frame_of,
     scene_input,
 )
-from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
+from dpgcli.calibration.choices import FITTED_BY_DEFAULT, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
+from dpgcli.calibration.known import KnownStates
+from dpgcli.calibration.observations import targets_for
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted, judged, quality_of
+from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
-from dpgcli.reports.fits import FINGER_UNITS, finger_summary, value_rows
+from dpgcli.reports.fits import finger_summary, value_rows
 
 
 def fit_finger(
@@ -39,7 +43,8 @@ def fit_finger(
     states: Tabular,
     *,
     free: str | Sequence[str] = (FITTED_BY_DEFAULT,),
-    target: str = "tips",
+    target: str | Sequence[str] = (),
+    error: str | Sequence[str] = (),
     settings: Settings = (),
     first_station: Place = None,
     tip_offset: Place = None,
@@ -49,11 +54,13 @@ def fit_finger(
     bootstrap: int = 0,
     seed: int = 0,
 ) -> FitResult[Fit]:
-    """Fit lattice values, the same in all units, to "tips" or "angles" of known states.
+    """Fit lattice values, the same in all units, to quantities of known states.
 
-    `states` has `pattern`, `tip_x_mm` and `tip_y_mm` or `tip_angle_rad`; see
-    `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
-    what the data call the tip, from the last node along the phalanx and to its left (mm), unless
+    `states` has `pattern` and what is known: see `files.known_states`. `target` is one or more of
+    "tips", "angles", "openings" and "pushes": by default tips (angles where there are none), with
+    walls openings and pushes, too; `error`, "pushes=0.05", is what one is taken to be off by (mm,
+    rad, N; estimated otherwise). `first_station` is the lattice's first node in the data,
+    `tip_offset` the data's tip from the last node along the phalanx and to its left (mm), unless
     the data's header or the spec's section `data` says them.
     Raises SpecError for a wrong spec or data, UsageError for wrong choices, FitError for a fit
     that fails.
@@ -70,27 +77,50 @@ def fit_finger(
     known = states_of(base, states)
     weighted = chosen(Loss, "loss", loss)
     check_loss(weighted, loss_scale)
-    met = chosen(Target, "target", target)
     frame, _ = frame_of(given, known, first_station, tip_offset)
-    keys = as_texts("free", free)
-    if not keys:
+    if not (keys := as_texts("free", free)):
         raise UsageError(Field("free"), ": expected one key or more")
+    met = targets_of(known, target, with_walls=WALLS in keys or base.has_walls)
     check_resampling(bootstrap, seed)
-    study = FingerFit(base, known, frame, keys, met, weighted, loss_scale)
+    study = FingerFit(base, known, frame, keys, met, weighted, loss_scale, errors_of(error, met))
     found = study.fit(bootstrap, seed)
-    name = name_of(states)
-    source = DataFile(file=name, sha256=known.sha256, rows=known.patterns.shape[1])
+    source = DataFile(file=name_of(states), sha256=known.sha256, rows=known.patterns.shape[1])
     return fit_result(
         found,
-        {
-            **fitted(found, FINGER_UNITS[met], source, only_free=True),
-            "quality": judged(study, quality_of(found, FINGER_UNITS[met])),
-            "method": finger_method(study, found, bootstrap, seed),
-            "geometry": where,
-        },
+        {**finger_sections(study, found, source, bootstrap, seed), "geometry": where},
         value_rows(found),
         partial(finger_summary, study, found),
         (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),
-        partial(draw_fitted, study, found, name),
+        partial(draw_fitted, study, found, name_of(states)),
         files=(*given.files, *files_of(states)),
     )
+
+
+def targets_of(
+    known: KnownStates, target: str | Sequence[str], *, with_walls: bool
+) -> tuple[Target, ...]:
+    """The quantities that are named, or else those that are fitted by default."""
+    named = (chosen(Target, "target", text) for text in as_texts("target", target))
+    return tuple(dict.fromkeys(named)) or targets_for(known, with_walls=with_walls)
+
+
+def errors_of(error: str | Sequence[str], targets: Sequence[Target]) -> dict[Target, float]:
+    """Errors by quantity, from texts such as "pushes=0.05".
+
+    >>> errors_of("pushes=0.05", [Target.TIPS, Target.PUSHES])
+    {<Target.PUSHES: 'pushes'>: 0.05}
+    """
+    errors = {}
+    for text in as_texts("error", error):
+        name, _, number = text.partition("=")
+        target = chosen(Target, "error", name)
+        try:
+            errors[target] = float(number)
+        except ValueError:
+            errors[target] = 0.0
+        if not 0.0 < errors[target] < np.inf:
+            raise UsageError(Field("error"), f" {text!r}: expected a number > 0, as in pushes=0.05")
+        if target not in targets:
+            known = ", ".join(targets)
+            raise UsageError(Field("error"), f" {text!r}: not fitted; {Field('target')} is {known}")
+    return errors

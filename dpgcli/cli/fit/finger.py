@@ -8,6 +8,7 @@ import typer
 from dpgcli.calibration.choices import FITTED_BY_DEFAULT, Loss, Target
 from dpgcli.cli.fit.options import (
     Bootstrap,
+    ErrorsOfTargets,
     GeometryValues,
     LossOption,
     LossScale,
@@ -33,7 +34,14 @@ def finger(
             help=f"Fit this value; repeatable  [default: {FITTED_BY_DEFAULT}]",
         ),
     ] = None,
-    target: Annotated[Target, typer.Option(help="What of the states to meet")] = Target.TIPS,
+    target: Annotated[
+        list[Target] | None,
+        typer.Option(
+            help="What of the states to meet; repeatable  [default: tips; with free walls openings "
+            "and pushes, too]"
+        ),
+    ] = None,
+    error: ErrorsOfTargets = None,
     settings: Settings = None,
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
@@ -58,7 +66,8 @@ def finger(
             given,
             data,
             free=tuple(free or (FITTED_BY_DEFAULT,)),
-            target=target,
+            target=target or (),
+            error=error or (),
             first_station=frame[0],
             tip_offset=frame[1],
             geometry=geometry,

@@ -70,3 +70,11 @@ Units = Annotated[
         "--units", metavar="QUANTITY=UNIT", help="The file's unit, such as force=kN; repeatable"
     ),
 ]
+ErrorsOfTargets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--error",
+        metavar="TARGET=NUMBER",
+        help="Take this for the error of a target (mm, rad, N); repeatable  [default: estimated]",
+    ),
+]
