@@ -10,7 +10,7 @@ from dpgcli.design.dimensions import WALL_COMPLIANCE
 from dpgcli.design.footing import ELSEWHERE, MOVED, Case
 from dpgcli.design.outputs import Basis
 from dpgcli.design.problems import of_design
-from dpgcli.design.rules import SEGMENT_HEIGHT, Value
+from dpgcli.design.rules import HINGE_STIFFNESS, SEGMENT_HEIGHT, Value
 from dpgcli.design.scene import ORIGINS, UNKNOWN, ModelError
 
 CURLED = "shapes curl 13–24 % too far against finite elements"
@@ -46,7 +46,8 @@ def _of_walls(case: Case) -> ModelError:
         return UNKNOWN
     if case.has_fitted_walls:
         shapes = WITH_WALLS if case.has_geometric_height else WITH_BOTH
-        return ModelError(f"{shapes}{case.footings[WALL_COMPLIANCE].elsewhere}; {THE_REST}")
+        where = case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
+        return ModelError(f"{shapes}{where}; {THE_REST}")
     return ModelError(OTHER_WALLS)
 
 
@@ -60,7 +61,8 @@ def _of_height(case: Case) -> ModelError:
         return ModelError(f"{CURLED}{where}; {CALIBRATE}")
     if height.basis is not Basis.FITTED:
         return UNKNOWN
-    return ModelError(f"{WITH_HEIGHT}{height.elsewhere}; with a segment height fitted to them")
+    where = case.elsewhere(SEGMENT_HEIGHT.key)
+    return ModelError(f"{WITH_HEIGHT}{where}; with a segment height fitted to them")
 
 
 def _left_out(file: Calibration, known: KnownError, own: Sequence[Value], place: int) -> ModelError:

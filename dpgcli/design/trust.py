@@ -125,7 +125,7 @@ def _ground(case: Case) -> Trust:
     hinge = case.footings[HINGE_STIFFNESS.key]
     known = case.known_error(Output.GROUND, HINGE_STIFFNESS.key)
     if not known and hinge.basis in (Basis.FITTED, Basis.PUBLISHED):
-        known = f"within about 20 % of finite elements{hinge.elsewhere}"
+        known = f"within about 20 % of finite elements{case.elsewhere(hinge.key)}"
     return _checked(Trust(Output.GROUND, hinge.basis, known or UNKNOWN, str(hinge)), hinge)
 
 
@@ -155,7 +155,7 @@ def _of_walls(case: Case, output: Output, error: str) -> Trust:
     keys = (WALL_COMPLIANCE, BISTABLE_STIFFNESS.key, HINGE_STIFFNESS.key)
     lead, known = case.gravest(*keys), case.known_error(output, *keys)
     if not known and case.has_fitted_walls:
-        known = error + case.footings[WALL_COMPLIANCE].elsewhere
+        known = error + case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
     return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
 
 

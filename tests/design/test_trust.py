@@ -371,6 +371,15 @@ def test_a_file_that_does_not_say_where_it_holds_is_extrapolated() -> None:
     assert found[Output.ENERGIES].instead == "calibrate at this geometry: dpg help calibration"
 
 
+def test_walls_do_not_hide_a_dome_that_nothing_backs() -> None:
+    found = trusts(sized(walled(with_files(PUSHED, HINGE)), dome_height_mm=8.0))
+    for output in (Output.INVERTED, Output.FORCES):
+        assert found[output].basis is Basis.EXTRAPOLATED
+        assert found[output].doubt.startswith(
+            "nothing backs it here: bistable stiffness: from dome"
+        )
+
+
 def test_of_graded_units_the_least_trusted_counts() -> None:
     graded = replace(BASE, overrides={"2": GivenValues(arrays({"dome_height_mm": 8.5}))})
     assert trusts(graded)[Output.ENERGIES].basis is Basis.EXTRAPOLATED
@@ -383,6 +392,10 @@ def test_values_carried_to_another_geometry_say_where_the_error_was_found() -> N
     found = trusts(moved)
     where = " (at the study's dimensions)"
     assert found[Output.GROUND].known_error == f"within about 20 % of finite elements{where}"
+    assert found[Output.INVERTED].known_error == WALLED + where, "its hinge is another"
+    assert found[Output.SHAPES].known_error.endswith(f"against finite elements{where}")
+    high = sized(with_files(BASE, HEIGHT), unit_cell_mm=23.0)
+    assert trusts(high)[Output.SHAPES].known_error.endswith(where)
     wider = sized(replace(BASE, law="push_only"), unit_cell_mm=24.0)
     assert trusts(wider)[Output.SHAPES].known_error == CURLED + where
 
