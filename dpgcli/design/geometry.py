@@ -101,6 +101,15 @@ def bistable_stiffness(dome_height: Size, dome_thickness: Size, elastic_modulus:
     return REFERENCE.bistable_stiffness * by_modulus * by_thickness * by_height
 
 
+def softness(elastic_modulus: Size) -> Size:
+    """1/E in 1/MPa, by which everything yields that is of one material and of one shape.
+
+    >>> softness(25.0)
+    0.04
+    """
+    return 1.0 / elastic_modulus
+
+
 def snap_pressure(dome_height: Size, dome_thickness: Size, elastic_modulus: Size) -> Size:
     """Pressure in MPa that inverts a dome, proportional to E t^2.5 h^1.2 from 0.1495.
 

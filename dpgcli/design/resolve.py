@@ -20,9 +20,12 @@ from dpgcli.design.dimensions import (
     range_issues,
 )
 from dpgcli.design.domes import Domes, domes_of
-from dpgcli.design.model_error import known_model_error
+from dpgcli.design.fitted import from_file
+from dpgcli.design.footing import Case, kinds
+from dpgcli.design.model_error import model_error_of
+from dpgcli.design.outputs import Trust
 from dpgcli.design.problems import Issue, Problems, number, of_design
-from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, Value, all_by
+from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, WALLS, Value, all_by
 from dpgcli.design.scene import (
     ORIGINS,
     Chambers,
@@ -33,6 +36,7 @@ from dpgcli.design.scene import (
     Source,
     Uncertainty,
 )
+from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -107,17 +111,37 @@ class Resolution:
             self._uncertainty(),
             self.model_error,
             self._chambers(),
+            self.trusts,
+            self.warnings,
         )
 
     @property
     def model_error(self) -> ModelError:
         """What is known of the model's own error, for a single design."""
-        values = [value for pairs in self.values.values() for _, value in pairs]
-        lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
-        walls = self.values.get(WALL_COMPLIANCE, ())
-        if any(value.numbers.any() for _, value in walls):  # nothing is known of a lever beside
-            lever = None
-        return known_model_error(self.design, lever, values)
+        return model_error_of(self._case(0))
+
+    @property
+    def trusts(self) -> tuple[Trust, ...]:
+        """What each output rests on, for a single design."""
+        return trusts_of(self._case(0))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the calibrations in use."""
+        return warnings_of(self._case(0))
+
+    def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
+        """What outputs of some designs, none of them wrong, rest on, and how many of them."""
+        found = kinds(self._each, designs)
+        return [(trusts_of(self._case(place)), count) for place, count in found]
+
+    def _case(self, place: int) -> Case:
+        return Case(self.design, self.domes, self._each, place)
+
+    @property
+    def _each(self) -> dict[str, list[Value]]:
+        """Values by key, one for each group of units."""
+        return {key: [value for _, value in pairs] for key, pairs in self.values.items()}
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
@@ -225,7 +249,8 @@ def resolve(design: Design) -> Resolution:
         found = [(group, value_of(derivation, group, base, problems)) for group in chosen]
         values[derivation.key] = [(g, value) for g, value in found if value is not None]
     values[LINEAR_STIFFNESS] = [(base, _bars(design, base))]
-    walls = [(group, _walls(group)) for group in groups]
+    found = [(group, _walls(group, problems)) for group in groups]
+    walls = [(group, value) for group, value in found if value is not None]
     if any(_may_yield(value, WALL_COMPLIANCE in design.tolerances) for _, value in walls):
         values[WALL_COMPLIANCE] = walls
     resolution = Resolution(design, domes, values, problems)
@@ -264,12 +289,14 @@ def _bars(design: Design, base: UnitGroup) -> Value:
     return _fitted(LINEAR_STIFFNESS, base) or assumed
 
 
-def _walls(group: UnitGroup) -> Value:
-    """How far walls give way: given, fitted, or not at all."""
+def _walls(group: UnitGroup, problems: Problems) -> Value | None:
+    """How far walls give way: given, fitted, or not at all; None where a file's does not fit."""
     if WALL_COMPLIANCE in group.lattice:
         return all_by(group.lattice[WALL_COMPLIANCE], Origin.GIVEN, "as given")
-    rigid = all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
-    return _fitted(WALL_COMPLIANCE, group) or rigid
+    for place, calibration in enumerate(group.calibrations):
+        if isinstance(calibration, Calibration) and calibration.has(WALL_COMPLIANCE):
+            return from_file(WALLS, group, calibration, place, problems)
+    return all_by(np.zeros(1), Origin.ASSUMED, "walls are rigid unless given or calibrated")
 
 
 def _may_yield(value: Value, is_tolerated: bool) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design import geometry
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import LARGEST, SMALLEST, UnitGroup
+from dpgcli.design.dimensions import LARGEST, SMALLEST, WALL_COMPLIANCE, UnitGroup
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.scene import ORIGINS, Origin
 
@@ -117,6 +117,13 @@ HINGE_STIFFNESS = Derivation(
     geometry.hinge_stiffness,
     "E W_ch t_L^3 / s (inferred scaling)",
     geometry.hinge_origin,
+    bounds=(0.0, LARGEST),
+)
+WALLS = Derivation(  # rigid unless given or calibrated: geometry alone yields none
+    WALL_COMPLIANCE,
+    ("elastic_modulus_MPa",),
+    geometry.softness,
+    "1 / E (elasticity)",
     bounds=(0.0, LARGEST),
 )
 DERIVATIONS = (

@@ -1,6 +1,6 @@
 """Starting shapes of searches: units in their own wells, or opened by strokes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -8,8 +8,12 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.rigid_unit import opening_of, single_units
+from dpgcli.states.rigid_unit import single_units
 from dpgcli.states.wells import ByUnit, Wells
+
+
+def _none() -> Array:
+    return np.zeros((1, 1))
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,8 @@ class FirstOrder(ByUnit):
     the far corner: near and far exchanged). A ground unit carries no force and has all of them
     zero. Close to the loss of bistability, and without a hinge, the answers grow without bound:
     they are then scaled down to a tenth of m. `turn` is what both corners may turn by in any
-    pattern (rad), not scaled down. Shapes as in `Wells`.
+    pattern (rad), not scaled down. `wall_by_chord`, `wall_by_corner` and `wall_by_strut` are what
+    the wall yields more, as bars and corners move. Shapes as in `Wells`.
     """
 
     rigid_angle: Array
@@ -33,6 +38,9 @@ class FirstOrder(ByUnit):
     by_near_strut: Array
     by_far_strut: Array
     turn: Array
+    wall_by_chord: Array = field(default_factory=_none)
+    wall_by_corner: Array = field(default_factory=_none)
+    wall_by_strut: Array = field(default_factory=_none)
 
 
 def first_order(finger: Finger, wells: Wells) -> FirstOrder:
@@ -46,7 +54,9 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     zero = np.zeros((units, designs))
     wall = zero
     if finger.has_walls:
-        wall = np.broadcast_to(wells.extension - opening_of(finger, wells.extension), zero.shape)
+        wall = np.broadcast_to(
+            wells.extension - 2.0 * finger.segment_height * np.sin(wells.angle), zero.shape
+        )
     if finger.is_rigid:
         return FirstOrder(rigid_angle, wall, zero, zero, zero, zero, zero, zero)
     angle = rigid_angle.reshape(1, -1)
@@ -57,7 +67,9 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     stiffness = np.broadcast_to(finger.linear_stiffness, (units, designs))
     # one unit's rows are e, a, b, s; band[k, j] is the entry (j + k, j)
     band, gradient = at_well.hessian, at_well.gradient
+    follows: tuple[Array, ...] = ()
     if finger.has_walls:
+        follows = _wall_answers(finger, band, zero.shape)
         band, gradient = without_first(band), gradient[1:]
     chord, strut = (-gradient[row].reshape(units, designs) / stiffness for row in (0, 3))
     answers = [part.reshape(units, designs) for part in _corner_answers(band)]
@@ -71,7 +83,17 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     scale = np.minimum(1.0, 0.2 * rigid_angle / np.maximum(turn, np.finfo(float).tiny))
     scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
     by_chord, by_near_strut, by_far_strut = scaled
-    return FirstOrder(rigid_angle, wall, chord, strut, by_chord, by_near_strut, by_far_strut, turn)
+    return FirstOrder(
+        rigid_angle, wall, chord, strut, by_chord, by_near_strut, by_far_strut, turn, *follows
+    )
+
+
+def _wall_answers(finger: Finger, band: Array, shape: tuple[int, ...]) -> tuple[Array, ...]:
+    """What a wall yields more by its chord (mm/mm), a corner (mm/rad) and a strut (mm/mm)."""
+    ratio = np.broadcast_to(finger.wall_ratio, shape)
+    with np.errstate(divide="ignore", invalid="ignore"):  # no second well
+        rows = (-ratio * (band[row, 0] / band[0, 0]).reshape(shape) for row in (1, 2, 4))
+        return tuple(np.where(np.isfinite(part), part, 0.0) for part in rows)
 
 
 def without_first(band: Array) -> Array:
@@ -125,7 +147,12 @@ def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Intern
     common = unit.rigid_angle + unit.by_chord * unit.chord
     near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut)
     far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut)
-    return Internal(unit.chord * on, near, far, strut, unit.wall * on)
+    wall = unit.wall * on
+    if finger.has_walls:
+        turned = near + far - 2.0 * unit.rigid_angle * on
+        wall += on * (unit.wall_by_chord * unit.chord + unit.wall_by_corner * turned)
+        wall += on * (unit.wall_by_strut * (near_strut + strut))
+    return Internal(unit.chord * on, near, far, strut, wall)
 
 
 def stroke_guess(finger: Finger, inverted: Flags, strokes: float) -> Internal:

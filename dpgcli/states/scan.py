@@ -1,4 +1,4 @@
-"""Wells and tops of a unit under any law: signs of its force on a grid, then bisection.
+"""Wells and tops of a unit under any law: signs of its force on a grid, then a root of it.
 
 The places of the grid next to which the force turns are moved to where it does, so that a well and
 its barrier next to a fold are told apart, however close they are.
@@ -11,14 +11,25 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_stiffness, rigid_unit, single_units
+from dpgcli.states.rigid_unit import (
+    SHORT_OF_LEVER,
+    TurnedUnit,
+    rigid_unit,
+    single_units,
+    tangent_of,
+    turned_unit,
+)
 
 MIDDLE = 0.75  # in strokes: the vertex of 2u² − 3u, between barrier and well
 IN_TOUCH = 0.999  # of a dome's own well: where a dome that only pushes still does
-SEARCHED = 512  # extensions at which the force of a unit is looked at
+SEARCHED = 512  # places at which the force of a unit is looked at, for any curve
+FEWER = 64  # for the polynomial, whose force turns twice
+COARSE = 16  # of them, with walls, for which the corners' turn is searched
 TANGENTS = 2.0  # times a slope's reach: a stiffness may have a kink in the cell
 WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
-BISECTIONS = 52  # of one 512th of the range: down to rounding
+ARRIVED = 1e-15  # of what places are counted by: a smaller step is rounding
+ONE = np.ones((1, 1))
+BISECTIONS = 53  # of one 64th of the range: down to rounding
 
 
 class Scan(NamedTuple):
@@ -34,8 +45,13 @@ class Scan(NamedTuple):
 
 
 class _Profile(NamedTuple):
-    """Places along the extension of a unit and its response there, (place, unit, design)."""
+    """Places along the extension of a unit and its response there, (place, unit, design).
 
+    `by` is what places are counted by: the extension itself, or with walls the tangent of the
+    corners' turn.
+    """
+
+    by: Array
     places: Array
     energy: Array
     force: Array
@@ -68,15 +84,15 @@ def scan(finger: Finger) -> Scan:
     top = tops.argmax(axis=0)
     is_touching = tops.max(axis=0) > untouched
     exists = np.asarray(is_well.any(axis=0))
-    at_well = _bisected(attached, profile.places, well, rises=True)
-    turning = _bisected(attached, profile.places, top, rises=False)
+    at_well = _turning_point(attached, profile.by, well, rises=True)
+    turning = _turning_point(attached, profile.by, top, rises=False)
     turning = np.where(is_touching, turning, _or_zero(rests.top))
     extension = np.where(exists, at_well, opened(finger, widest))
     barrier = np.where(exists, turning, MIDDLE * finger.stroke)
     along = profile.places
     reset = _largest(-profile.force, (along >= barrier) & (along <= extension))
     snap = _largest(profile.force, (along <= barrier) & pulls(finger))
-    others = _between(attached, profile.places, (is_well, is_top), well)
+    others = _between(attached, profile.by, (is_well, is_top), well)
     return Scan(exists, extension, barrier, *others, snap, reset)
 
 
@@ -116,9 +132,26 @@ def _range(finger: Finger, own_well: Array) -> tuple[Array, Flags]:
 
 
 def _profile(finger: Finger, widest: Array) -> _Profile:
-    grid = widest * np.linspace(0.0, 1.0, SEARCHED + 1)[:, None, None]
-    energy, force, stiffness = rigid_unit(finger, grid)
-    return _Profile(np.broadcast_to(grid, force.shape), energy, force, stiffness)
+    searched = FEWER if finger.law.curve is None else SEARCHED
+    share = np.linspace(0.0, 1.0, (COARSE if finger.has_walls else searched) + 1)
+    by = widest * share[:, None, None]
+    if finger.has_walls:
+        by = _refined(tangent_of(finger, by), searched // COARSE)
+    places, (energy, force, stiffness), _ = _at(finger, by, finger.has_walls)
+    by, places = (np.broadcast_to(part, force.shape) for part in (by, places))
+    return _Profile(by, places, energy, force, stiffness)
+
+
+def _refined(places: Array, parts: int) -> Array:
+    """Places, the first axis, with each cell between them divided into equal parts."""
+    between = np.linspace(0.0, 1.0, parts, endpoint=False)[:, None, None]
+    cells = places[:-1, None] + between * np.diff(places, axis=0)[:, None]
+    return np.concatenate((cells.reshape(-1, *places.shape[1:]), places[-1:]))
+
+
+def _at(finger: Finger, by: Array, is_turn: bool) -> TurnedUnit:
+    """Units by what a profile counts its places by."""
+    return turned_unit(finger, by) if is_turn else TurnedUnit(by, rigid_unit(finger, by), ONE)
 
 
 def _turned(finger: Finger, profile: _Profile) -> _Profile:
@@ -131,16 +164,18 @@ def _turned(finger: Finger, profile: _Profile) -> _Profile:
         return profile
     flat, (_, designs) = single_units(finger)
     few = flat.take_lanes(unit * designs + design)
-    low, high = (profile.places[cell + k, unit, design][None] for k in (0, 1))
+    low, high = (profile.by[cell + k, unit, design][None] for k in (0, 1))
     begins = profile.stiffness[cell, unit, design] >= 0.0
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        is_before = (rigid_stiffness(few, middle) >= 0.0) == begins
+        is_before = (_at(few, middle, finger.has_walls).response.stiffness >= 0.0) == begins
         low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    places, energy, force = (part.copy() for part in profile[:3])
-    for own, new in zip((places, energy, force), (low, *rigid_unit(few, low)[:2]), strict=True):
+    place, response, _ = _at(few, low, finger.has_walls)
+    by, places, energy, force = (np.array(part) for part in profile[:-1])
+    moved = (low, place, response.energy, response.force)
+    for own, new in zip((by, places, energy, force), moved, strict=True):
         own[cell + 1, unit, design] = new[0]
-    return _Profile(places, energy, force, profile.stiffness)
+    return _Profile(by, places, energy, force, profile.stiffness)
 
 
 def _may_hide_two_roots(profile: _Profile) -> Flags:
@@ -157,7 +192,7 @@ def _may_hide_two_roots(profile: _Profile) -> Flags:
 
 
 def _between(
-    finger: Finger, places: Array, turns: tuple[Flags, Flags], well: Indices
+    finger: Finger, by: Array, turns: tuple[Flags, Flags], well: Indices
 ) -> tuple[Array, Array]:
     """The tops beside a well that part it from others, ∓ infinity where there is no other."""
     is_well, is_top = turns
@@ -166,11 +201,11 @@ def _between(
     has_lesser = (is_well & (index < well)).any(axis=0)
     if has_lesser.any():
         last = np.where(is_top & (index < well), index, 0).max(axis=0)
-        lower = np.where(has_lesser, _bisected(finger, places, last, rises=False), lower)
+        lower = np.where(has_lesser, _turning_point(finger, by, last, rises=False), lower)
     has_further = (is_well & (index > well)).any(axis=0)
     if has_further.any():
         first = (is_top & (index > well)).argmax(axis=0)
-        upper = np.where(has_further, _bisected(finger, places, first, rises=False), upper)
+        upper = np.where(has_further, _turning_point(finger, by, first, rises=False), upper)
     return lower, upper
 
 
@@ -179,11 +214,23 @@ def _largest(values: Array, at: Flags) -> Array:
     return np.where(at.any(axis=0), np.where(at, values, -np.inf).max(axis=0), np.inf)
 
 
-def _bisected(finger: Finger, places: Array, index: Indices, *, rises: bool) -> Array:
-    """Where the force changes its sign between a place and the next."""
-    low, high = (np.take_along_axis(places, (index + k)[None], axis=0)[0] for k in (0, 1))
+def _turning_point(finger: Finger, by: Array, index: Indices, *, rises: bool) -> Array:
+    """The extension (mm) at which the force changes its sign between a place and the next.
+
+    By Newton's method within what is known to be before it and behind, else by bisection.
+    """
+    low, high = (np.take_along_axis(by, (index + k)[None], axis=0)[0] for k in (0, 1))
+    here, is_running = 0.5 * (low + high), np.ones(low.shape, bool)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        is_beyond = (rigid_unit(finger, middle).force >= 0.0) == rises
-        low, high = np.where(is_beyond, low, middle), np.where(is_beyond, middle, high)
-    return np.asarray(0.5 * (low + high))
+        at = _at(finger, here, finger.has_walls)
+        is_beyond = (at.response.force >= 0.0) == rises
+        low, high = np.where(is_beyond, low, here), np.where(is_beyond, here, high)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            step = at.response.force / (at.response.stiffness * at.rate)
+        is_running &= ~(np.abs(step) <= ARRIVED * here)  # what has arrived stays
+        if not is_running.any():
+            break
+        further = here - step
+        is_inside = (further > low) & (further < high)
+        here = np.where(is_running, np.where(is_inside, further, 0.5 * (low + high)), here)
+    return np.asarray(_at(finger, here, finger.has_walls).extension)

@@ -15,7 +15,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.rigid_unit import SHORT_OF_LEVER, opening_of, rigid_stiffness, rigid_unit
+from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, tangent_of
 from dpgcli.states.scan import MIDDLE, WIDEST, opened, pulls, scan
 
 INFLECTION_BISECTIONS = 24
@@ -124,7 +124,7 @@ def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
     soft = np.minimum(0.5 * finger.stroke, stiff.max(axis=0)) + 0.0 * stiff
     for _ in range(INFLECTION_BISECTIONS):
         middle = 0.5 * (stiff + soft)
-        rises = rigid_stiffness(finger, middle) >= 0.0
+        rises = rigid_unit(finger, middle).stiffness >= 0.0
         stiff, soft = np.where(rises, middle, stiff), np.where(rises, soft, middle)
     return rigid_unit(finger, stiff).force
 
@@ -132,12 +132,13 @@ def _extreme_slopes(finger: Finger, stiff: Array) -> Array:
 def _scanned_wells(finger: Finger) -> Wells:
     """The inverted well of any law, with walls that give way too."""
     found = scan(finger)
-    opening = opening_of(finger, found.extension)
+    sine = found.extension / (2.0 * finger.segment_height)
+    angle = np.arctan(tangent_of(finger, found.extension)) if finger.has_walls else np.arcsin(sine)
     return Wells(
         found.exists,
         found.extension,
         found.barrier,
-        np.arcsin(opening / (2.0 * finger.segment_height)),
+        angle,
         _spring_barrier(finger),
         found.from_top,
         found.to_top,

@@ -4,6 +4,7 @@ Compare ratios within one run: states a second, and a map's time over the time t
 alone takes to write such a table.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from dpgcli.arrays import keep_freed_memory
 from dpgcli.design.scene import Scene
 from dpgcli.files.prediction import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
@@ -47,10 +49,14 @@ def note_rate(benchmark: Any, n_states: int) -> None:
     benchmark.extra_info["states_per_second"] = round(n_states / benchmark.stats["median"])
 
 
-def test_all_states_of_many_five_unit_designs(benchmark: Any) -> None:
+@pytest.mark.parametrize("walls", [0.0, 0.05], ids=["rigid walls", "walls"])
+@pytest.mark.parametrize("law", [PUBLISHED, PushOnly(PUBLISHED)], ids=["published", "push-only"])
+def test_all_states_of_many_five_unit_designs(benchmark: Any, law: DomeLaw, walls: float) -> None:
+    """Walls (0.05 mm/N, two thirds of 1/k_b) may cost half as much more."""
     keep_freed_memory()
     n_designs = lanes_at_once(5) // 32
     finger = varied_designs(5, n_designs)
+    finger = replace(finger, law=law, wall_compliance=np.array([[walls]]))
     inverted = np.tile(inverted_units(np.arange(32, dtype=np.uint64), 5), n_designs)
     designs = np.repeat(np.arange(n_designs), 32)
     benchmark(

@@ -1,4 +1,4 @@
-"""A couple on the end phalanx: closed forms of one unit, both coordinates, no term where it is 0."""
+"""A couple on the end phalanx: closed forms, both coordinates, and no term where it is 0."""
 
 from collections.abc import Callable
 from dataclasses import replace

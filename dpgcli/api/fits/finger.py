@@ -28,10 +28,10 @@ from dpgcli.calibration.choices import FITTED_BY_DEFAULT, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import KnownStates
-from dpgcli.calibration.observations import residual_unit, targets_for
+from dpgcli.calibration.observations import targets_for
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted, judged, quality_of
+from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
@@ -87,12 +87,7 @@ def fit_finger(
     source = DataFile(file=name_of(states), sha256=known.sha256, rows=known.patterns.shape[1])
     return fit_result(
         found,
-        {
-            **fitted(found, residual_unit(study.targets), source, only_free=True),
-            "quality": judged(study, quality_of(found, residual_unit(study.targets))),
-            "method": finger_method(study, found, bootstrap, seed),
-            "geometry": where,
-        },
+        {**finger_sections(study, found, source, bootstrap, seed), "geometry": where},
         value_rows(found),
         partial(finger_summary, study, found),
         (*study.judgments(found), *(() if where else (NO_GEOMETRY,))),

@@ -19,11 +19,10 @@ from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import Frame
-from dpgcli.calibration.observations import residual_unit
 from dpgcli.calibration.unit import unit_finger
 from dpgcli.design import geometry as rules
 from dpgcli.files.calibration import DataFile
-from dpgcli.files.calibration.results import finger_method, fitted
+from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import check_loads, read_states
 from dpgcli.files.sections import Geometry
@@ -83,11 +82,7 @@ def fit_unit(
     doubts = (ASSUMED_LEVER,) if lever is None and LEVER not in keys and has_pushes else ()
     return fit_result(
         found,
-        {
-            **fitted(found, residual_unit(met), source, only_free=True),
-            "method": finger_method(study, found, bootstrap, seed),
-            "geometry": at,
-        },
+        {**finger_sections(study, found, source, bootstrap, seed), "geometry": at},
         (columns, {name: values[is_free] for name, values in rows.items()}),
         partial(unit_summary, study, found),
         warned((*found.warnings, *doubts), at, known.unused),

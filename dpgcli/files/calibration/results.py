@@ -12,7 +12,7 @@ from dpgcli.calibration.choices import Branches, GridMethod, Quantity
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import GridLaw
-from dpgcli.calibration.observations import UNITS
+from dpgcli.calibration.observations import UNITS, residual_unit
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import FitError
 from dpgcli.files.calibration.models import (
@@ -36,7 +36,19 @@ def fitted(fit: Fit, unit: str, source: DataFile, *, only_free: bool = False) ->
     }
 
 
-def judged(study: FingerFit, quality: Quality) -> Quality:
+def finger_sections(
+    study: FingerFit, found: Fit, source: DataFile, resamples: int, seed: int
+) -> dict[str, object]:
+    """The sections on a fit to known states: its values, their errors and how they were found."""
+    unit = residual_unit(study.targets)
+    return {
+        **fitted(found, unit, source, only_free=True),
+        "quality": _judged(study, quality_of(found, unit)),
+        "method": finger_method(study, found, resamples, seed),
+    }
+
+
+def _judged(study: FingerFit, quality: Quality) -> Quality:
     """The quality of a finger's fit, with the errors of states predicted from the others."""
     known = study.left_out[np.isfinite(study.left_out)]
     if not len(known):

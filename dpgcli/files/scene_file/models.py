@@ -63,7 +63,8 @@ class FingerSpec(Section):
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,
         description="Where values come from that the lattice section leaves out: published, "
-        "a file of dpg fit, or a list of these, the first that has a value giving it.",
+        "finite_elements (with law: push_only, unless given), a file of dpg fit, or a list of "
+        "these, the first that has a value giving it.",
     )
     law: Literal["published", "tabulated", "push_only"] | None = Field(
         default=None,

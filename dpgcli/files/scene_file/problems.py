@@ -56,7 +56,8 @@ SHARED = {*Geometry.model_fields, *Lattice.model_fields} - {
 
 OWN = {
     "units": f"a whole number from 1 to {MAX_UNITS}",
-    "calibration": '"published", the name of a calibration file, or a list of these',
+    "calibration": '"published", "finite_elements", the name of a calibration file, or a list '
+    "of these",
     "law": '"published", "tabulated" or "push_only"',
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
     **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),

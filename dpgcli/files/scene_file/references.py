@@ -4,7 +4,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dpgcli.design.calibrations import PUBLISHED
+import dpgcli
+from dpgcli.design.calibrations import FINITE_ELEMENTS, PUBLISHED
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
@@ -14,14 +15,18 @@ from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
 from dpgcli.text import KeyPath
 
-EXPECTED = '"published" or the name of a calibration file'
-KEY = ("finger", "calibration")
+EXPECTED = '"published", "finite_elements" or the name of a calibration file'
+KEY, LAW = ("finger", "calibration"), ("finger", "law")
+SHIPPED = Path(dpgcli.__file__).parent / FINITE_ELEMENTS
+SHIPPED_FILES = ("domes.yaml", "units.yaml")
+SHIPPED_LAW = "push_only"  # that of its curve
 
 
 def with_calibrations(document: Document, folder: Path) -> Document:
     """The document with calibrations instead of their files' names, and those files.
 
-    Names are relative to the spec's folder, in `--set` to the current one. What is wrong in a
+    `finite_elements` names those that ship, and their law where the spec has none. Names are
+    relative to the spec's folder, in `--set` to the current one. What is wrong in a
     calibration joins the document's problems.
     """
     finger = document.data.get("finger")
@@ -30,15 +35,13 @@ def with_calibrations(document: Document, folder: Path) -> Document:
         return document
     origin = Path() if document.place(KEY) == SETTING else folder
     reader = _Reader(document, origin)
-    if isinstance(said, list):
-        value: Any = [reader.found((*KEY, place), part) for place, part in enumerate(said)]
-        if not said:
-            reader.wrong(KEY, "an empty list")
-    else:
-        value = reader.found(KEY, said)
+    value: Any = reader.listed(said) if isinstance(said, list) else reader.found(KEY, said)
     if reader.problems:  # what is wrong with the values is said once the files are right
         value = PUBLISHED
-    embedded = changed(document, {".".join(KEY): value})
+    changes = {".".join(KEY): value}
+    if FINITE_ELEMENTS in (said if isinstance(said, list) else [said]):
+        changes[".".join(LAW)] = document.data["finger"].get("law") or SHIPPED_LAW
+    embedded = changed(document, changes)
     problems = (*document.problems, *reader.problems)
     return replace(embedded, problems=problems, files=tuple(reader.files))
 
@@ -66,6 +69,11 @@ def recalibrated(document: Document, calibration: Calibration) -> Document:
     return replace(document, data={**document.data, "finger": changes})
 
 
+def _shipped(name: str) -> Calibration:
+    """One of the calibrations of the package."""
+    return read_calibration(SHIPPED / name).model_copy(update={"file": f"{FINITE_ELEMENTS}/{name}"})
+
+
 @dataclass
 class _Reader:
     """Reads calibrations by name, or as a table keeps them; what is wrong gathers."""
@@ -78,11 +86,20 @@ class _Reader:
     def wrong(self, path: KeyPath, found: str) -> None:
         self.problems.append(self.document.problem(path, EXPECTED, found))
 
+    def listed(self, said: list[object]) -> list[object]:
+        """The calibrations of a list."""
+        if not said:
+            self.wrong(KEY, "an empty list")
+        parts = [self.found((*KEY, place), part) for place, part in enumerate(said)]
+        return [one for part in parts for one in (part if isinstance(part, list) else [part])]
+
     def found(self, path: KeyPath, said: object) -> object:
-        """The calibration that is said; "published" remains."""
+        """The calibration that is said, or those of the package; "published" remains."""
         try:
             if isinstance(said, dict):
                 return calibration_in(self.document.section(path, said))
+            if said == FINITE_ELEMENTS:
+                return [_shipped(name) for name in SHIPPED_FILES]
             if isinstance(said, str) and said != PUBLISHED:
                 return self.named(path, said)
         except SpecError as error:

@@ -418,7 +418,7 @@ def test_what_a_table_keeps_is_checked_as_a_file_is(write, scene, problems, list
     assert f": {where}.curve.travel_mm.2: expected more than 3, found 2" in problem
 
 
-EXPECTED = 'expected "published" or the name of a calibration file'
+EXPECTED = 'expected "published", "finite_elements" or the name of a calibration file'
 
 
 @pytest.mark.parametrize(

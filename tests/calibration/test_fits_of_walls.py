@@ -163,7 +163,7 @@ def test_one_moment_does_not_tell_hinge_and_walls_apart(unit: KnownStates) -> No
     alone = unit.chosen(np.flatnonzero(unit.patterns[0] & (unit.moments == 0.0)))
     start = unit_finger(unit, 10.75)
     study = FingerFit(start, alone, Frame(), (HINGES, WALLS), (Target.ANGLES, Target.ANGLES))
-    with pytest.raises(FitError, match="apart.*rows with moment_N_mm, of a ground"):
+    with pytest.raises(FitError, match=r"apart.*rows with moment_N_mm, of a ground"):
         study.fit()
 
 
