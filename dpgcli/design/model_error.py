@@ -10,7 +10,7 @@ from dpgcli.design.dimensions import WALL_COMPLIANCE
 from dpgcli.design.footing import ELSEWHERE, MOVED, Case
 from dpgcli.design.outputs import Basis
 from dpgcli.design.problems import of_design
-from dpgcli.design.rules import SEGMENT_HEIGHT, Value
+from dpgcli.design.rules import HINGE_STIFFNESS, SEGMENT_HEIGHT, Value
 from dpgcli.design.scene import ORIGINS, UNKNOWN, ModelError
 
 CURLED = "shapes curl 13–24 % too far against finite elements"
@@ -19,11 +19,13 @@ WITH_HEIGHT = "shapes within 1–8 % of the deflection against finite elements"
 WITH_WALLS = "shapes within 1–6 % of the deflection against finite elements"
 WITH_BOTH = "shapes within 3–10 % of the deflection against finite elements"  # and a fitted height
 THE_REST = (
-    "pushes within about 10 %, inverted units' stiffness within 30 %, with walls fitted to them"
+    "pushes within about 10 %, inverted units' stiffness within 30 % (60 % if walls are fitted to "
+    "shapes)"
 )
 OTHER_WALLS = (
     "unknown for these walls; fitted ones bring shapes within 1–6 % of the deflection, pushes "
-    "within about 10 % and inverted units' stiffness within 30 % of finite elements"
+    "within about 10 % and inverted units' stiffness within 30 % of finite elements (60 % if they "
+    "are fitted to shapes)"
 )
 
 
@@ -44,7 +46,8 @@ def _of_walls(case: Case) -> ModelError:
         return UNKNOWN
     if case.has_fitted_walls:
         shapes = WITH_WALLS if case.has_geometric_height else WITH_BOTH
-        return ModelError(f"{shapes}{case.footings[WALL_COMPLIANCE].elsewhere}; {THE_REST}")
+        where = case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
+        return ModelError(f"{shapes}{where}; {THE_REST}")
     return ModelError(OTHER_WALLS)
 
 
@@ -58,7 +61,8 @@ def _of_height(case: Case) -> ModelError:
         return ModelError(f"{CURLED}{where}; {CALIBRATE}")
     if height.basis is not Basis.FITTED:
         return UNKNOWN
-    return ModelError(f"{WITH_HEIGHT}{height.elsewhere}; with a segment height fitted to them")
+    where = case.elsewhere(SEGMENT_HEIGHT.key)
+    return ModelError(f"{WITH_HEIGHT}{where}; with a segment height fitted to them")
 
 
 def _left_out(file: Calibration, known: KnownError, own: Sequence[Value], place: int) -> ModelError:

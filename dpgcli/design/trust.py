@@ -34,6 +34,7 @@ ASSUMED_AREA = (
 )
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
+WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
 DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
 
 
@@ -124,13 +125,13 @@ def _ground(case: Case) -> Trust:
     hinge = case.footings[HINGE_STIFFNESS.key]
     known = case.known_error(Output.GROUND, HINGE_STIFFNESS.key)
     if not known and hinge.basis in (Basis.FITTED, Basis.PUBLISHED):
-        known = f"within about 20 % of finite elements{hinge.elsewhere}"
+        known = f"within about 20 % of finite elements{case.elsewhere(hinge.key)}"
     return _checked(Trust(Output.GROUND, hinge.basis, known or UNKNOWN, str(hinge)), hinge)
 
 
 def _inverted(case: Case) -> Trust:
     if case.has_walls:
-        return _of_walls(case, Output.INVERTED, "within 30 % of finite elements")
+        return _of_walls(case, Output.INVERTED, WITH_WALLS)
     times = "6" if case.has_published_domes else "hundreds of" if case.pulls else "40–90"
     error = f"{times} times too stiff against finite elements"
     return _of_rigid_walls(case, Output.INVERTED, error)
@@ -154,7 +155,7 @@ def _of_walls(case: Case, output: Output, error: str) -> Trust:
     keys = (WALL_COMPLIANCE, BISTABLE_STIFFNESS.key, HINGE_STIFFNESS.key)
     lead, known = case.gravest(*keys), case.known_error(output, *keys)
     if not known and case.has_fitted_walls:
-        known = error + case.footings[WALL_COMPLIANCE].elsewhere
+        known = error + case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
     return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
 
 

@@ -253,7 +253,9 @@ def test_explain_of_a_space_without_a_design(call: Call, domes: Path) -> None:
     (domes / "sweep.yaml").write_text(text + "constraints: [unit_separation_mm > 9]\n")
     found = section(call("explain", "sweep.yaml").stdout, "What to trust")
     assert found == ["nothing: there is no design to solve"]
-    assert call("sweep", "sweep.yaml", *SERIAL, "--require", "n_stable > 0").exit_code == 5
+    for strict in ((), ("--strict",)):
+        done = call("sweep", "sweep.yaml", *SERIAL, "--require", "n_stable > 0", *strict)
+        assert done.exit_code == ExitCode.NOTHING_SELECTED
 
 
 def test_the_summary_of_predict_has_the_warnings(call: Call, domes: Path) -> None:
