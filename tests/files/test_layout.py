@@ -46,6 +46,11 @@ def body(separator: str, decimal: str = ".", group: str = "", quote: str = "") -
     return "".join(separator.join(map(spelled, row)) + "\n" for row in ROWS)
 
 
+def labeled(rows: str, separator: str = "\t") -> str:
+    """Rows behind a label each, whose parts blanks would part."""
+    return "".join(f"Dome {n}{separator}{row}\n" for n, row in enumerate(rows.splitlines()))
+
+
 @pytest.mark.parametrize(
     "content",
     [
@@ -61,9 +66,17 @@ def body(separator: str, decimal: str = ".", group: str = "", quote: str = "") -
         "Ext;Load\n" + body(";", ",", "\u202f"),
         "Ext;Load;\n;;\n" + body(";", ",").replace("\n", ";\n"),
         "Ext\tLoad\n" + body("\t", ","),
+        "Ext\tLoad\n" + body("\t", ".", "\u00a0"),
+        "Ext\tLoad\n" + body("\t", ",", "\u202f"),
+        "No.\tExt\tLoad\n" + labeled(body("\t")),
+        "No.\tExt (um)\tLoad (N)\n" + labeled(body("\t", ",")),
+        '"No. 1"\tExt\tLoad\n' + labeled(body("\t", quote='"')),
+        "No.,\tExt,\tLoad\n" + labeled(body(",\t"), ",\t"),
         "Ext|Load\n" + body("|"),
         "Ext Load\n" + body(" "),
         "  Ext     Load  \n" + body("   ", ","),
+        "Ext  Load\n" + body("  ", ".", "\u00a0"),
+        "Ext Load\n" + body(" ", ",", "\u202f"),
         '"Ext\n(um)";"Load\n(N)"\n' + body(";", ","),
         "Ext,Load\n(um),(N)\n\n" + body(","),
         "Probe 1;Dome, Nr. 3\nDatum;26.11.2026\n\nExt;Load\num;N\n" + body(";", ","),
@@ -188,6 +201,10 @@ def test_marks(cells: list[str], separator: str, decimal: str, grouping: str) ->
         (["a;b", "0,5;1,5"], ";"),
         (["variant,x", '"base (1 mm, 0.75 mm)",5', "fine mesh,6"], ","),
         (["x", "1", "2"], ","),
+        (["No.\tx\ty", "Dome 1\t0.1\t2"], "\t"),
+        (["Dome\tNo.\tSet\tF", "a b\tNo. 3\tc d\t1,5"], "\t"),
+        (["x,\ty", "1,\t2"], ","),
+        (['x,"a\tb"', '1,"c\td"'], ","),
         (["x y", "1 2"], " "),
     ],
 )
