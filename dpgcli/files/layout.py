@@ -16,7 +16,9 @@ from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
 SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more
-BLANKS = re.compile(" +"), re.compile("  +")  # no tabs, and none that group thousands
+BLANKS = re.compile("  +")  # no tabs, and none that group thousands
+IN_BRACKETS = r"[\[(<][^\[\]()<>]{0,30}[\])>]"
+WORD = re.compile(f"{IN_BRACKETS}|[^ ]+(?: {IN_BRACKETS})?")  # a title has its unit behind it
 PARTED = "\x1f"  # between cells that blanks part: a tab may stand within one
 QUOTED = re.compile('"[^"]*"')
 SAMPLE = 200  # of the last lines, which are of the table
@@ -89,7 +91,9 @@ class _Lines:
 
 def _parted(text: str, separator: str) -> str:
     """A line with a mark where the blanks between its cells were."""
-    return text if separator.strip(" ") else BLANKS[len(separator) - 1].sub(PARTED, text)
+    if separator == " ":
+        return PARTED.join(WORD.findall(text))
+    return text if separator.strip(" ") else BLANKS.sub(PARTED, text)
 
 
 def rows_in(

@@ -77,6 +77,9 @@ def labeled(rows: str, separator: str = "\t") -> str:
         "  Ext     Load  \n" + body("   ", ","),
         "Ext  Load\n" + body("  ", ".", "\u00a0"),
         "Ext Load\n" + body(" ", ",", "\u202f"),
+        "Ext (um) Load [N]\n" + body(" "),
+        "No.  Ext (um) Load\n[] (um) [N]\n"
+        + labeled(body(" ")).replace("Dome ", "").replace("\t", " "),
         '"Ext\n(um)";"Load\n(N)"\n' + body(";", ","),
         "Ext,Load\n(um),(N)\n\n" + body(","),
         "Probe 1;Dome, Nr. 3\nDatum;26.11.2026\n\nExt;Load\num;N\n" + body(";", ","),
@@ -104,6 +107,11 @@ def test_whatever_the_program_the_numbers_are_the_same(read: Read, content: str 
         ('Ext,Load\n1,2\n3,4\n"5,5",6\n', '4: travel_mm: expected a number, found "5,5" (write'),
         ("Ext,Load\n0,5,1\n1,5,2\n", "2: row: expected 2 cells, found 3"),
         ("Ext,Load\n0,5,\n1,5\n", "2: row: expected 2 cells, found 3"),
+        ("Ext,Load,\n0,0,5,\n1,5,25,\n", "1: header: expected a title for column 3, found none"),
+        (",Ext,,Load\n0,0,5,1\n1,1,0,2\n", "1: header: expected a title for column 3, found non"),
+        ("Ext Load cell F\n1 2 3\n2 3 4\n", "1: header: expected 3 titles, as many as cells below"),
+        ("Ext,Ext, Load,F\n1,2,3\n2,3,4\n", "1: header: expected 3 titles, as many as cells below"),
+        ("Ext in um Load in N T\n1 2 3\n", "1: header: expected 3 titles, as many as cells below"),
         ("Ext,Load\n0,5,\n", "2: row: expected 2 cells, found 3"),
         ("Ext,Load,Ext,Load\n0,5,0,6\n", '1: header: expected each column once, found "Ext" again'),
         ("Ext,Load\n0,5\n1,6\nEnd of test\n", "4: row: expected 2 cells, found 1"),
@@ -167,6 +175,11 @@ def test_a_column_that_no_row_has_is_none(read: Read) -> None:
     assert problems(read, "Comment\tExt\tLoad\n0.5\t5\n1.5\t6\n")[0].startswith(
         "2: row: expected 3"
     )
+
+
+def test_an_index_without_a_title_is_no_column_of_decimals(read: Read) -> None:
+    assert read(",Ext,Load\n0,0.5,5\n1,1.5,6\n").curve.travel.tolist() == [0.5, 1.5]
+    assert read("Ext;Load;\n0,5;5;1\n1,5;6;2\n").curve.travel.tolist() == [0.5, 1.5]
 
 
 def test_line_breaks_in_quotes_do_not_move_lines(read: Read) -> None:
