@@ -3,6 +3,7 @@
 import hashlib
 import io
 import math
+from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -284,7 +285,7 @@ def _untitled(sheet: Sheet, places: Sequence[int], header: int) -> Iterator[Prob
 
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Location(sheet.file, header)
-    for name in dict.fromkeys(n for n in sheet.names if n and sheet.names.count(n) > 1):
+    for name in (name for name, count in Counter(sheet.names).items() if name and count > 1):
         yield located(top, "header", "each column once", f"{shown(name)} again")
     longest = max(map(len, sheet.rows), default=0)
     if sheet.titles and sheet.separator != "\t" and 0 < longest < len(sheet.names):

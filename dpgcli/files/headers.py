@@ -50,6 +50,7 @@ def headed(
     names = _named(titles, found)
     needed = {*found} | {n for n in names if n in wanted}
     n_names = _width(names, below, needed if may_be_longer else names)
+    first = next((place for place, title in enumerate(titles) if title), 0)
     said = {name: unit for name, unit in zip(names, _units(titles, units), strict=True) if unit}
     return Head(
         tuple(names[:n_names]),
@@ -58,7 +59,7 @@ def headed(
         said,
         {name: titles[column] for name, (column, _) in found.items()},
         frozenset(name for name, (_, is_reversed) in found.items() if is_reversed),
-        tuple(place for place in range(n_names) if any(titles[:place]) and not titles[place]),
+        tuple(place for place in range(first, n_names) if not titles[place]),
     )
 
 
@@ -89,7 +90,12 @@ def _place(titles: Sequence[str], source: str) -> int | None:
     for known in (titles, bare_titles):
         if source in known:
             return known.index(source) if list(known).count(source) == 1 else None
-    is_place = source.isascii() and source.isdigit() and 1 <= int(source) <= len(titles)
+    is_place = (
+        source.isascii()
+        and source.isdigit()
+        and len(source) < 7
+        and 1 <= int(source) <= len(titles)
+    )
     return int(source) - 1 if is_place else None
 
 

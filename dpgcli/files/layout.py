@@ -22,11 +22,11 @@ WORD = re.compile(f"{IN_BRACKETS}|[^ ]+(?: {IN_BRACKETS})?")  # a title has its 
 PARTED = "\x1f"  # between cells that blanks part: a tab may stand within one
 QUOTED = re.compile('"[^"]*"')
 SAMPLE = 200  # of the last lines, which are of the table
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?", re.ASCII)
 GROUPED = re.compile(r"[-+]?[1-9][0-9]{0,2}([.,'\u00a0\u202f])[0-9]{3}(?:\1[0-9]{3})*", re.ASCII)
 LOOSE = ("'", "\u00a0", "\u202f")  # which can be nothing but groups
 ANY_MARK = re.compile(
-    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*[.,]?[0-9]*|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
+    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
     re.ASCII,
 )
 

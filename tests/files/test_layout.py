@@ -1,20 +1,25 @@
 """Curves as other programs write them: each gives the same numbers, or a question."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dpgcli.errors import SpecError
+from dpgcli.calibration.opening import parse_number
+from dpgcli.cli.options import millimeters
+from dpgcli.errors import SpecError, UsageError
 from dpgcli.files.csv_file import Choice, read_sheet
-from dpgcli.files.layout import marks_in, separator_of
+from dpgcli.files.layout import NUMBER, is_number, marks_in, separator_of
 from dpgcli.files.measured import CURVE, Measured, read_curve
 from dpgcli.files.units import FACTORS, OWN, factor_of
 
 NAMED = Choice({"travel_mm": "Ext", "force_N": "Load"})
 TRAVEL, FORCE = [0.0, 0.5, 1.25, 1234.5], [0.25, 10.5, 1200.0, -3.75]
 ROWS = list(zip(TRAVEL, FORCE, strict=True))
+LONG = 40_000
+MANY = "9" * LONG
 UNITS = {"travel": "um", "force": "N"}
 Read = Callable[..., Measured]
 
@@ -180,6 +185,27 @@ def test_a_column_that_no_row_has_is_none(read: Read) -> None:
 def test_an_index_without_a_title_is_no_column_of_decimals(read: Read) -> None:
     assert read(",Ext,Load\n0,0.5,5\n1,1.5,6\n").curve.travel.tolist() == [0.5, 1.5]
     assert read("Ext;Load;\n0,5;5;1\n1,5;6;2\n").curve.travel.tolist() == [0.5, 1.5]
+
+
+@pytest.mark.parametrize("cell", [MANY + "x", MANY + "." + MANY + "x", "1,234" * LONG + "x"])
+def test_a_long_cell_is_read_as_fast_as_a_long_file(read: Read, cell: str) -> None:
+    """The time grows with its length, not with the square: that would be minutes."""
+    begin = time.process_time()
+    assert problems(read, f'Ext,Load\n0,5\n"{cell}",6\n1,2\n')
+    assert problems(read, f"Ext Load\n0 5\n1 6 {cell.replace(',', '.')}\n")
+    assert not is_number(cell)
+    assert NUMBER.fullmatch(cell) is None
+    assert parse_number(cell) is None
+    with pytest.raises(UsageError):
+        millimeters("--target-error", f"{cell}-")
+    assert time.process_time() - begin < 5.0
+
+
+def test_a_wide_header_is_read_as_fast_as_a_long_file(read: Read) -> None:
+    begin = time.process_time()
+    assert problems(read, "Ext" + ",a" * LONG + "\n1\n")
+    assert problems(read, "Ext" + "\t" * LONG + "a\n1\n")
+    assert time.process_time() - begin < 5.0
 
 
 def test_line_breaks_in_quotes_do_not_move_lines(read: Read) -> None:
