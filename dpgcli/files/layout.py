@@ -8,7 +8,7 @@ import csv
 import re
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from dpgcli.errors import Problem
 from dpgcli.files.places import Location, located
@@ -16,12 +16,17 @@ from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
 SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more
+BLANKS = re.compile("  +")  # no tabs, and none that group thousands
+IN_BRACKETS = r"[\[(<][^\[\]()<>]{0,30}[\])>]"
+WORD = re.compile(f"{IN_BRACKETS}|[^ ]+(?: {IN_BRACKETS})?")  # a title has its unit behind it
+PARTED = "\x1f"  # between cells that blanks part: a tab may stand within one
+QUOTED = re.compile('"[^"]*"')
 SAMPLE = 200  # of the last lines, which are of the table
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?", re.ASCII)
 GROUPED = re.compile(r"[-+]?[1-9][0-9]{0,2}([.,'\u00a0\u202f])[0-9]{3}(?:\1[0-9]{3})*", re.ASCII)
 LOOSE = ("'", "\u00a0", "\u202f")  # which can be nothing but groups
 ANY_MARK = re.compile(
-    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*[.,]?[0-9]*|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
+    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
     re.ASCII,
 )
 
@@ -85,10 +90,10 @@ class _Lines:
 
 
 def _parted(text: str, separator: str) -> str:
-    """A line with tabs where the blanks between its cells were."""
-    if separator.strip() or separator == "\t":
-        return text
-    return re.sub(r"\s{2,}" if len(separator) > 1 else r"\s+", "\t", text.strip())
+    """A line with a mark where the blanks between its cells were."""
+    if separator == " ":
+        return PARTED.join(WORD.findall(text))
+    return text if separator.strip(" ") else BLANKS.sub(PARTED, text)
 
 
 def rows_in(
@@ -99,7 +104,7 @@ def rows_in(
     Without comments, as a data frame is, rows of empty cells count.
     """
     source = _Lines(lines, separator, has_comments)
-    mark = separator if separator.strip() else "\t"
+    mark = separator if separator.strip(" ") else PARTED
     reader = csv.reader(source, delimiter=mark, skipinitialspace=True, strict=True)
     rows: list[Row] = []
     problems: list[Problem] = []
@@ -123,14 +128,18 @@ def _in_one_line(cell: str) -> str:
 
 
 def separator_of(lines: Sequence[str]) -> str:
-    r"""What parts the cells: that by which the last lines have the most numbers.
+    r"""What parts the cells: tabs, or that by which the last lines have the most numbers.
 
     >>> separator_of(["Kraft in N;Weg", "0,5;1,5"]), separator_of(["a\tb", "1\t2"])
     (';', '\t')
     >>> separator_of(["a b", "1  2.5"]), separator_of(["a", "1"])
     ('  ', ',')
+    >>> separator_of(["No.\tForce", "Dome 1\t2"])  # by blanks it has as many numbers
+    '\t'
     """
     last = [line for line in lines if line.strip()][-SAMPLE:]
+    if 2 * sum(map(_has_tab_between_cells, last)) > len(last):
+        return "\t"
 
     def score(separator: str) -> int:
         rows, _ = rows_in(last, separator)
@@ -140,6 +149,12 @@ def separator_of(lines: Sequence[str]) -> str:
         return 2 * n_numbers - len(cells)
 
     return max(SEPARATORS, key=score)
+
+
+def _has_tab_between_cells(line: str) -> bool:
+    """Whether a tab parts two cells, rather than stand in one or beside another separator."""
+    parts = [part for cell in QUOTED.sub("q", line).split("\t") if (part := cell.strip())]
+    return any(a[-1] not in ",;|" and b[0] not in ",;|" for a, b in pairwise(parts))
 
 
 def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str]) -> int:

@@ -15,7 +15,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
-from dpgcli.files.table_reader import read_designs, read_record
+from dpgcli.files.table_reader import designs_in, read_designs, read_record
 
 N = 4
 COLUMNS: dict[str, Any] = {
@@ -104,6 +104,23 @@ def test_text_is_text_and_nothing_is_empty(tmp_path: Path, kind: Any) -> None:
 def test_columns_that_nobody_can_use_are_left_out(tmp_path: Path) -> None:
     found = read(tmp_path, **NOT_NUMBERS)
     assert list(found) == list(COLUMNS)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        sorted(COLUMNS),
+        list(reversed(COLUMNS)),
+        ["status", "design", "n_stable", "calibration", "height_mm", "reason", "reach_max_mm"],
+    ],
+)
+def test_columns_may_stand_in_any_order(tmp_path: Path, order: list[str]) -> None:
+    pq.write_table(pa.table(COLUMNS).select(order), tmp_path / "t.parquet")
+    found = read_designs(tmp_path / "t.parquet")[0]
+    assert list(found)[:3] == ["design", "height_mm", "calibration"]
+    assert found.keys() == COLUMNS.keys()
+    with_notes = pa.table({**COLUMNS, "notes": ["a"] * N}).select([*reversed(order), "notes"])
+    assert list(designs_in(with_notes, "t")[0])[:3] == ["design", "height_mm", "calibration"]
 
 
 @pytest.mark.parametrize("reasons", [["", "", "", "no such finger"], [""] * N])

@@ -127,10 +127,16 @@ def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Mod
     return Model("hinge", deck, words, len(mesh.nodes), 1.0, outcome)
 
 
-def unit_model(chambers: Chambers, push: Push, fineness: str, largest_moment: float) -> Model:
+def unit_model(
+    chambers: Chambers,
+    push: Push,
+    fineness: str,
+    largest_moment: float,
+    shares: Sequence[float] = SHARES,
+) -> Model:
     """A gap on the ground and pushed open, at rest and under end couples up to a moment (N mm)."""
     mesh = pushed_bricks(chambers, PUSHED_CELLS[fineness], 2)
-    moments = [share * largest_moment for share in SHARES]
+    moments = [share * largest_moment for share in shares]
     steps = (
         *(Step((False,), moment) for moment in moments),
         *(Step((True,), moment) for moment in (0.0, *moments)),

@@ -2,7 +2,8 @@
 
 What stands for a dome is one spring between its apex and the mean position of a patch of the
 neighbor's wall, so that the push can turn freely. The apex lies the dome's height behind the lid
-that bears the dome, as at rest, and shifts and turns with the lid; the spring is a stroke too long.
+that bears the dome, as at rest, and shifts and turns with chamber and lid; the spring is a stroke
+too long.
 """
 
 from dataclasses import dataclass
@@ -97,15 +98,20 @@ class End:
 
 
 def apex(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> End:
-    """The apex of the dome before a gap, counted from 0; nodes of the lid within W_c/2 of its axis.
+    """The apex of the dome before a gap, counted from 0.
 
-    So far the dome's annulus reaches, out to the walls.
+    It shifts with the lid within W_c/2 of the dome's axis, as far as the dome's annulus reaches,
+    and turns with the upper and lower edges of the chamber's side.
     """
     lid = gap * chambers.pitch + chambers.outer_length
-    nodes = _disc(chambers, mesh, lid, 0.5)
-    up = mesh.nodes[nodes, 1] - _axis(chambers)
-    place = np.array([lid - push.dome_height, _axis(chambers), 0.0])
-    return End(place, nodes, _equal(nodes), push.dome_height * up / (up @ up))
+    disc, edges = _disc(chambers, mesh, lid, 0.5), _side_edges(chambers, mesh, gap)
+    up = mesh.nodes[edges, 1] - _axis(chambers)
+    return End(
+        place=np.array([lid - push.dome_height, _axis(chambers), 0.0]),
+        nodes=np.concatenate([disc, edges]),
+        shifts=np.concatenate([_equal(disc), np.zeros(len(edges))]),
+        turns=np.concatenate([np.zeros(len(disc)), push.dome_height * up / (up @ up)]),
+    )
 
 
 def patch(chambers: Chambers, mesh: Bricks, gap: int) -> End:
@@ -159,6 +165,17 @@ def _disc(chambers: Chambers, mesh: Bricks, place: float, radius: float) -> Indi
     """Nodes on a plane across the domes' axis, about it; the radius over the chamber's width."""
     away = np.hypot(mesh.nodes[:, 1] - _axis(chambers), mesh.nodes[:, 2])
     return np.flatnonzero(on_plane(mesh, 0, place) & (away < (radius + 1e-9) * chambers.width))
+
+
+def _side_edges(chambers: Chambers, mesh: Bricks, number: int) -> Indices:
+    """Nodes of a chamber's outer side on a level with its inner roof and with its floor."""
+    start, end = number * chambers.pitch, number * chambers.pitch + chambers.outer_length
+    slack = 1e-9 * end
+    is_along = (mesh.nodes[:, 0] > start - slack) & (mesh.nodes[:, 0] < end + slack)
+    is_outside = on_plane(mesh, 2, chambers.width / 2 + WALL_THICKNESS)
+    floor = chambers.layer_thickness
+    is_edge = on_plane(mesh, 1, floor) | on_plane(mesh, 1, floor + chambers.width)
+    return np.flatnonzero(is_along & is_outside & is_edge)
 
 
 def _equal(nodes: Indices) -> Array:

@@ -20,9 +20,10 @@ from dpgcli.calibration.fe.hinge import Chambers, end_couple, on_plane
 from dpgcli.calibration.fe.pushed import End, Push, apex, clamped, loaded, patch
 from dpgcli.design.geometry import WALL_THICKNESS
 
-OFF, SLACK, ON = 0.0, 1.0, 2.0
+OFF, SLACK, ON = 0.0, 0.02, 1.0
 """Temperatures of a spring that is not there, that is as long as at rest, and that pushes. They are
-no temperatures of the chambers, which do not expand."""
+no temperatures of the chambers, which do not expand. What opens the gap is the way from slack to
+on, nearly all of a step; a spring of little stiffness would open it at once."""
 
 LONGEST = 10.0
 """Largest elongation of a spring over its length at rest, where its table ends."""
@@ -80,8 +81,8 @@ def pushed_words(chambers: Chambers, push: Push, n_chambers: int) -> tuple[str, 
         "reduced integration, large displacements.",
         f"An inverted dome is a spring of {push.stiffness:g} N/mm and {length:g} mm, "
         f"{push.stroke:g} mm too long, on the dome's axis: from its apex,",
-        f"{push.dome_height:g} mm behind the lid and rigid with it, to the middle of a patch "
-        "of the neighbor's wall.",
+        f"{push.dome_height:g} mm behind the lid and moving with it, to the middle of a patch of "
+        "the neighbor's wall.",
         "The first chamber's face at x = 0 is clamped.",
     )
 
@@ -107,7 +108,7 @@ def _equation_lines(node: int, axis: int, end: End, turns: Array) -> Iterator[st
     shifts = zip(end.nodes.tolist(), end.shifts.tolist(), strict=True)
     turned = zip(end.nodes.tolist(), turns.tolist(), strict=True)
     terms = [
-        *((other + 1, axis, weight) for other, weight in shifts),
+        *((other + 1, axis, weight) for other, weight in shifts if weight),
         *((other + 1, 3 - axis, weight) for other, weight in turned if weight),
     ]
     yield "*EQUATION"
@@ -129,7 +130,7 @@ def _law_lines(chambers: Chambers, push: Push) -> Iterator[str]:
         for elongation in (-length, LONGEST * length):
             force = stiffness / 2 * (elongation - stroke)
             # reals with a point: CalculiX tells numbers of springs from degrees of freedom by it
-            yield f"{force:.9f}, {elongation:.9f}, {temperature:.1f}"
+            yield f"{force:.9f}, {elongation:.9f}, {temperature:.2f}"
 
 
 def _step_lines(step: Step, forces: Array, *, is_snap: bool) -> Iterator[str]:

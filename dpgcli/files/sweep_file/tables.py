@@ -120,7 +120,7 @@ def _csv(content: bytes) -> pd.DataFrame:
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
             content = _without_ends(content, separator)
-            if re.search(re.escape(mark.encode()) + rb"[ \t]*(\n|\Z)", content):
+            if re.search(re.escape(mark.encode()) + rb" *(\n|\Z)", content):
                 _check_rows(content, mark)  # pandas drops an empty cell too many
             stream = io.BytesIO(content)
             return pd.read_csv(stream, index_col=False, sep=parted, decimal=decimal)

@@ -54,7 +54,7 @@ def test_the_deck_pushes_one_gap_after_the_other() -> None:
     model = finger_model(CHAMBERS, PUSH, "coarse", ALL)
     lines = model.deck.splitlines()
     steps = [i for i, line in enumerate(lines) if line == "*TEMPERATURE"]
-    patterns = ["".join("01"[line.endswith(" 2")] for line in lines[i + 1 : i + 4]) for i in steps]
+    patterns = ["".join("01"[line.endswith(" 1")] for line in lines[i + 1 : i + 4]) for i in steps]
     assert patterns == ["001", "011", "010", "110", "111", "101", "100"]
     assert "*CLOAD" not in lines
     assert model.end == 7
