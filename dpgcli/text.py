@@ -1,6 +1,7 @@
 """Text from outside made fit to print: nothing in it moves a cursor or ends a line."""
 
 import re
+from collections.abc import Sequence
 
 KeyPath = tuple[str | int, ...]
 
@@ -59,6 +60,15 @@ def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     """
     head = printable(text[: limit + 1])
     return head if len(head) <= limit else head[: limit - 3] + "..."
+
+
+def enumerated(words: Sequence[str]) -> str:
+    """Words as a sentence has them.
+
+    >>> enumerated(["a"]), enumerated(["a", "b", "c"])
+    ('a', 'a, b and c')
+    """
+    return " and ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
 
 def counted(number: int, what: str) -> str:

@@ -1,12 +1,15 @@
 """What all tests need."""
 
+import compileall
 import signal
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
+import dpgcli
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 
@@ -17,6 +20,12 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup would have ignored
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the package once: where Python writes no bytecode, each of many processes would."""
+    if not hasattr(config, "workerinput"):
+        compileall.compile_dir(Path(dpgcli.__file__).parent, quiet=2)
 
 
 @pytest.fixture(scope="session")

@@ -77,6 +77,8 @@ COMMANDS = {
     "fit grid": grid,
     "fe dome": fe.dome,
     "fe hinge": fe.hinge,
+    "fe unit": fe.unit,
+    "fe finger": fe.finger,
 }
 PAGES = {"README": ROOT / "README.md"} | {
     path.stem: path for path in sorted((ROOT / "dpgcli" / "manual").glob("*.md"))

@@ -7,21 +7,24 @@ from typing import Any, TypeAlias
 
 from dpgcli.api.inputs import as_texts, path_of
 from dpgcli.api.tables import Table
-from dpgcli.arrays import Columns
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.frames import frame_of
-from dpgcli.files.table_reader import designs_in, read_designs
+from dpgcli.files.table_reader import DesignTable, designs_in, read_designs
 from dpgcli.sweeps.gate import RequirementVerdict, check_designs
 
 DesignsInput: TypeAlias = str | Path | Table | Any
 """The designs.parquet of a sweep, or its content: of pandas, of Arrow, or a Table."""
 
 
-def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[RequirementVerdict, ...]:
+def check(
+    designs: DesignsInput, require: str | Sequence[str], *, strict: bool = False
+) -> tuple[RequirementVerdict, ...]:
     """Test every design of a table against requirements, one verdict each.
 
-    Raises UsageError for what is no table of designs or no requirement, NothingSelectedError
-    where every design is excluded.
+    A verdict's `warnings` say which columns rest on what no design should be judged by, as far as
+    the table says what they rest on. Raises UsageError for what is no table of designs or no
+    requirement, and where it is `strict` instead of such a warning; NothingSelectedError where
+    every design is excluded.
 
     >>> designs = {"design": [0, 1], "height_mm": [5.5, 6.5], "calibration": ["given"] * 2,
     ...            "status": ["stable"] * 2, "reason": [""] * 2, "n_stable": [8, 8]}
@@ -32,11 +35,12 @@ def check(designs: DesignsInput, require: str | Sequence[str]) -> tuple[Requirem
     requirements = as_texts("require", require)
     if not requirements:
         raise UsageError(Field("require"), ": expected one requirement or more")
-    return check_designs(designs_of(designs)[0], requirements)
+    table = designs_of(designs)
+    return check_designs(table.columns, requirements, table.trusts, strict=strict)
 
 
-def designs_of(designs: DesignsInput) -> tuple[Columns, dict[str, str]]:
-    """The columns of a table of designs, and the unit of each."""
+def designs_of(designs: DesignsInput) -> DesignTable:
+    """A table of designs, with what it says of its columns."""
     if isinstance(designs, str | os.PathLike):
         return read_designs(path_of("designs", designs))
     import pyarrow as pa

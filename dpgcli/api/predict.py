@@ -19,6 +19,7 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
+from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.states import predict as states
@@ -52,6 +53,16 @@ class PredictResult:
     def summary(self) -> Summary:
         """Counts by status, largest residual (N) and tip error (mm), times (s)."""
         return self.prediction.summary
+
+    @property
+    def trusts(self) -> tuple[Trust, ...]:
+        """What each kind of output rests on; none of values without a spec."""
+        return self.plan.trusts
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the calibrations in use."""
+        return self.plan.warnings
 
     @cached_property
     def table(self) -> Table:

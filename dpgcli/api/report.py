@@ -10,7 +10,7 @@ from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_reader import read_designs
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.summary import DesignSpace, doubts
 from dpgcli.studies.sweep import DESIGNS, REPORT
 
 PAGES = {".md": markdown, ".html": html}
@@ -23,11 +23,12 @@ def silent(_: str) -> None:
     """Say nothing."""
 
 
-def report(folder: str | Path, *, format: str = "md") -> str:
+def report(folder: str | Path, *, format: str = "md", strict: bool = False) -> str:
     """Summarize the design space in a sweep's folder: what is best, what failed and why.
 
-    A page of Markdown ("md"), or of HTML that needs no other file ("html").
-    Raises UsageError for another format, or where the folder has no table of designs.
+    A page of Markdown ("md"), or of HTML that needs no other file ("html"). It says what each
+    output rests on. Raises UsageError for another format, or where the folder has no table of
+    designs; where it is `strict`, also if a ranking is by what no design should be judged by.
 
     >>> report("nowhere")
     Traceback (most recent call last):
@@ -36,14 +37,26 @@ def report(folder: str | Path, *, format: str = "md") -> str:
     """
     if f".{format}" not in PAGES:
         raise UsageError(Field("format"), f" {format!r}: expected md or html")
-    return page(path_of("folder", folder), f".{format}")[1]
+    return page(path_of("folder", folder), f".{format}", strict=strict)[1]
 
 
-def page(folder: Path, kind: str) -> tuple[DesignSpace, str]:
+def page(folder: Path, kind: str, *, strict: bool = False) -> tuple[DesignSpace, str]:
     """The design space in a folder, and its page: the same for the same table."""
-    designs, units = read_designs(folder / DESIGNS)
-    space = DesignSpace(designs, units, read_metadata(folder / DESIGNS))
+    table = read_designs(folder / DESIGNS)
+    space = DesignSpace(table.columns, table.units, read_metadata(folder / DESIGNS), table.trusts)
+    if strict:
+        _check_ranking(space)
     return space, PAGES[kind](space)
+
+
+def _check_ranking(space: DesignSpace) -> None:
+    if not space.trusts:
+        where = " needs a table that says what its columns rest on, as dpg sweep writes it"
+        raise UsageError(Field("strict"), where)
+    if found := doubts(space):
+        raise UsageError(
+            Field("strict"), " allows no ranking by what is doubted:\n", "\n".join(found)
+        )
 
 
 def summarize(folder: Path, *, is_new: bool) -> tuple[DesignSpace, str]:

@@ -3,23 +3,33 @@
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any
 
 from dpgcli.api.given import SweepInput, sweep_input
-from dpgcli.api.inputs import Settings, check_numbers, check_whole, path_of, setting_texts
+from dpgcli.api.inputs import (
+    Settings,
+    as_texts,
+    check_numbers,
+    check_whole,
+    path_of,
+    setting_texts,
+)
 from dpgcli.api.report import Say, silent, summarize
 from dpgcli.api.tables import Table
 from dpgcli.cores import cores
-from dpgcli.errors import Field, UsageError
+from dpgcli.errors import Field, Message, UsageError
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.table_reader import read_undamaged
+from dpgcli.files.trust import warnings_in
 from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.summary import doubts as ranked_doubts
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
+from dpgcli.states.columns import Kind
 from dpgcli.studies.run import run
 from dpgcli.studies.sweep import (
     DESIGNS,
@@ -35,6 +45,14 @@ from dpgcli.studies.sweep import (
 )
 from dpgcli.sweeps import cluster, executors, pool
 from dpgcli.sweeps.executors import Backend
+from dpgcli.sweeps.expressions import Expression
+from dpgcli.sweeps.gate import (
+    RequirementVerdict,
+    check_beyond_doubt,
+    check_requirements,
+    doubts,
+    requirement,
+)
 from dpgcli.temporary import temporary_folder
 
 EXECUTORS = ("processes", "serial", "dask")
@@ -46,7 +64,8 @@ class SweepResult:
     """The tables of a sweep, read when asked for; of a shard there are none before `merge`.
 
     `n_failed` designs killed their worker, twice. `report` is the page on the space, `space` what
-    it was made of; `fingerprint` is that of all the tables depend on.
+    it was made of; `fingerprint` is that of all the tables depend on. `verdicts` are on what was
+    required.
     """
 
     folder: Path
@@ -54,6 +73,15 @@ class SweepResult:
     n_failed: int
     report: str = ""
     space: DesignSpace | None = None
+    verdicts: tuple[RequirementVerdict, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Of calibrations in use, and of requirements and rankings by what is doubted."""
+        if self.space is None:
+            return ()
+        required = (warning for verdict in self.verdicts for warning in verdict.warnings)
+        return (*warnings_in(self.space.metadata), *required, *ranked_doubts(self.space))
 
     @cached_property
     def designs(self) -> Table:
@@ -95,6 +123,8 @@ def sweep(
     shard: str | Shard | None = None,
     restart: bool = False,
     force: bool = False,
+    require: str | Sequence[str] = (),
+    strict: bool = False,
     watch: Callable[[Progress], None] = lambda progress: None,
 ) -> SweepResult:
     """Evaluate every design of a space: `sweep` is its file, or the data of one.
@@ -116,11 +146,12 @@ def sweep(
     """
     place = Place(executor, jobs, scheduler, wait)
     part = shard_of(shard)
-    if output is None and part is not None:
-        raise UsageError("a ", Field("shard"), " is kept in a folder: give ", Field("output"))
+    if part is not None:
+        _check_part(output, require)
     with _folder(output) as folder:
         study = study_of(sweep, folder, settings, tolerance, target_error)
         check_not_read(study.sweep.files, [path for path, _ in outputs(folder)])
+        rules, _ = rules_of(study, require, strict=strict)
         with sole_use(folder):
             drop_half_written(folder)
             is_new = run(
@@ -134,7 +165,7 @@ def sweep(
                 warn=silent,
                 tell=silent,
             )
-            result = _result(study, part, is_new)
+            result = _result(study, part, is_new, rules)
         if output is None:
             _ = result.designs, result.states  # before their folder goes
     return result
@@ -149,10 +180,24 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
         yield folder / "output"  # which is locked, as the folder is
 
 
-def _result(study: Study, part: Shard | None, is_new: bool) -> SweepResult:
+def _check_part(output: str | Path | None, require: str | Sequence[str]) -> None:
+    """Raise UsageError for what a shard has no place or no table for."""
+    if output is None:
+        raise UsageError("a ", Field("shard"), " is kept in a folder: give ", Field("output"))
+    if require:
+        raise UsageError(Field("require"), " needs the whole table: give it to check")
+
+
+def _result(
+    study: Study, part: Shard | None, is_new: bool, rules: Sequence[Expression]
+) -> SweepResult:
     if part is not None:
-        return SweepResult(study.folder, study.metadata[FINGERPRINT], study.n_failed)
-    return _summarized(study.folder, study.metadata[FINGERPRINT], is_new=is_new)
+        return SweepResult(study.folder, study.fingerprint, study.n_failed)
+    found = _summarized(study.folder, study.fingerprint, is_new=is_new)
+    if found.space is None or not rules:
+        return found
+    verdicts = check_requirements(found.space.designs, rules, found.space.trusts)
+    return replace(found, verdicts=verdicts)
 
 
 def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
@@ -172,6 +217,26 @@ def study_of(
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target_error)
     return Study(sweep_input(sweep, settings), folder, exactness, target_error)
+
+
+def rules_of(
+    study: Study, require: str | Sequence[str], *, strict: bool
+) -> tuple[list[Expression], list[Message]]:
+    """Requirements over the columns of designs, checked before any work, and what is doubted.
+
+    Raises UsageError for what is no requirement, and where it is `strict` for what is doubted.
+    """
+    texts = as_texts("require", require)
+    if not texts:
+        return [], []
+    columns = study.evaluation.design_columns
+    numbers = [column.name for column in columns if column.kind in (Kind.COUNT, Kind.NUMBER)]
+    rules = [requirement(text, numbers) for text in texts]
+    known = {trust.output: trust for trust in study.trusts}
+    trusts = {c.name: [known[o] for o in c.outputs if o in known] for c in columns}
+    if strict and known:  # else there is no design to judge
+        check_beyond_doubt(rules, trusts)
+    return rules, [doubt for rule in rules for doubt in doubts(rule, trusts)]
 
 
 def shard_of(shard: str | Shard | None) -> Shard | None:

@@ -64,6 +64,14 @@ class Points:
             return np.asarray(in_range)
         return np.asarray(in_range & (self._hull.find_simplex(scaled, tol=HULL_TOLERANCE) >= 0))
 
+    def are_among(self, geometry: Array) -> Flags:
+        """Whether geometries (design, key) are those of a point, but for rounding."""
+        scaled, own = self._scaled(np.real(geometry)), self._scaled(self.geometry)
+        found = np.zeros(len(scaled), bool)
+        for point in own:
+            found |= (np.abs(scaled - point) <= HULL_TOLERANCE).all(axis=1)
+        return found
+
     def _scaled(self, geometry: Array) -> Array:
         """Geometries (design, key) mapped so that the points range from 0 to 1 in each key."""
         size = np.ptp(self.geometry, axis=0)
@@ -104,7 +112,13 @@ class GridLaw:
             self._value(key, geometry),
             self._relative_error(key, geometry),
             self.points.are_inside(geometry),
+            self._are_samples(geometry),
         )
+
+    def _are_samples(self, geometry: Array) -> Flags:
+        if self.method is GridMethod.INTERPOLATION:
+            return self.points.are_among(geometry)
+        return np.zeros(len(geometry), bool)
 
     def scaling(self, key: str) -> Fit:
         """The scaling law of one quantity: ln of its value at the reference, then exponents.

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dpgcli.cli.exits import ExitCode
+from dpgcli.cli.exits import ExitCode, say_warnings
+from dpgcli.cli.options import Strict
+from dpgcli.cli.spelling import with_options
 from dpgcli.cli.streams import annotate, put, put_json, say
 from dpgcli.cli.validate import MOST_ANNOTATIONS, ProblemFormat
 
@@ -32,6 +34,7 @@ def check(
         Path | None,
         typer.Option("--summary-file", metavar="FILE", help="Append the summary, in Markdown"),
     ] = None,
+    strict: Strict = False,
 ) -> None:
     """Check that every design of a table meets requirements."""
     from dpgcli.files.output import check_appendable
@@ -39,10 +42,11 @@ def check(
     from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_designs
 
-    designs, _ = read_designs(table)
+    designs = read_designs(table)
     if summary_file is not None:
         check_appendable(summary_file, (table,))
-    verdicts = check_designs(designs, require)
+    verdicts = check_designs(designs.columns, require, designs.trusts, strict=strict)
+    say_warnings(warning for verdict in verdicts for warning in verdict.warnings)
     print_verdicts(verdicts, listed_as)
     is_written = summary_file is None or append_summary(summary_file, verdicts_markdown(verdicts))
     if code := code_of(verdicts, is_written=is_written):
@@ -131,6 +135,7 @@ def _record(verdict: "RequirementVerdict") -> dict[str, Any]:
     return {
         "requirement": verdict.requirement.text,
         "is_met": verdict.is_met,
+        "warnings": [with_options(warning) for warning in verdict.warnings],
         "n_checked": verdict.n_checked,
         "n_failing": len(verdict.rows),
         "failing": failures,

@@ -66,4 +66,9 @@ EXAMPLES = {
         "dpg fe dome finger.yaml --output deck --mesh coarse --run",
     ),
     "fe hinge": ("dpg fe hinge finger.yaml --output deck --mesh coarse --run",),
+    "fe unit": ("dpg fe unit finger.yaml --output deck --mesh coarse --run",),
+    "fe finger": (
+        "dpg fe finger finger.yaml --output deck --mesh coarse --run",
+        "dpg fe finger finger.yaml --output deck --pattern '1?1' --run",
+    ),
 }

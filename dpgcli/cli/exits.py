@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import IntEnum
 from types import FrameType
 from typing import NoReturn, ParamSpec
@@ -30,6 +30,7 @@ from dpgcli.errors import (
 )
 from dpgcli.signals import STOP_SIGNALS
 from dpgcli.temporary import working_folder_is_gone
+from dpgcli.text import printable
 
 P = ParamSpec("P")
 
@@ -100,6 +101,12 @@ def say_problems(error: SpecError) -> None:
     count = len(error.problems)
     rest = f"; of those in rows of data the first {MOST_ROWS} are shown" if hidden else ""
     say(f"dpg: {count:,} problem{'s' * (count != 1)}{rest}")
+
+
+def say_warnings(warnings: Iterable[str]) -> None:
+    """Say each on standard error, in a line of its own."""
+    for warning in warnings:
+        say(f"warning: {printable(with_options(warning))}")
 
 
 def fail(code: ExitCode, message: str) -> NoReturn:

@@ -25,7 +25,6 @@ from dpgcli.text import counted
 
 if TYPE_CHECKING:
     from dpgcli.design.scene import Source
-    from dpgcli.states.omissions import Omission
     from dpgcli.states.plan import Plan
 
 
@@ -103,6 +102,8 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "accuracy_level": plan.accuracy_level and plan.accuracy_level.name,
         "error_bound_mm": spelled(plan.error_bound),
         "model_error": plan.scene.model_error.text,
+        "trust": [trust.record for trust in plan.trusts],
+        "warnings": [*plan.warnings],
         "uncertainty": _uncertainty_facts(plan),
         "columns": [column.name for column in plan.columns],
         "left_out": [
@@ -144,6 +145,8 @@ def _uncertainty(plan: "Plan") -> Iterator[str]:
 
 
 def _lines(name: str, plan: "Plan") -> list[str]:
+    from dpgcli.cli.trust import trust_lines
+
     return [
         f"{name}: {_what(plan)}",
         "",
@@ -171,6 +174,9 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         ),
         "  [names] are what dpg bench --keep puts back, to show what it costs and changes",
         "",
+        "What to trust",
+        *(f"  {line}" for line in trust_lines(plan.trusts, plan.warnings)),
+        "",
         "Uncertainty",
         *(f"  {line}" for line in _uncertainty(plan)),
         "",
@@ -179,11 +185,6 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  {_bound(plan)}",
         f"  {expected(plan)}",
     ]
-
-
-def _omission(left_out: "Omission") -> str:
-    keep = f" [{left_out.keep}]" if left_out.keep else ""
-    return f"  {left_out.what}: {with_options(left_out.why)}{keep}"
 
 
 def expected(plan: "Plan") -> str:

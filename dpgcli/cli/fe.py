@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.commands import add_command
-from dpgcli.cli.options import MOST_PROCESSES, Quiet, Settings, SpecPath
+from dpgcli.cli.options import MOST_PROCESSES, Patterns, Quiet, Settings, SpecPath
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
+    from dpgcli.calibration.fe.hinge import Chambers
     from dpgcli.calibration.fe.models import Model
+    from dpgcli.calibration.fe.pushed import Push
     from dpgcli.studies.finite_elements import Limits
 
 app = typer.Typer(
-    help="Finite elements of a dome or a hinge: decks for CalculiX, and the curves it finds.",
+    help="Finite elements of domes, hinges, units, fingers: decks for CalculiX, and its curves.",
     no_args_is_help=True,
 )
 
@@ -32,6 +34,8 @@ HINGE_KEYS = (
     "limiting_layer_thickness_mm",
     "elastic_modulus_MPa",
 )
+UNIT_KEYS = ("dome_height_mm", *HINGE_KEYS)
+MOST_STATES = 256  # a minute each, or less
 
 
 class Mesh(StrEnum):
@@ -47,6 +51,9 @@ Out = Annotated[
 ]
 Poisson = Annotated[float, typer.Option("--poisson", help="Poisson's ratio, below 0.5")]
 MeshOption = Annotated[Mesh, typer.Option("--mesh", help="How fine the mesh is")]
+PushStiffness = Annotated[
+    float, typer.Option("--push-stiffness", help="Spring in the dome's place, N/mm")
+]
 RunOption = Annotated[bool, typer.Option("--run", help="Run ccx, write the curve")]
 TimeLimit = Annotated[
     float, typer.Option("--time-limit", metavar="SECONDS", help="End ccx after this time")
@@ -117,6 +124,94 @@ def hinge(
     chambers = Chambers(length, width, lid, gap, layer, modulus, poisson)
     model = hinge_model(chambers, mesh.value, moment)
     _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
+def unit(
+    spec: SpecPath,
+    out: Out,
+    settings: Settings = None,
+    poisson: Poisson = 0.48,
+    push_stiffness: PushStiffness = 50.0,
+    moment: Annotated[
+        float, typer.Option("--moment", help="Largest end couple, N mm; half of it and both signs")
+    ] = 5.0,
+    mesh: MeshOption = Mesh.MEDIUM,
+    run: RunOption = False,
+    time_limit: TimeLimit = 3600.0,
+    threads: Threads = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Push the gap between two chambers open and bend it by end couples: hinge and walls."""
+    from dpgcli.calibration.fe.models import unit_model
+
+    _check_positive({"--moment": moment, "--push-stiffness": push_stiffness})
+    chambers, push = _pushed(spec, settings, poisson, push_stiffness, quiet)
+    model = unit_model(chambers, push, mesh.value, moment)
+    _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
+def finger(
+    spec: SpecPath,
+    out: Out,
+    settings: Settings = None,
+    patterns: Patterns = None,
+    poisson: Poisson = 0.48,
+    push_stiffness: PushStiffness = 50.0,
+    mesh: MeshOption = Mesh.MEDIUM,
+    run: RunOption = False,
+    time_limit: TimeLimit = 3600.0,
+    threads: Threads = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Push gaps of a whole finger open, state by state: the table that `dpg compare` reads."""
+    from dpgcli.calibration.fe.models import finger_model
+
+    _check_positive({"--push-stiffness": push_stiffness})
+    chambers, push = _pushed(spec, settings, poisson, push_stiffness, quiet)
+    chosen = _chosen(spec, settings, patterns)
+    model = finger_model(chambers, push, mesh.value, chosen)
+    _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
+
+
+def _pushed(
+    spec: Path, settings: list[str] | None, poisson: float, stiffness: float, quiet: bool
+) -> "tuple[Chambers, Push]":
+    """The chambers of a spec, and the spring in the place of its domes."""
+    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.pushed import Push
+    from dpgcli.design.geometry import stroke
+    from dpgcli.errors import UsageError
+
+    _check_poisson(poisson)
+    height, length, width, lid, gap, layer, modulus = _dimensions(spec, settings, UNIT_KEYS, quiet)
+    if (push := stroke(height, gap)) <= 0.0:
+        raise UsageError(
+            f"the dome does not reach its neighbor: dome_height_mm {height:g} is not above "
+            f"unit_separation_mm {gap:g}"
+        )
+    return Chambers(length, width, lid, gap, layer, modulus, poisson), Push(stiffness, push, height)
+
+
+def _chosen(
+    path: Path, settings: list[str] | None, globs: list[str] | None
+) -> "list[tuple[bool, ...]]":
+    """The patterns to solve; all of them, where none is named, if they are few enough."""
+    from dpgcli.errors import UsageError
+    from dpgcli.files.scene_file import read_keys
+    from dpgcli.states.patterns import inverted_units, select
+
+    n_units = read_keys(path, settings or ()).finger.units
+    selection = select(globs or ["*"], n_units)
+    if len(selection) > MOST_STATES:
+        raise UsageError(
+            f"{len(selection)} states are too many for finite elements, at most {MOST_STATES}: "
+            "choose some with --pattern"
+        )
+    codes = inverted_units(selection.codes(0, len(selection)), n_units).T
+    chosen = [tuple(pattern) for pattern in codes.tolist()]
+    if not any(map(any, chosen)):
+        raise UsageError("nothing is pushed in state " + "0" * n_units)
+    return chosen
 
 
 def _check_positive(lengths: dict[str, float | None]) -> None:
@@ -193,5 +288,5 @@ def _as_before(name: str) -> str:
     return "output" if name == "out" else name
 
 
-for _function in (dome, hinge):
+for _function in (dome, hinge, unit, finger):
     add_command(app, _function, "fe", context_settings={"token_normalize_func": _as_before})

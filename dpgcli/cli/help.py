@@ -13,7 +13,7 @@ from dpgcli.errors import UsageError
 
 TOPICS = (  # in the order in which one reads them
     *("tutorial", "spec", "columns", "sweeps", "calibration", "laws"),
-    *("accuracy", "stress", "files", "python", "glossary"),
+    *("trust", "accuracy", "stress", "files", "python", "glossary"),
 )
 LINK_TO_PAGE = re.compile(r"\[([^]]+)\]\((\w+)\.md(#[\w-]+)?\)")
 

@@ -57,6 +57,12 @@ MaxFailed = Annotated[
 ]
 
 
+Strict = Annotated[
+    bool,
+    typer.Option("--strict", help="Refuse what would be warned of: dpg help trust"),
+]
+
+
 FirstStation = Annotated[
     str | None,
     typer.Option("--first-station", metavar="X,Y", help="Lattice's first node in the data, mm"),

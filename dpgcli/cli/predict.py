@@ -199,6 +199,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"
     yield from _uncertainty(prediction)
+    yield from (f"warning: {warning}" for warning in plan.warnings)
     yield f"the model's own error: {plan.scene.model_error.text}"
 
 

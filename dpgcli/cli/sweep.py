@@ -13,12 +13,13 @@ import typer
 
 from dpgcli.cli.check import append_summary, code_of, print_verdicts
 from dpgcli.cli.depfile import Depfile, depfile_text
-from dpgcli.cli.exits import ExitCode, Terminated, check_failed
+from dpgcli.cli.exits import ExitCode, Terminated, check_failed, say_warnings
 from dpgcli.cli.options import (
     MOST_PROCESSES,
     MaxFailed,
     Quiet,
     Settings,
+    Strict,
     TargetError,
     Tolerance,
     millimeters,
@@ -101,24 +102,24 @@ def sweep(
     require: Require = None,
     max_failed: MaxFailed = 0,
     summary_file: SummaryFile = None,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Evaluate every design of a space, resumably."""
     folder = Path(output)
     _start_fork_server_early(executor, jobs, folder)
-    from dpgcli.api.sweep import Place, shard_of, study_of
+    from dpgcli.api.sweep import shard_of, study_of
     from dpgcli.files.output import sole_use
     from dpgcli.studies.run import run
     from dpgcli.studies.sweep import drop_half_written
 
     part = shard_of(shard)
-    limit = None if wait is None else seconds("--wait", wait)
-    place = Place(executor.value, jobs, scheduler, limit)
+    place = _place(executor, jobs, scheduler, wait)
     _check_part(part, require, summary_file, depfile)
     target = None if target_error is None else millimeters("--target-error", target_error)
     study = study_of(spec, folder, settings or (), tolerance, target)
     _check_names(study, depfile, summary_file)
-    rules = _rules(study, require or [])
+    rules = _rules(study, require or (), strict=strict)
     described = None if depfile is None else _described(study, output, depfile)
 
     work = partial(_computed, study, place, part, quiet)
@@ -144,6 +145,24 @@ def sweep(
     check_failed(n_failed, max_failed)
     if code:
         raise typer.Exit(code)
+
+
+def _place(
+    executor: ExecutorName, jobs: int | None, scheduler: str | None, wait: str | None
+) -> "Place":
+    from dpgcli.api.sweep import Place
+
+    limit = None if wait is None else seconds("--wait", wait)
+    return Place(executor.value, jobs, scheduler, limit)
+
+
+def _rules(study: "Study", require: Sequence[str], *, strict: bool) -> "list[Expression]":
+    """Requirements over columns of designs, checked before any work; what is doubted is said."""
+    from dpgcli.api.sweep import rules_of
+
+    rules, doubts = rules_of(study, require, strict=strict)
+    say_warnings(doubts)
+    return rules
 
 
 def _check_part(
@@ -192,18 +211,6 @@ def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None
         check_appendable(summary_file, study.sweep.files)
 
 
-def _rules(study: "Study", require: list[str]) -> "list[Expression]":
-    """Requirements over the columns of designs, checked before any work."""
-    if not require:
-        return []
-    from dpgcli.states.columns import Kind
-    from dpgcli.sweeps.gate import requirement
-
-    columns = study.evaluation.design_columns
-    numbers = [column.name for column in columns if column.kind in (Kind.COUNT, Kind.NUMBER)]
-    return [requirement(text, numbers) for text in require]
-
-
 def _judge(
     study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
 ) -> tuple[int, ExitCode]:
@@ -228,7 +235,7 @@ def _judge(
 def print_in_short(folder: Path, space: "DesignSpace") -> None:
     """Where the tables are, how many designs, the best and the worst of them."""
     from dpgcli.cli.printing import print_grid
-    from dpgcli.reports.summary import in_short
+    from dpgcli.reports.summary import doubts, in_short
     from dpgcli.studies.sweep import REPORT
 
     counts, table = in_short(space)
@@ -237,6 +244,7 @@ def print_in_short(folder: Path, space: "DesignSpace") -> None:
         places = enumerate(table.head)
         texts = {name: [row[place] for row in table.rows] for place, name in places}
         print_grid(texts, left=table.head)
+    say_warnings(doubts(space))
 
 
 def _chosen(designs: "Columns") -> str:

@@ -39,6 +39,8 @@ def facts(plan: "SweepPlan") -> dict[str, Any]:
         "expected_seconds": plan.expected_seconds,
         "expected_disk_bytes": plan.expected_disk_bytes,
         "expected_memory_bytes": plan.expected_memory_bytes,
+        "trust": [trust.record for trust in plan.trusts],
+        "warnings": [*plan.warnings],
         "refused": with_options(plan.refusal) or None,
         "files": [str(path) for path in sweep.files],
     }
@@ -46,6 +48,8 @@ def facts(plan: "SweepPlan") -> dict[str, Any]:
 
 def lines(name: str, plan: "SweepPlan") -> list[str]:
     """The plan in words."""
+    from dpgcli.cli.trust import trust_lines
+
     sweep = plan.sweep
     rules = [rule.text for rule in sweep.constraints]
     return [
@@ -54,6 +58,9 @@ def lines(name: str, plan: "SweepPlan") -> list[str]:
         "Axes",
         *(f"  {line}" for axis in sweep.space.axes for line in _axis(axis)),
         *(["", "Constraints", *(f"  {rule}" for rule in rules)] if rules else []),
+        "",
+        "What to trust",
+        *(f"  {line}" for line in trust_lines(plan.trusts, plan.warnings)),
         "",
         "Work",
         *(f"  {line}" for line in _work(plan)),

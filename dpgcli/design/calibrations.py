@@ -1,7 +1,7 @@
 """Calibrations as values: numbers for one geometry, a scaling law over several, a dome's curve."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 from dpgcli.arrays import Array, Flags
@@ -20,12 +20,14 @@ class Fitted(NamedTuple):
 class Estimate(NamedTuple):
     """Values, their relative standard errors, and whether they lie inside the hull; (design,).
 
-    NaN for an error where there are too few points to know.
+    NaN for an error where there are too few points to know. `is_sample` says which are those of a
+    point itself: never by a scaling law.
     """
 
     value: Array
     relative_error: Array
     is_inside: Flags
+    is_sample: Flags
 
 
 class GridLaw(Protocol):
@@ -58,13 +60,35 @@ class DomeCurve:
     gaps: Sequence[Sequence[float]] = ()
 
 
+class KnownError(NamedTuple):
+    """Errors of one kind of output, as shares of it: the largest, and their root mean square.
+
+    `against` says what it was compared with, such as states that it was not fitted to.
+    """
+
+    largest: float
+    rms: float | None = None
+    against: str = "what it was not fitted to"
+
+    @property
+    def text(self) -> str:
+        """The errors in percent.
+
+        >>> KnownError(0.08, 0.056).text
+        '5.6 % (rms), 8 % at most'
+        """
+        largest = f"{100.0 * self.largest:.2g} % at most"
+        return largest if self.rms is None else f"{100.0 * self.rms:.2g} % (rms), {largest}"
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """Lattice values by key, for one geometry (by key) or over several, and the dome's curve.
 
     `correlation` is that of the values that have an error, in their order; `leave_one_out` are the
     root mean square and the largest error of tips of states, each predicted from the others, as
-    shares of their deflection.
+    shares of their deflection. `known_errors` are by kind of output, as `outputs.Output.key`;
+    `residual` is what a fit leaves of its data, in words; `warnings` are the fit's own.
     """
 
     file: str | None
@@ -74,6 +98,17 @@ class Calibration:
     curve: DomeCurve | None = None
     grid: Grid | None = None
     leave_one_out: tuple[float, float] | None = None
+    known_errors: Mapping[str, KnownError] = field(default_factory=dict)
+    residual: str = ""
+    warnings: Sequence[str] = ()
+
+    @property
+    def shape_error(self) -> KnownError | None:
+        """That of tips, as shares of their deflection."""
+        if self.leave_one_out is None:
+            return self.known_errors.get("shapes")
+        rms, largest = self.leave_one_out
+        return KnownError(largest, rms)
 
     def has(self, key: str) -> bool:
         """Whether it gives a key of the lattice, at one geometry or over several."""

@@ -57,8 +57,8 @@ def _from_grid(derivation: Derivation, group: UnitGroup, grid: Grid) -> Value:
     return Value(
         estimate.value,
         np.where(estimate.is_inside, known_place, beyond),
-        (f"{how} {listed(grid.over)},",),
-        np.zeros(1, np.int64),
+        (f"{how} {listed(grid.over)},", f"at a point over {listed(grid.over)},"),
+        estimate.is_sample.astype(np.int64),
         error if np.isfinite(estimate.relative_error).all() else None,
     )
 
@@ -71,16 +71,17 @@ def _brought(
     over: tuple[str, ...],
 ) -> Value:
     """A file's value, scaled by the rule where dimensions that it is not over are others."""
-    name = f"{base.rules[0]} {calibration.file}"
+    names = tuple(f"{rule} {calibration.file}" for rule in base.rules)
+    name = names[0]
     own = sizes_of({key: np.array([size]) for key, size in calibration.geometry.items()})
     own |= {key: group.geometry[key] for key in over}
     here = {need: group.geometry[need] for need in derivation.needs if need in group.geometry}
     everywhere = np.ones(1, bool)
     if unknown := [need for need in here if need not in own]:
         rule = f"{name}, which does not state its {listed(unknown)}"
-        return _beyond(replace(base, rules=(name,)), everywhere, rule)
+        return _beyond(replace(base, rules=names), everywhere, rule)
     moved = np.any(np.broadcast_arrays(*(_differs(s, own[n]) for n, s in here.items())), axis=0)
-    value = replace(base, rules=(name,))
+    value = replace(base, rules=names)
     if not moved.any():
         return value
     if missing := [need for need in derivation.needs if need not in own]:
@@ -119,8 +120,8 @@ def _scaled(
     scaled = Value(
         value.numbers * factor,
         np.where(is_scaled, origin, value.origin),
-        (name, f"{name}, {derivation.rule}"),
-        np.where(is_scaled, 1, 0),
+        (*value.rules, f"{name}, {derivation.rule}"),
+        np.where(is_scaled, len(value.rules), value.rule),
         None if error is None else error * np.real(factor),
     )
     rule = f"{name}, whose geometry has no such value to scale by"

@@ -21,7 +21,9 @@ from dpgcli.design.dimensions import (
 )
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.fitted import from_file
-from dpgcli.design.model_error import known_model_error
+from dpgcli.design.footing import Case, kinds
+from dpgcli.design.model_error import model_error_of
+from dpgcli.design.outputs import Trust
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, WALLS, Value, all_by
 from dpgcli.design.scene import (
@@ -34,6 +36,7 @@ from dpgcli.design.scene import (
     Source,
     Uncertainty,
 )
+from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
@@ -108,17 +111,37 @@ class Resolution:
             self._uncertainty(),
             self.model_error,
             self._chambers(),
+            self.trusts,
+            self.warnings,
         )
 
     @property
     def model_error(self) -> ModelError:
         """What is known of the model's own error, for a single design."""
-        values = [value for pairs in self.values.values() for _, value in pairs]
-        lever = next((value for _, value in self.values.get(SEGMENT_HEIGHT.key, ())), None)
-        walls = self.values.get(WALL_COMPLIANCE, ())
-        if any(value.numbers.any() for _, value in walls):  # nothing is known of a lever beside
-            lever = None
-        return known_model_error(self.design, lever, values)
+        return model_error_of(self._case(0))
+
+    @property
+    def trusts(self) -> tuple[Trust, ...]:
+        """What each output rests on, for a single design."""
+        return trusts_of(self._case(0))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the calibrations in use."""
+        return warnings_of(self._case(0))
+
+    def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
+        """What outputs of some designs, none of them wrong, rest on, and how many of them."""
+        found = kinds(self._each, designs)
+        return [(trusts_of(self._case(place)), count) for place, count in found]
+
+    def _case(self, place: int) -> Case:
+        return Case(self.design, self.domes, self._each, place)
+
+    @property
+    def _each(self) -> dict[str, list[Value]]:
+        """Values by key, one for each group of units."""
+        return {key: [value for _, value in pairs] for key, pairs in self.values.items()}
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.

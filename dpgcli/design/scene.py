@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.design.outputs import Trust
 from dpgcli.mechanics.finger import Finger
 
 
@@ -143,7 +144,8 @@ class Scene:
 
     Of a batch of fingers gripper and thickness are arrays by design. `uncertainty` is that of
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
-    is known of the last; `chambers` are those of a finger given by its geometry.
+    is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
+    its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
     """
 
     finger: Finger
@@ -153,9 +155,11 @@ class Scene:
     uncertainty: Uncertainty | None = None
     model_error: ModelError = UNKNOWN
     chambers: Chambers | None = None
+    trusts: tuple[Trust, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def take_lanes(self, index: Indices) -> "Scene":
-        """Some designs of a batch; sources, uncertainty and chambers are left out."""
+        """Some designs of a batch, without what is said of a single one."""
         gripper, thickness = self.gripper, self.layer_thickness
         if gripper is not None:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))

@@ -11,6 +11,7 @@ from enum import Enum
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
+from dpgcli.files.seal import footer_size
 from dpgcli.temporary import lock, temporary_file
 from dpgcli.text import control_character
 
@@ -75,7 +76,8 @@ def is_own(path: Path, mark: Mark) -> bool:
     """Whether a file has the mark, or is empty."""
     with path.open("rb") as stream:
         head = stream.read(ENDS)
-        stream.seek(max(len(head), stream.seek(0, os.SEEK_END) - ENDS))
+        tail = max(ENDS, footer_size(stream))
+        stream.seek(max(len(head), stream.seek(0, os.SEEK_END) - tail))
         ends = head + stream.read()  # what is left out between them is in no mark
         return not head or re.search(mark.value, ends, re.MULTILINE) is not None
 

@@ -26,6 +26,7 @@ from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.trust import TRUST, WARNINGS
 from dpgcli.states.columns import Column
 from dpgcli.temporary import temporary_file
 
@@ -36,12 +37,13 @@ SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT, N_DESIGNS = "dpg.fingerprint", "dpg.designs"
 BASE = "dpg.base"  # a name only: no result depends on it
+NO_CAUSE = (FINGERPRINT, BASE, TRUST, WARNINGS)
 SHA256 = "sha256"  # of all texts in sweep.json, the name of the base as well
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
-    """The SHA-256 of a sweep's metadata, but for the name of its base."""
-    return _sha256({key: text for key, text in said.items() if key not in (FINGERPRINT, BASE)})
+    """The SHA-256 of a sweep's metadata, but for the name of its base and what follows from it."""
+    return _sha256({key: text for key, text in said.items() if key not in NO_CAUSE})
 
 
 def _sha256(texts: Mapping[str, str]) -> str:

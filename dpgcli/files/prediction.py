@@ -13,6 +13,7 @@ from dpgcli.files.output import run_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
+from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.plan import Plan
 from dpgcli.states.predict import Prediction
 
@@ -74,7 +75,8 @@ def write_states(
     columns = prediction.plan.columns
     rows = prediction.blocks() if blocks is None else blocks
     batches = (record_batch(columns, block) for block in rows)
-    write_table(path, schema(columns), batches, _metadata(prediction.plan, spec_json))
+    metadata = _metadata(prediction.plan, spec_json)
+    write_table(path, with_bases(schema(columns), metadata), batches, metadata)
 
 
 def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
@@ -92,6 +94,7 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
             [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
         ),
         "dpg.model_error": plan.scene.model_error.text,
+        **trust_metadata(plan.trusts, plan.warnings),
         **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
         "dpg.versions": versions(),
     }

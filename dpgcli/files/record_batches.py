@@ -36,11 +36,18 @@ def schema(columns: tuple[Column, ...]) -> Any:
             pa.field(
                 column.name,
                 TYPES[column.kind],
-                metadata={"unit": column.unit, "description": column.description},
+                metadata=_said_of(column),
             )
             for column in columns
         ]
     )
+
+
+def _said_of(column: Column) -> dict[str, str]:
+    """Unit, description and, if it shows any, the kinds of outputs of a column."""
+    outputs = ", ".join(column.outputs)
+    said = {"unit": column.unit, "description": column.description}
+    return {**said, "outputs": outputs} if outputs else said
 
 
 def _array(column: Column, values: NDArray[Any]) -> Any:

@@ -1,7 +1,7 @@
 """The SHA-256 of a table in its own footer, so that no damaged byte of it is believed.
 
-The digits stand behind `dpg.file_sha256`, the last of the file's metadata, and are those of all
-bytes but themselves. Values, names, units and offsets are covered, before anything is decoded.
+The digits stand behind `dpg.file_sha256` among the file's metadata, and are those of all bytes
+but themselves. Values, names, units and offsets are covered, before anything is decoded.
 """
 
 import hashlib
@@ -12,7 +12,8 @@ from typing import BinaryIO
 KEY = "dpg.file_sha256"
 UNSEALED = "0" * 64
 HEAD = KEY.encode() + b"\x18\x40"  # what Thrift puts between a key and a text of 64 bytes
-TAIL = 2**16  # bytes at the end that the metadata's last key is among
+TAIL = 2**16  # bytes at the end that are looked at in what says no size of its footer
+END = b"PAR1"  # behind four bytes that say how long the footer is
 BLOCK = 2**20
 
 
@@ -47,11 +48,23 @@ def is_whole_in(stream: BinaryIO) -> bool | None:
     return said == _sha256(stream, place)
 
 
+def footer_size(stream: BinaryIO) -> int:
+    """Bytes at the end of a table that hold its metadata; 0 for what is no table.
+
+    They are as many as the metadata need: a sweep's spec, lists of values, names of columns.
+    """
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(size - 8, 0))
+    length, mark = stream.read(4), stream.read(4)
+    found = int.from_bytes(length, "little") + 8
+    return found if mark == END and found <= size else 0
+
+
 def _place(stream: BinaryIO) -> int | None:
     """The byte range of the digits."""
-    size = stream.seek(0, os.SEEK_END)
-    start = stream.seek(max(size - TAIL, 0))
-    found = stream.read(TAIL).rfind(HEAD)
+    size = max(footer_size(stream), TAIL)
+    start = stream.seek(max(stream.seek(0, os.SEEK_END) - size, 0))
+    found = stream.read(size).rfind(HEAD)
     return None if found < 0 else start + found + len(HEAD)
 
 
@@ -61,6 +74,8 @@ def _sha256(stream: BinaryIO, place: int) -> bytes:
     stream.seek(0)
     while block := stream.read(min(BLOCK, place - stream.tell())):
         digest.update(block)
+    end = stream.seek(0, os.SEEK_END)  # a device may never come to one
     stream.seek(place + len(UNSEALED))
-    digest.update(stream.read(TAIL))
+    while block := stream.read(min(BLOCK, max(end - stream.tell(), 0))):
+        digest.update(block)
     return digest.hexdigest().encode()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -14,9 +14,11 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Columns
+from dpgcli.design.outputs import Trust
 from dpgcli.errors import UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
+from dpgcli.files.trust import outputs_of, trusts_in
 from dpgcli.sweeps.metrics import METRICS
 
 TEXTS = ("calibration", "status", "reason", "accuracy_level")
@@ -31,8 +33,19 @@ DAMAGED = (
 NO_ROOM = "it takes more memory than there is"
 
 
-def read_designs(path: Path) -> tuple[Columns, dict[str, str]]:
-    """A table of designs and the unit of each of its columns, empty where there is none.
+class DesignTable(NamedTuple):
+    """A table of designs: its columns, the unit of each, and what those that say it rest on.
+
+    Units are empty where there is none; `trusts` are of the outputs that a column shows.
+    """
+
+    columns: Columns
+    units: dict[str, str]
+    trusts: dict[str, tuple[Trust, ...]]
+
+
+def read_designs(path: Path) -> DesignTable:
+    """A table of designs.
 
     Columns are text, whole numbers or numbers, whatever types they were stored as; what is
     neither is left out. Raises UsageError for what is damaged, or no table of designs.
@@ -42,14 +55,26 @@ def read_designs(path: Path) -> tuple[Columns, dict[str, str]]:
     return designs_in(read_undamaged(path, partial(_readable, str(path))), str(path))
 
 
-def designs_in(table: Any, name: str) -> tuple[Columns, dict[str, str]]:
+def designs_in(table: Any, name: str) -> DesignTable:
     """The same of a pyarrow Table; `name` is what messages call it."""
     table = table.select(_readable(name, table.schema))
     units = {
         field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
         for field in table.schema
     }
-    return _plain(name, table), units
+    return DesignTable(_plain(name, table), units, _trusts(table.schema))
+
+
+def _trusts(described: Any) -> dict[str, tuple[Trust, ...]]:
+    """What the columns of a schema rest on, as far as it says so."""
+    metadata = (described.metadata or {}).items()
+    known = trusts_in({k.decode(errors="replace"): v.decode(errors="replace") for k, v in metadata})
+    found = {field.name: outputs_of(field) for field in described}
+    return {
+        name: tuple(known[output] for output in outputs if output in known)
+        for name, outputs in found.items()
+        if known
+    }
 
 
 def _all(described: Any) -> list[str]:

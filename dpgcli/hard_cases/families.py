@@ -267,8 +267,9 @@ def _crossed(base: Finger) -> Iterator[Variant]:
             bistable_stiffness=grades[::-1] * graded.bistable_stiffness[0],
         ),
     }
+    folds = {label: limits(finger).force_linearity for label, finger in fingers.items()}
     for (label, finger), distance in product(fingers.items(), CROSSED_DISTANCES):
-        near = changed(finger, force_linearity=limits(finger).force_linearity * (1.0 - distance))
+        near = changed(finger, force_linearity=folds[label] * (1.0 - distance))
         side = f"{label}, α at fold {'−' if distance > 0.0 else '+'} {abs(distance):g}"
         for ratio in CROSSED_RATIOS:
             yield Variant(f"{side}, k_L/k_b = {ratio:g}", _with_bars(near, ratio))

@@ -10,6 +10,7 @@ from dpgcli.mechanics.finger import Finger
 if TYPE_CHECKING:
     from mpmath import mpf
 
+TANGENT = 1e30  # of a turn of 90 degrees: where nothing else ends it
 BISECTIONS = 60
 
 
@@ -75,41 +76,47 @@ def inverted_rest(unit: Unit) -> tuple["mpf", "mpf"]:
     the opening, w = c_w h'(x) and F(y) + h'(x) = 0. The left side of the second has one least value
     beyond half a stroke, and the well beyond that (our derivation).
     """
-    from mpmath import asin, eps, sqrt
+    from mpmath import atan, eps, pi, sqrt
 
     if not unit.wall:
         return inverted_angle(unit), unit.wall
+    lever, hinge = 2 * unit.height, unit.hinge / unit.height**2
+    yields = unit.wall * lever * hinge
 
-    def pull(x: "mpf") -> tuple["mpf", "mpf"]:
-        """h' and h''."""
-        sine = x / (2 * unit.height)
-        m, cosine, k = asin(sine), sqrt(1 - sine**2), unit.hinge / unit.height**2
-        return 2 * k * unit.height * m / cosine, k / cosine**2 * (1 + m * sine / cosine)
+    def opened(t: "mpf") -> tuple["mpf", "mpf"]:
+        """The dome's extension and its slope by t = tan m."""
+        secant = sqrt(1 + t * t)
+        slope = lever / secant**3 + yields * (1 + atan(t) * t) / secant
+        return lever * t / secant + yields * atan(t) * secant, slope
 
-    def opening(y: "mpf") -> "mpf":
-        """From above, where the excess is convex, each step of Newton's method stays above."""
-        x = min(y, 1.99 * unit.height)
+    def tangent(y: "mpf") -> "mpf":
+        """Of the corner's turn: Newton's method where it stays between two bounds."""
+        low, high = 0 * y, max(1 + 0 * y, 4 * y / (pi * yields)) if yields else TANGENT + 0 * y
+        t = high / 2
         for _ in range(BISECTIONS):
-            moment, stiffness = pull(x)
-            step = (x + unit.wall * moment - y) / (1 + unit.wall * stiffness)
-            x -= step
-            if abs(step) <= 8 * eps * x:
+            reached, slope = opened(t)
+            low, high = (low, t) if reached > y else (t, high)
+            further = t - (reached - y) / slope
+            if abs(further - t) <= 8 * eps * t:
                 break
-        return x
+            t = further if low < further < high else (low + high) / 2
+        return t
 
     def force(y: "mpf") -> "mpf":
-        u, softening = y / unit.stroke, 1 - unit.linearity
-        return unit.bistable * y * (1 + softening * (2 * u * u - 3 * u)) + pull(opening(y))[0]
+        u, softening, t = y / unit.stroke, 1 - unit.linearity, tangent(y)
+        own = unit.bistable * y * (1 + softening * (2 * u * u - 3 * u))
+        return own + lever * hinge * atan(t) * sqrt(1 + t * t)
 
     def stiffness(y: "mpf") -> "mpf":
-        u, hinge = y / unit.stroke, pull(opening(y))[1]
+        u, t = y / unit.stroke, tangent(y)
+        bent = hinge * (1 + t * t) * (1 + atan(t) * t)
         own = unit.bistable * (1 + 6 * (1 - unit.linearity) * (u * u - u))
-        return own + hinge / (1 + unit.wall * hinge)
+        return own + bent / (1 + unit.wall * bent)
 
     least = _bisected(stiffness, unit.stroke / 2, unit.stroke)
     y = unit.stroke if not force(least) < 0 else _bisected(force, least, unit.stroke * 5 / 4)
-    x = opening(y)
-    return asin(x / (2 * unit.height)), y - x
+    t = tangent(y)
+    return atan(t), y - lever * t / sqrt(1 + t * t)
 
 
 def spring_barrier(unit: Unit) -> "mpf":

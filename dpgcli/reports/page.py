@@ -60,6 +60,7 @@ def verdicts_markdown(verdicts: Sequence[RequirementVerdict]) -> str:
     lines: list[str | PageTable] = []
     for verdict in verdicts:
         lines.append(str(verdict))
+        lines += [f"Warning: {warning}." for warning in verdict.warnings]
         if not verdict.is_met:
             failures = [[str(failure)] for failure in verdict.failures(MOST_ROWS)]
             lines += shortened(PageTable(("first that fail",), failures), len(verdict.rows))

@@ -14,7 +14,9 @@ import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
+from dpgcli.design.outputs import Output, Trust, doubts_about
 from dpgcli.design.scene import Origin
+from dpgcli.files.trust import trusts_in, warnings_in
 from dpgcli.reports.base import bar_stiffness, base_lines
 from dpgcli.sweeps.gate import swept_names
 
@@ -60,11 +62,15 @@ class PageSection(NamedTuple):
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """A table of designs with the units of its columns, its metadata, and its numbers as text."""
+    """A table of designs with the units of its columns, its metadata, and its numbers as text.
+
+    `trusts` are those of the outputs that a column shows, where the table says what they rest on.
+    """
 
     designs: Columns
     units: Mapping[str, str]
     metadata: Mapping[str, str] = field(default_factory=dict)
+    trusts: Mapping[str, Sequence[Trust]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.designs["design"])
@@ -130,6 +136,7 @@ def sections(space: DesignSpace) -> list[PageSection]:
     return [
         counted,
         PageSection("Best and worst designs", _extremes(space)),
+        *_trust(space),
         PageSection("Designs by status and calibration", [_counts(space)]),
         PageSection("What failed and why", _failures(space)),
         PageSection("Where bistability ends", _bistability(space)),
@@ -230,8 +237,32 @@ def _extremes(space: DesignSpace) -> list[str | PageTable]:
     return [
         text,
         *_left_out(space),
+        *(f"Warning: {doubt}." for doubt in doubts(space)),
         PageTable(["metric", "", "value", "design", *space.swept], rows),
     ]
+
+
+def doubts(space: DesignSpace) -> list[str]:
+    """Why designs should not be ranked by some of the metrics, in a line for each reason.
+
+    The stiffness of bars alone is not ranked: there the assumed one is no matter.
+    """
+    ranked = dict.fromkeys(extreme.metric for extreme in extremes(space))
+    trusts = {name: space.trusts.get(name, ()) for name in ranked}
+    if STIFFEST in trusts:
+        trusts[STIFFEST] = [t for t in trusts[STIFFEST] if t.output is not Output.AXIAL]
+    return [f"ranking: {why}" for why in doubts_about(trusts)]
+
+
+def _trust(space: DesignSpace) -> Iterator[PageSection]:
+    """What outputs rest on, and the warnings of calibrations; nothing where no table says so."""
+    known = trusts_in(space.metadata).values()
+    if not known:
+        return
+    rows = [[t.output.value, t.basis_text, t.known_error, t.source] for t in known]
+    table = PageTable(["output", "basis", "known error", "from"], rows)
+    warnings = [f"Warning: {warning}." for warning in warnings_in(space.metadata)]
+    yield PageSection("What to trust", [table, *warnings])
 
 
 def _left_out(space: DesignSpace) -> Iterator[str]:

@@ -1,7 +1,9 @@
 """The columns of tables: name, unit, meaning, type."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+
+from dpgcli.design.outputs import Output
 
 
 class Kind(StrEnum):
@@ -31,10 +33,14 @@ class Group(StrEnum):
 
 @dataclass(frozen=True)
 class Column:
-    """One column; `unit` is empty for text, flags and pure numbers."""
+    """One column; `unit` is empty for text, flags and pure numbers.
+
+    `outputs` are the kinds of outputs that it shows, none where it shows none of the model's.
+    """
 
     name: str
     unit: str
     description: str
     group: Group = Group.STATES
     kind: Kind = Kind.NUMBER
+    outputs: tuple[Output, ...] = field(default=(), kw_only=True)

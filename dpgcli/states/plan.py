@@ -6,6 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
@@ -92,6 +93,16 @@ class Plan:
     @property
     def n_units(self) -> int:
         return self.scene.finger.n_units
+
+    @property
+    def trusts(self) -> tuple[Trust, ...]:
+        """What each kind of output rests on; none of values without a spec."""
+        return self.scene.trusts
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the calibrations in use."""
+        return self.scene.warnings
 
     @property
     def groups(self) -> frozenset[Group]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Columns
 from dpgcli.design.dimensions import without_unit
+from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.scene import Uncertainty
 from dpgcli.errors import Field, UsageError
 from dpgcli.states.columns import Column, Group, Kind
@@ -96,6 +97,10 @@ def named(quantities: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantit
     return tuple(q for q in quantities if q.name in names or q.group in names)
 
 
+def _shape(name: str, unit: str, description: str, of: Of, group: Group = Group.STATES) -> Quantity:
+    return Quantity(name, unit, description, group, outputs=(Output.SHAPES,), of=of)
+
+
 _POSES = (
     Quantity(
         "pattern",
@@ -110,27 +115,33 @@ _POSES = (
         "",
         "stable where certified, else why not",
         kind=Kind.STATUS,
+        outputs=(Output.SHAPES,),
         of=lambda s: s.status,
         is_always=True,
     ),
-    Quantity(
-        "tip_x_mm", "mm", "x of the tip, the last limiting-layer node", of=lambda s: s.pose[0]
-    ),
-    Quantity("tip_y_mm", "mm", "y of the tip; negative is the inner side", of=lambda s: s.pose[1]),
-    Quantity(
+    _shape("tip_x_mm", "mm", "x of the tip, the last limiting-layer node", lambda s: s.pose[0]),
+    _shape("tip_y_mm", "mm", "y of the tip; negative is the inner side", lambda s: s.pose[1]),
+    _shape(
         "tip_angle_rad",
         "rad",
         "rotation of the last strut; negative = curled",
-        of=lambda s: s.pose[2],
+        lambda s: s.pose[2],
     ),
-    Quantity("tip_angle_deg", "deg", "the same in degrees", of=lambda s: np.degrees(s.pose[2])),
-    Quantity("energy_mJ", "mJ", "potential energy of the state", of=lambda s: s.energy),
+    _shape("tip_angle_deg", "deg", "the same in degrees", lambda s: np.degrees(s.pose[2])),
+    Quantity(
+        "energy_mJ",
+        "mJ",
+        "potential energy of the state",
+        outputs=(Output.ENERGIES,),
+        of=lambda s: s.energy,
+    ),
 )
 _EIGENVALUE = Quantity(
     "min_eigenvalue_N_per_mm",
     "N/mm",
     "smallest eigenvalue of the Hessian in node coordinates",
     Group.EIGENVALUE,
+    outputs=STIFFNESS,
     of=lambda s: s.eigenvalues,
 )
 _NUMERICS = (
@@ -159,13 +170,14 @@ _NUMERICS = (
 ALWAYS = (*_POSES, *_NUMERICS)  # in every table of states: pose, status and numerical errors
 
 
-def _stiffness(name: str, unit: str, description: str, of: Of) -> Quantity:
-    return Quantity(name, unit, description, Group.STIFFNESS, of=of, needs_bars=True)
+def _stiffness(name: str, unit: str, description: str, of: Of, *outputs: Output) -> Quantity:
+    shown = (*outputs, *STIFFNESS)
+    return Quantity(name, unit, description, Group.STIFFNESS, outputs=shown, of=of, needs_bars=True)
 
 
-def _compliance(place: int, name: str, unit: str, description: str) -> Quantity:
+def _compliance(place: int, name: str, unit: str, description: str, *outputs: Output) -> Quantity:
     name = f"tip_compliance_{name}"
-    return _stiffness(name, unit, description, lambda s: s.compliance[place])
+    return _stiffness(name, unit, description, lambda s: s.compliance[place], *outputs)
 
 
 _STIFFNESS = (
@@ -176,9 +188,13 @@ _STIFFNESS = (
         lambda s: s.stiffness[0],
     ),
     _stiffness(
-        "tip_stiffness_max_N_per_mm", "N/mm", "the same, stiffest way", lambda s: s.stiffness[1]
+        "tip_stiffness_max_N_per_mm",
+        "N/mm",
+        "the same, stiffest way",
+        lambda s: s.stiffness[1],
+        Output.AXIAL,
     ),
-    _compliance(0, "xx_mm_per_N", "mm/N", "tip x by a force along x"),
+    _compliance(0, "xx_mm_per_N", "mm/N", "tip x by a force along x", Output.AXIAL),
     _compliance(1, "xy_mm_per_N", "mm/N", "tip y by a force along x"),
     _compliance(2, "yy_mm_per_N", "mm/N", "tip y by a force along y"),
     _compliance(3, "x_angle_rad_per_N", "rad/N", "tip angle by a force along x"),
@@ -199,22 +215,23 @@ def _energy(kind: str) -> Quantity:
         "mJ",
         f"energy of the {_ENERGY_KINDS[kind]}",
         Group.ENERGIES,
+        outputs=(Output.AXIAL,) if kind == "bar" else (Output.ENERGIES,),
         of=lambda s: s.energies[kind],
     )
 
 
 def _opening(unit: int) -> Quantity:
-    return Quantity(
+    return _shape(
         f"opening_{unit + 1}_mm",
         "mm",
         f"extension x of unit {unit + 1}'s spring",
+        lambda s: s.openings[unit],
         Group.OPENINGS,
-        of=lambda s: s.openings[unit],
     )
 
 
 def _gripper(name: str, unit: str, description: str, of: Of, kind: Kind = Kind.NUMBER) -> Quantity:
-    return Quantity(name, unit, description, Group.GRIPPER, kind, of=of)
+    return Quantity(name, unit, description, Group.GRIPPER, kind, outputs=(Output.SHAPES,), of=of)
 
 
 _GRIPPER = (
@@ -330,10 +347,10 @@ def _node(finger: str, layer: str, station: int, axis: str) -> Quantity:
         nodes = solved.in_gripper.upper if finger else solved.nodes
         return np.asarray(sign * getattr(nodes, coordinate)[station])
 
-    return Quantity(
+    return _shape(
         f"{finger}{layer}{station}_{axis}_mm",
         "mm",
         f"{axis} of {_FINGERS[finger]}{_LAYERS[layer]} {station}",
+        position,
         Group.NODES,
-        of=position,
     )

@@ -14,7 +14,8 @@ from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
 
 SHORT_OF_LEVER = 1.0 - 1e-9  # of 2H, where bars end all opening
-NEWTON_STEPS = 60  # for an opening; a handful does but where bars nearly end it
+LARGEST_TANGENT = 1e15  # of a corner's turn: beyond it all is 90 degrees
+NEWTON_STEPS = 100  # for a turn; a handful does but where bars nearly end it
 
 
 def rigid_unit(finger: Finger, extension: Array) -> Response:
@@ -29,31 +30,35 @@ def rigid_unit(finger: Finger, extension: Array) -> Response:
     [[3.381735]]
     """
     if finger.has_walls:
-        return turned_unit(finger, turn_of(finger, extension)).response
+        return turned_unit(finger, tangent_of(finger, extension)).response
     return _with_hinge(finger, extension, *_hinge(finger, extension))
 
 
 class TurnedUnit(NamedTuple):
-    """Extension y (mm), the response by it as of `rigid_unit`, and dy/dm, mm/rad."""
+    """Extension y (mm), the response by it as of `rigid_unit`, and dy/dt, mm."""
 
     extension: Array
     response: Response
     rate: Array
 
 
-def turned_unit(finger: Finger, turn: Array) -> TurnedUnit:
-    """A unit by the turn m (rad) of either corner.
+def turned_unit(finger: Finger, tangent: Array) -> TurnedUnit:
+    """A unit by the tangent t = tan m of the turn of either corner.
 
-    y = 2H sin m + c_w h' is explicit in m and rises with it, where m by y takes a search.
+    y = 2H sin m + c_w h' is explicit in t and rises with it, where t by y takes a search. Bars that
+    nearly end the opening are told apart by t, where all m are 90 degrees to rounding.
     """
     lever = 2.0 * finger.segment_height
-    opening = lever * np.sin(turn)
-    turn, pull, stiffness = _hinge(finger, opening)
+    secant = np.sqrt(1.0 + tangent * tangent)
+    turn, opening = np.arctan(tangent), lever * tangent / secant
+    hinge = finger.hinge_stiffness / finger.segment_height**2
+    pull = lever * hinge * turn * secant
+    stiffness = hinge * secant * secant * (1.0 + turn * tangent)
     extension = opening + finger.wall_compliance * pull
     yields = 1.0 + finger.wall_compliance * stiffness
     energy, *derivatives = _with_hinge(finger, extension, turn, pull, stiffness / yields)
     response = Response(energy + 0.5 * finger.wall_compliance * pull * pull, *derivatives)
-    return TurnedUnit(extension, response, lever * np.cos(turn) * yields)
+    return TurnedUnit(extension, response, lever * yields / secant**3)
 
 
 def _with_hinge(
@@ -64,35 +69,42 @@ def _with_hinge(
     return Response(energy, spring.force + pull, spring.stiffness + stiffness)
 
 
-def turn_of(finger: Finger, extension: Array) -> Array:
-    """The turn m (rad) of either corner of a unit with rigid bars whose dome extends by y (mm).
+def tangent_of(finger: Finger, extension: Array) -> Array:
+    """The tangent t of the corners' turn of a unit between rigid bars whose dome extends by y, mm.
 
-    Walls take the rest: y − x = c_w h'(x), h' being the hinge's pull on the opening. With
-    x = 2H sin m, and times cos m, nothing in it grows without bound where bars end the opening:
-    (y − 2H sin m) cos m = 2 m c_w k_θ/H, whose left side less the right falls from m = 0 to its
-    root. Newton's method, kept between what is known to be below the root and above it.
+    The root of y(t) = 2H t/√(1+t²) + c_w h'(t), which rises with t: by Newton's method, kept
+    between what is known to be below it and above. Without hinge or wall bars end all opening.
     """
     lever = 2.0 * finger.segment_height
     softness = 2.0 * finger.wall_compliance * finger.hinge_stiffness / finger.segment_height
     reached, lever, softness = np.broadcast_arrays(np.abs(extension), lever, softness)
-    low, high = np.zeros(reached.shape), np.full(reached.shape, 0.5 * np.pi)
-    turn = np.arcsin(np.minimum(reached / (lever + softness), SHORT_OF_LEVER))
+    yields, within = softness > 0.0, reached < SHORT_OF_LEVER * lever
+    share = np.where(yields, softness, np.inf)
+    by_bars = np.where(within | ~yields, _tangent(reached / lever), LARGEST_TANGENT)
+    by_walls = np.where(yields, np.maximum(1.0, 4.0 / np.pi * reached / share), np.inf)
+    low, high = np.zeros(reached.shape), np.minimum(by_walls, by_bars)
+    beyond = 2.0 / np.pi * (reached - lever) / share
+    tangent = np.minimum(np.maximum(_tangent(reached / (lever + softness)), beyond), high)
     is_running = np.ones(reached.shape, bool)
     for _ in range(NEWTON_STEPS):
-        sine, cosine = np.sin(turn), np.cos(turn)
-        excess = (reached - lever * sine) * cosine - softness * turn
-        slope = -lever * cosine * cosine - (reached - lever * sine) * sine - softness
-        low = np.where(excess >= 0.0, turn, low)
-        high = np.where(excess <= 0.0, turn, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            further = turn - excess / slope
-        is_running &= ~(np.abs(further - turn) <= 1e-15 * turn)  # what has arrived stays
+        secant, turn = np.sqrt(1.0 + tangent * tangent), np.arctan(tangent)
+        excess = lever * tangent / secant + softness * turn * secant - reached
+        slope = lever / secant**3 + softness * (1.0 + turn * tangent) / secant
+        low = np.where(excess <= 0.0, tangent, low)
+        high = np.where(excess >= 0.0, tangent, high)
+        further = tangent - excess / slope
+        is_running &= ~(np.abs(further - tangent) <= 1e-15 * tangent)  # what has arrived stays
         if not is_running.any():
             break
         inside = (further > low) & (further < high)
-        further = np.where(inside, further, 0.5 * (low + high))
-        turn = np.where(is_running, further, turn)
-    return np.asarray(np.copysign(turn, extension))
+        middle = np.where(low > 0.0, np.sqrt(low * high), 0.5 * high)
+        tangent = np.where(is_running, np.where(inside, further, middle), tangent)
+    return np.asarray(np.copysign(tangent, extension))
+
+
+def _tangent(sine: Array) -> Array:
+    sine = np.minimum(sine, SHORT_OF_LEVER)
+    return np.asarray(sine / np.sqrt(1.0 - sine * sine))
 
 
 def _hinge(finger: Finger, opening: Array) -> tuple[Array, Array, Array]:

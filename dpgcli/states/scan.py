@@ -16,7 +16,7 @@ from dpgcli.states.rigid_unit import (
     TurnedUnit,
     rigid_unit,
     single_units,
-    turn_of,
+    tangent_of,
     turned_unit,
 )
 
@@ -47,7 +47,8 @@ class Scan(NamedTuple):
 class _Profile(NamedTuple):
     """Places along the extension of a unit and its response there, (place, unit, design).
 
-    `by` is what places are counted by: the extension itself, or with walls the corners' turn.
+    `by` is what places are counted by: the extension itself, or with walls the tangent of the
+    corners' turn.
     """
 
     by: Array
@@ -135,17 +136,17 @@ def _profile(finger: Finger, widest: Array) -> _Profile:
     share = np.linspace(0.0, 1.0, (COARSE if finger.has_walls else searched) + 1)
     by = widest * share[:, None, None]
     if finger.has_walls:
-        by = _refined(turn_of(finger, by), searched // COARSE)
+        by = _refined(tangent_of(finger, by), searched // COARSE)
     places, (energy, force, stiffness), _ = _at(finger, by, finger.has_walls)
     by, places = (np.broadcast_to(part, force.shape) for part in (by, places))
     return _Profile(by, places, energy, force, stiffness)
 
 
-def _refined(turns: Array, parts: int) -> Array:
+def _refined(places: Array, parts: int) -> Array:
     """Places, the first axis, with each cell between them divided into equal parts."""
     between = np.linspace(0.0, 1.0, parts, endpoint=False)[:, None, None]
-    cells = turns[:-1, None] + between * np.diff(turns, axis=0)[:, None]
-    return np.concatenate((cells.reshape(-1, *turns.shape[1:]), turns[-1:]))
+    cells = places[:-1, None] + between * np.diff(places, axis=0)[:, None]
+    return np.concatenate((cells.reshape(-1, *places.shape[1:]), places[-1:]))
 
 
 def _at(finger: Finger, by: Array, is_turn: bool) -> TurnedUnit:

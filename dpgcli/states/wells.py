@@ -15,7 +15,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
-from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, turn_of
+from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, tangent_of
 from dpgcli.states.scan import MIDDLE, WIDEST, opened, pulls, scan
 
 INFLECTION_BISECTIONS = 24
@@ -133,7 +133,7 @@ def _scanned_wells(finger: Finger) -> Wells:
     """The inverted well of any law, with walls that give way too."""
     found = scan(finger)
     sine = found.extension / (2.0 * finger.segment_height)
-    angle = turn_of(finger, found.extension) if finger.has_walls else np.arcsin(sine)
+    angle = np.arctan(tangent_of(finger, found.extension)) if finger.has_walls else np.arcsin(sine)
     return Wells(
         found.exists,
         found.extension,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.design.dimensions import UNITS
+from dpgcli.design.outputs import Trust
 from dpgcli.errors import UsageError
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.studies.sweep import Study
@@ -19,7 +20,8 @@ class SweepPlan:
     In spaces of up to a million designs each is looked at: `n_excluded` do not meet a constraint,
     `n_invalid` are no fingers that can exist, and `n_states` is the number of states that will be
     computed. In larger ones the first two are None, and the states are those of all designs.
-    `refusal` says why `sweep` will not begin on this machine, if it will not.
+    `refusal` says why `sweep` will not begin on this machine, if it will not. `trusts` are what
+    outputs rest on, at worst of all designs, `warnings` those of the calibrations in use.
     """
 
     sweep: Sweep
@@ -32,6 +34,8 @@ class SweepPlan:
     expected_disk_bytes: int
     expected_memory_bytes: int
     refusal: str
+    trusts: tuple[Trust, ...]
+    warnings: tuple[str, ...]
 
 
 def plan_of_sweep(study: Study) -> SweepPlan:
@@ -51,6 +55,8 @@ def plan_of_sweep(study: Study) -> SweepPlan:
         extent.bytes_of(n_states),
         extent.bytes_in_memory,
         _refusal(study),
+        study.trusts,
+        study.warnings,
     )
 
 

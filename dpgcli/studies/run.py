@@ -7,7 +7,6 @@ from time import perf_counter
 from typing import Any
 
 from dpgcli.files.output import check_outputs
-from dpgcli.files.parts import FINGERPRINT
 from dpgcli.files.table_writer import write_run
 from dpgcli.studies.sweep import RUN, Progress, Shard, Study, drop_parts, outputs
 from dpgcli.sweeps.extent import size_text, time_text
@@ -99,7 +98,7 @@ def run_facts(
     """
     core, writing, pool = _shares(progress)
     return {
-        "fingerprint": study.metadata[FINGERPRINT],
+        "fingerprint": study.fingerprint,
         "designs": progress.n_designs,
         "resumed_designs": progress.n_resumed,
         "states": progress.n_states,

@@ -3,12 +3,15 @@
 import os
 import shlex
 import shutil
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from time import perf_counter
 
+from dpgcli.design.outputs import Trust, of_space
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
@@ -17,12 +20,13 @@ from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
+from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask, reason_against
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
-from dpgcli.sweeps.extent import Extent, size_text
+from dpgcli.sweeps.extent import ASKED_AT_ONCE, MOST_ASKED, Extent, size_text
 from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
 
@@ -88,7 +92,32 @@ class Study:
 
     @cached_property
     def metadata(self) -> dict[str, str]:
-        """All that the results depend on, and its SHA-256 as the fingerprint."""
+        """All that the results depend on, its fingerprint, and what the outputs rest on."""
+        return {**self._identity, **trust_metadata(self.trusts, self.warnings)}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the calibrations in use."""
+        return scene_of(self.sweep.base).warnings
+
+    @property
+    def fingerprint(self) -> str:
+        """The SHA-256 of all that the results depend on."""
+        return self._identity[FINGERPRINT]
+
+    @cached_property
+    def trusts(self) -> tuple[Trust, ...]:
+        """What outputs of the designs rest on, at worst: of a million at most, spread evenly."""
+        kinds: Counter[tuple[Trust, ...]] = Counter()
+        step = max(1, self.sweep.space.size // MOST_ASKED)
+        for chunk in islice(chunked([(0, self.sweep.space.size)], ASKED_AT_ONCE), None, None, step):
+            values = self.sweep.space.designs(chunk.start, chunk.stop)
+            for trusts, count in self.evaluation.kinds_of_trust(values):
+                kinds[trusts] += count
+        return of_space([*kinds.items()])
+
+    @cached_property
+    def _identity(self) -> dict[str, str]:
         said = {
             "dpg.sweep": self.sweep.canonical_json(),
             **self._exactness,
@@ -109,7 +138,7 @@ class Study:
     @cached_property
     def store(self) -> PartStore:
         """Where the parts of just this sweep are kept."""
-        return PartStore(self.folder / PARTS / self.metadata[FINGERPRINT][:16])
+        return PartStore(self.folder / PARTS / self.fingerprint[:16])
 
     @property
     def chunk_size(self) -> int:
@@ -132,7 +161,7 @@ class Study:
     @property
     def is_up_to_date(self) -> bool:
         """Whether both tables are there, undamaged, and were made from just this."""
-        wanted = self.metadata[FINGERPRINT]
+        wanted = self.fingerprint
         return all(
             is_whole(self.folder / name)
             and read_metadata(self.folder / name).get(FINGERPRINT) == wanted
@@ -276,7 +305,8 @@ def assemble(parts_of: Sequence[PartStore], folder: Path) -> str:
         covered = part.stop if part else covered
     for which, name in enumerate((STATES, DESIGNS)):
         batches = (batch for part in parts for batch in part.batches(which))
-        write_table(folder / name, parts[0].schema(which), batches, metadata, in_thread=True)
+        described = with_bases(parts[0].schema(which), metadata)
+        write_table(folder / name, described, batches, metadata, in_thread=True)
     return metadata[FINGERPRINT]
 
 

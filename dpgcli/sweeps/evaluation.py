@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Columns, Flags, Indices, distinct, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
+from dpgcli.design.outputs import Trust
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import ORIGINS, Scene
 from dpgcli.states.accuracy import exactnesses
@@ -184,6 +185,15 @@ class Evaluation:
         for places, design in self._designs(values, np.flatnonzero(right)):
             right[places] = ~resolve(design).are_wrong
         return allowed, right
+
+    def kinds_of_trust(
+        self, values: Mapping[str, Values]
+    ) -> Iterator[tuple[tuple[Trust, ...], int]]:
+        """What outputs of designs that will be solved rest on, and how many of them."""
+        right = self.allowed(values) & self._are_possible(values)
+        for _, design in self._designs(values, np.flatnonzero(right)):
+            found = resolve(design)
+            yield from found.kinds_of_trust(np.flatnonzero(~found.are_wrong))
 
     def _solved(self, places: Indices, scene: Scene) -> "Iterator[_Solved]":
         found = exactnesses(UnitSolutions.of(scene.finger), self.tolerance, self.target_error)

@@ -1,13 +1,14 @@
 """Requirements on a table of designs: thresholds that every design has to meet."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
 
 from dpgcli.arrays import Columns, Flags, Indices
-from dpgcli.errors import Field, NothingSelectedError, UsageError
+from dpgcli.design.outputs import Trust, doubts_about
+from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.text import printable
 
@@ -29,14 +30,22 @@ class Failure:
         return printable(said)  # in one line, whatever the table holds
 
 
+Trusts = Mapping[str, Sequence[Trust]]
+"""What the outputs that a column shows rest on, by column; empty where a table does not say it."""
+
+
 @dataclass(frozen=True)
 class RequirementVerdict:
-    """One requirement held against the designs; `rows` are those that fail it."""
+    """One requirement held against the designs; `rows` are those that fail it.
+
+    `warnings` say which of its columns rest on what no design should be judged by.
+    """
 
     designs: Columns
     requirement: Expression
     n_checked: int
     rows: Indices
+    warnings: tuple[str, ...] = ()
 
     @property
     def is_met(self) -> bool:
@@ -92,6 +101,25 @@ def requirement(text: str, columns: Collection[str]) -> Expression:
     return rule
 
 
+def doubts(rule: Expression, trusts: Trusts) -> tuple[Message, ...]:
+    """Why no design should be judged by columns of a requirement, in a line for each reason."""
+    found = doubts_about({name: trusts.get(name, ()) for name in sorted(rule.names)})
+    return tuple(Message(Field("require"), f" {rule.text!r}: {why}") for why in found)
+
+
+def check_beyond_doubt(rules: Sequence[Expression], trusts: Trusts) -> None:
+    """Raise UsageError for requirements on what no design should be judged by.
+
+    And for a table that does not say what its columns rest on.
+    """
+    if not trusts:
+        where = " needs a table that says what its columns rest on, as dpg sweep writes it"
+        raise UsageError(Field("strict"), where)
+    if found := [doubt for rule in rules for doubt in doubts(rule, trusts)]:
+        lines = (part for doubt in found for part in ("\n", doubt))
+        raise UsageError(Field("strict"), " allows no requirement on what is doubted:", *lines)
+
+
 def number_columns(designs: Columns) -> list[str]:
     """Columns that a requirement can name."""
     return [name for name, column in designs.items() if column.dtype.kind in "biuf"]
@@ -117,14 +145,22 @@ def failing(designs: Columns, rule: Expression) -> Indices:
     return np.flatnonzero(~met & _in_question(designs))
 
 
-def check_designs(designs: Columns, texts: Sequence[str]) -> tuple[RequirementVerdict, ...]:
-    """Hold every design against requirements in words; see `check_requirements`."""
+def check_designs(
+    designs: Columns, texts: Sequence[str], trusts: Trusts, *, strict: bool = False
+) -> tuple[RequirementVerdict, ...]:
+    """Hold every design against requirements in words; see `check_requirements`.
+
+    Raises UsageError where it is `strict` and one of them is about what is doubted.
+    """
     columns = number_columns(designs)
-    return check_requirements(designs, [requirement(text, columns) for text in texts])
+    rules = [requirement(text, columns) for text in texts]
+    if strict:
+        check_beyond_doubt(rules, trusts)
+    return check_requirements(designs, rules, trusts)
 
 
 def check_requirements(
-    designs: Columns, requirements: Sequence[Expression]
+    designs: Columns, requirements: Sequence[Expression], trusts: Trusts | None = None
 ) -> tuple[RequirementVerdict, ...]:
     """Hold every requirement against every design that is not excluded.
 
@@ -136,7 +172,9 @@ def check_requirements(
             f"no design to check: the table has {len(designs['status']):,}, all of them excluded"
         )
     return tuple(
-        RequirementVerdict(designs, rule, n_checked, failing(designs, rule))
+        RequirementVerdict(
+            designs, rule, n_checked, failing(designs, rule), doubts(rule, trusts or {})
+        )
         for rule in requirements
     )
 

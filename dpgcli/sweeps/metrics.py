@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
+from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
@@ -101,52 +102,99 @@ class Metrics:
             self.hulls.append(hulls_of(owner, tips))
 
 
-def _count(name: str, description: str, of: Callable[[Metrics], Array | Indices]) -> Metric:
-    return Metric(name, "", description, kind=Kind.COUNT, of=of)
+SHAPES = (Output.SHAPES,)
+
+
+def _count(
+    name: str,
+    description: str,
+    of: Callable[[Metrics], Array | Indices],
+    outputs: tuple[Output, ...] = (),
+) -> Metric:
+    return Metric(name, "", description, kind=Kind.COUNT, outputs=outputs, of=of)
 
 
 def _least(
-    name: str, unit: str, description: str, over: str, group: Group = Group.STATES
+    name: str,
+    unit: str,
+    description: str,
+    over: str,
+    *outputs: Output,
+    group: Group = Group.STATES,
 ) -> Metric:
-    return Metric(name, unit, description, group, of=lambda m: m.extreme(name), over=over)
+    def extreme(metrics: Metrics) -> Array:
+        return metrics.extreme(name)
+
+    return Metric(name, unit, description, group, outputs=outputs, of=extreme, over=over)
 
 
-def _most(name: str, unit: str, description: str, over: str, group: Group = Group.STATES) -> Metric:
-    return replace(_least(name, unit, description, over, group), extreme=np.maximum)
+def _most(
+    name: str,
+    unit: str,
+    description: str,
+    over: str,
+    *outputs: Output,
+    group: Group = Group.STATES,
+) -> Metric:
+    least = _least(name, unit, description, over, *outputs, group=group)
+    return replace(least, extreme=np.maximum)
 
 
 METRICS = (
     _count("n_units", "number of units", lambda m: m.alike(m.units.finger.n_units)),
     _count("n_states", "number of patterns", lambda m: m.alike(2**m.units.finger.n_units)),
-    _count("n_stable", "number of certified states", lambda m: m.n_stable),
+    _count("n_stable", "number of certified states", lambda m: m.n_stable, SHAPES),
     _count(
         "n_distinct_tips",
         f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
         lambda m: m.tips.counts(m.n_designs),
+        SHAPES,
     ),
-    Metric("workspace_area_mm2", "mm²", "area of the tips' convex hull", of=Metrics.area),
-    _least("reach_min_mm", "mm", "smallest distance of a tip from the base", "reach"),
-    _most("reach_max_mm", "mm", "largest distance of a tip from the base", "reach"),
+    Metric(
+        "workspace_area_mm2",
+        "mm²",
+        "area of the tips' convex hull",
+        outputs=SHAPES,
+        of=Metrics.area,
+    ),
+    _least("reach_min_mm", "mm", "smallest distance of a tip from the base", "reach", *SHAPES),
+    _most("reach_max_mm", "mm", "largest distance of a tip from the base", "reach", *SHAPES),
     _least(
-        "aperture_min_mm", "mm", "smallest aperture of the gripper", "aperture_mm", Group.GRIPPER
+        "aperture_min_mm",
+        "mm",
+        "smallest aperture of the gripper",
+        "aperture_mm",
+        *SHAPES,
+        group=Group.GRIPPER,
     ),
-    _most("aperture_max_mm", "mm", "largest aperture of the gripper", "aperture_mm", Group.GRIPPER),
+    _most(
+        "aperture_max_mm",
+        "mm",
+        "largest aperture of the gripper",
+        "aperture_mm",
+        *SHAPES,
+        group=Group.GRIPPER,
+    ),
     _least(
         "stiffness_min_N_per_mm",
         "N/mm",
         "softest tip direction of any state",
         "tip_stiffness_min_N_per_mm",
+        *STIFFNESS,
     ),
     _most(
         "stiffness_max_N_per_mm",
         "N/mm",
         "stiffest tip direction of any state",
         "tip_stiffness_max_N_per_mm",
+        Output.AXIAL,
+        *STIFFNESS,
     ),
     Metric(
         "min_barrier_mJ",
         "mJ",
         "smallest barrier of a unit to snap or reset, bars taken as rigid",
+        outputs=(Output.BARRIERS,),
         of=lambda m: m.alike(barriers(m.units.finger, m.units.wells)),
     ),
     _most("max_residual_N", "N", "largest unbalanced force of any state", "residual_N"),

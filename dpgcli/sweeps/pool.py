@@ -11,10 +11,12 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from functools import cache
+from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -40,15 +42,17 @@ def process_pool(n_workers: int) -> Executor:
 
     method = "forkserver" if _has_fork_server() else "spawn"
     start_fork_server()
-    with _refusals_said(", for semaphores (/dev/shm on Linux)"):
+    # a signal between making a semaphore and noting it would leave it behind
+    with _held_signals(), _refusals_said(", for semaphores (/dev/shm on Linux)"):
         return _Pool(n_workers, mp_context=get_context(method), initializer=_start_worker)
 
 
 def start_fork_server(*modules: str) -> None:
-    """Start the process that workers are forked from; it imports these modules once for all.
+    """Start the process that workers are forked from, with these modules imported once for all.
 
-    Called early, it does so while this process is still busy with imports of its own. On Windows
-    there is none, and every worker imports for itself. Raises WorkplaceError where it cannot be.
+    Called early, while this process has one thread and no files open, it is a fork of this one,
+    and what both need is imported once; else a new interpreter. On Windows there is none, and
+    every worker imports for itself. Raises WorkplaceError where it cannot be.
     """
     if not _has_fork_server():
         return
@@ -58,8 +62,12 @@ def start_fork_server(*modules: str) -> None:
             from multiprocessing import forkserver
 
             forkserver.set_forkserver_preload(list(modules))
+        is_early = bool(modules) and len(sys._current_frames()) == 1
+        if is_early:
+            for module in modules:
+                import_module(module)
         with _safe_path():
-            _ensure_fork_server()
+            _ensure_fork_server(_forking() if is_early else nullcontext())
 
 
 @contextmanager
@@ -78,7 +86,7 @@ def _refusals_said(purpose: str = "") -> Iterator[None]:
         raise WorkplaceError(said, Field("jobs"), " 1") from error
 
 
-def _ensure_fork_server() -> None:
+def _ensure_fork_server(way: AbstractContextManager[None]) -> None:
     from multiprocessing import forkserver, resource_tracker
 
     # what a terminal sends to all its processes is for this one to answer: the others inherit
@@ -87,9 +95,40 @@ def _ensure_fork_server() -> None:
     try:
         resource_tracker.ensure_running()
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        forkserver.ensure_running()
+        with way:
+            forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _forking() -> Iterator[None]:
+    """Have `multiprocessing` fork this process where it would start a new interpreter."""
+    from multiprocessing import util
+
+    known = vars(util)
+    before = known["spawnv_passfds"]
+    known["spawnv_passfds"] = _fork
+    try:
+        yield
+    finally:
+        known["spawnv_passfds"] = before
+
+
+def _fork(_: object, arguments: Sequence[str], passed: Sequence[int]) -> int:
+    """Run the code of an interpreter's last argument in a fork; its process."""
+    process = os.fork()
+    if process:
+        return process
+    try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # Ctrl-C and hang-ups are blocked
+        for last, following in pairwise([2, *sorted(passed), os.sysconf("SC_OPEN_MAX")]):
+            os.closerange(last + 1, following)  # among them the pipe that says who is alive
+        exec(arguments[-1], {})
+    except Exception:
+        sys.excepthook(*sys.exc_info())
+    finally:
+        os._exit(0)  # what is to be done at the end is for the parent to do
 
 
 @contextmanager

@@ -21,6 +21,7 @@ SWEEP = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\
 RUN = ("sweep", "sweep.yaml", "--executor", "serial", "-q", "-o", "out")
 REQUIRE = ("--require", "n_stable > 0")
 SPECIAL = "is a device or pipe, not a file"
+EITHER = pytest.mark.parametrize("kind", ["pipe", pytest.param("device", marks=pytest.mark.slow)])
 LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_AS, (2**33, 2**33))"
 
 
@@ -62,7 +63,7 @@ def test_it_is_refused_by_its_name(
     assert result.stderr == f"dpg: cannot read {name}: {SPECIAL}\n"
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device"])
+@EITHER
 def test_parts_of_somebody_else_are_left_alone(
     run: Any, out: Path, folder: Path, kind: str
 ) -> None:
@@ -87,7 +88,7 @@ def test_a_summary_is_not_appended_to_a_pipe(run: Any, out: Path, folder: Path) 
         assert result.stderr == f"dpg: cannot write s.md: {SPECIAL}\n"
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device"])
+@EITHER
 def test_facts_that_are_no_file_are_not_read(run: Any, out: Path, kind: str) -> None:
     put(out / "run.json", kind)
     for command in (("report", "out"), RUN):
@@ -105,12 +106,12 @@ def test_a_report_that_is_no_file_stays(run: Any, out: Path, kind: str) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        ("predict", "p"),
         ("validate", "p"),
-        ("sweep", "p", "-o", "new"),
         ("sweep", "of_pipe.yaml", "-o", "new"),
-        ("compare", "three_unit.yaml", "p"),
         ("fit", "hinge", "p"),
+        pytest.param(("predict", "p"), marks=pytest.mark.slow),
+        pytest.param(("sweep", "p", "-o", "new"), marks=pytest.mark.slow),
+        pytest.param(("compare", "three_unit.yaml", "p"), marks=pytest.mark.slow),
     ],
 )
 def test_a_pipe_that_nobody_writes_to_is_not_waited_for(

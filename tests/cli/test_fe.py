@@ -17,6 +17,8 @@ from dpgcli.cli.exits import ExitCode
 
 needs_solver = pytest.mark.skipif(shutil.which("ccx") is None, reason="needs calculix-ccx")
 HINGE = ("fe", "hinge", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
+UNIT = ("fe", "unit", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
+FINGER = ("fe", "finger", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
 DOME = ("fe", "dome", "three_unit.yaml", "--output", "deck", "--mesh", "coarse")
 
 Fake = Callable[[str], dict[str, str]]
@@ -62,12 +64,12 @@ def rows(path: Path) -> Any:
 
 
 def test_a_deck_alone(call: Any, folder: Path) -> None:
-    for command, name in ((DOME, "dome"), (HINGE, "hinge")):
+    for command, name in ((DOME, "dome"), (HINGE, "hinge"), (UNIT, "unit"), (FINGER, "finger")):
         result = call(*command)
         assert result.exit_code == ExitCode.DONE
         assert result.stdout == f"deck/{name}.inp\n"
         assert result.stderr == ""
-    assert files(folder) == {"dome.inp", "hinge.inp"}
+    assert files(folder) == {"dome.inp", "hinge.inp", "unit.inp", "finger.inp"}
     before = (folder / "deck" / "dome.inp").read_bytes()
     assert call(*DOME).exit_code == ExitCode.DONE
     assert (folder / "deck" / "dome.inp").read_bytes() == before
@@ -90,6 +92,82 @@ def test_options_reach_the_deck(call: Any, folder: Path) -> None:
     said = (folder / "deck" / "hinge.inp").read_text()
     assert "** gap 2.5 mm" in said
     assert "up to 7 N mm" in said
+
+
+def test_options_reach_the_deck_of_a_unit(call: Any, folder: Path) -> None:
+    changes = ("unit_separation_mm=2", "dome_height_mm=6", "limiting_layer_thickness_mm=2")
+    settings = [word for change in changes for word in ("-s", f"finger.geometry.{change}")]
+    options = ("--moment", "7", "--push-stiffness", "40", "--poisson", "0.45")
+    assert call(*UNIT, *settings, *options).exit_code == ExitCode.DONE
+    said = (folder / "deck" / "unit.inp").read_text()
+    for words in ("** gap 2 mm, layer 2 mm", "a spring of 40 N/mm and 8 mm, 4 mm too long",
+                  "nu = 0.45", "up to 7 N mm"):  # fmt: skip
+        assert words in said
+
+
+@pytest.mark.parametrize("command", [UNIT, FINGER])
+def test_a_dome_that_does_not_reach_pushes_nothing(
+    call: Any, folder: Path, command: tuple[str, ...]
+) -> None:
+    result = call(*command, "-s", "finger.geometry.unit_separation_mm=6.5")
+    assert result.exit_code == ExitCode.USAGE
+    assert "dome_height_mm 6.5 is not above unit_separation_mm 6.5" in result.stderr
+    assert not (folder / "deck").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "patterns"),
+    [
+        ((), ["001", "011", "010", "110", "111", "101", "100"]),
+        (("--pattern", "1?0"), ["110", "100"]),
+        (("--pattern", "000", "--pattern", "001"), ["001"]),
+    ],
+)
+def test_states_of_a_finger_are_chosen(
+    call: Any, folder: Path, options: tuple[str, ...], patterns: list[str]
+) -> None:
+    assert call(*FINGER, *options).exit_code == ExitCode.DONE
+    steps = (folder / "deck" / "finger.inp").read_text().split("*TEMPERATURE\n")[1:]
+    lines = [step.splitlines()[:3] for step in steps]
+    assert ["".join(line[-1] for line in step) for step in lines] == patterns
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--pattern", "000"), "nothing is pushed in state 000"),
+        (("-s", "finger.units=9"), "512 states are too many for finite elements, at most 256"),
+        (("-s", "finger.units=9"), "choose some with --pattern"),
+        (("--pattern", "12"), "expected digits 0 and 1"),
+        (("--push-stiffness", "nan"), "--push-stiffness nan: expected a number > 0"),
+    ],
+)
+def test_fingers_that_are_none(
+    call: Any, folder: Path, options: tuple[str, ...], said: str
+) -> None:
+    result = call(*FINGER, *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr
+    assert not (folder / "deck").exists()
+
+
+def test_states_of_a_finger_are_data_to_compare_with(call: Any, folder: Path, fake: Fake) -> None:
+    from dpgcli.calibration.fe.models import PUSHED_CELLS
+    from dpgcli.calibration.fe.pushed import pushed_bricks
+
+    chambers = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+    nodes = pushed_bricks(chambers, PUSHED_CELLS["coarse"], 4).nodes
+    moved = np.where(nodes[:, :1] > 39.0, [3.45, -0.5, 0.0], 0.0)
+    rows = [f"{n:10d} {x:13.6E} {y:13.6E} {z:13.6E}" for n, (x, y, z) in enumerate(moved, start=1)]
+    head = "\n displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
+    (folder / "prepared.dat").write_text(head + "\n".join(rows) + "\n")
+    fake('cp ../../prepared.dat "$1.dat"')
+    result = call(*FINGER, "--pattern", "00?", "--run")
+    assert result.exit_code == ExitCode.DONE
+    assert "2 states; tip of 001: 55.45, -0.5 mm. (" in result.stderr
+    compared = call("compare", "three_unit.yaml", "deck/finger.csv")
+    assert compared.exit_code == ExitCode.DONE, compared.stderr
+    assert "001" in compared.stdout
 
 
 def test_a_run_writes_curve_results_and_log(call: Any, folder: Path, fake: Fake) -> None:
@@ -305,6 +383,9 @@ def test_another_deck_removes_what_the_old_one_gave(call: Any, folder: Path, fak
         ((*DOME, "--rim-radius", "8"), "no mesh of this dome: its rim lies within r = 8.299 mm"),
         ((*DOME, "--base-diameter", "0.2"), "no mesh of this dome: "),
         ((*DOME, "--time-limit", "0"), "--time-limit 0: expected a number > 0"),
+        ((*UNIT, "--moment", "0"), "--moment 0: expected a number > 0"),
+        ((*UNIT, "--push-stiffness", "-50"), "--push-stiffness -50: expected a number > 0"),
+        ((*UNIT, "--poisson", "0.5"), "--poisson 0.5: expected 0 to below 0.5"),
         ((*HINGE, "--moment", "nan"), "--moment nan: expected a number > 0"),
         (
             ("fe", "dome", "none.yaml", "--output", "deck"),
@@ -360,6 +441,40 @@ def test_a_real_hinge_is_as_stiff_as_the_reference(call: Any, folder: Path) -> N
     assert 5.0 / rotation[-1] == pytest.approx(27.7, rel=0.03)
     stiffness = moment[1:] / rotation[1:]
     assert stiffness == pytest.approx(stiffness[0], rel=0.01), "linear within a percent"
+
+
+@needs_solver
+@pytest.mark.slow
+def test_a_real_unit_is_that_of_the_given_table(call: Any, folder: Path) -> None:
+    """On the same mesh within 1 %, but for what the clamped chamber tilts by, 0.008 rad at most."""
+    table = rows(Path(__file__).parents[2] / "configs" / "calibration" / "unit_moment.csv")
+    assert call(*UNIT[:-1], "medium", "--run", "-q").exit_code == ExitCode.DONE
+    curve = rows(folder / "deck" / "unit.csv")
+    assert curve.dtype.names == table.dtype.names
+    assert curve["moment_N_mm"] == pytest.approx(table["moment_N_mm"])
+    for column in ("chamber2_angle_rad", "opening_mm", "push_N"):
+        assert curve[column] == pytest.approx(table[column], rel=0.01, abs=1e-9), column
+    assert curve["chamber1_angle_rad"] == pytest.approx(table["chamber1_angle_rad"], abs=1e-3)
+
+
+@needs_solver
+@pytest.mark.slow
+def test_a_real_finger_is_that_of_the_given_table(call: Any, folder: Path) -> None:
+    """Tips within 1.5 % of the deflection; gaps on the ground are soft springs in the table."""
+    path = Path(__file__).parents[2] / "configs" / "calibration" / "three_gap_finger_pure_push.csv"
+    table = rows(path)
+    options = [word for pattern in ("001", "100", "110") for word in ("--pattern", pattern)]
+    assert call(*FINGER[:-1], "medium", *options, "--run", "-q").exit_code == ExitCode.DONE
+    states = rows(folder / "deck" / "finger.csv")
+    table = table[[1, 3, 4]]
+    assert states.dtype.names == table.dtype.names
+    tips, given = (np.stack([t["tip_x_mm"], t["tip_y_mm"]]) for t in (states, table))
+    assert (np.hypot(*(tips - given)) < 0.015 * np.hypot(*(given - [[52.0], [0.0]]))).all()
+    for gap in (1, 2, 3):
+        pushed = table[f"push{gap}_N"] > 0.0
+        found = states[f"push{gap}_N"]
+        assert found[pushed] == pytest.approx(table[f"push{gap}_N"][pushed], rel=0.015)
+        assert (found[~pushed] == 0.0).all()
 
 
 @needs_solver

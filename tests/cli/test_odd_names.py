@@ -59,7 +59,8 @@ COMMANDS = [  # an @ stands for the odd name
     "fit finger @-finger.yaml @-tips.csv -o @-lever.yaml --plot @-f.svg; "
     "compare @-finger.yaml @-tips.csv --calibration @-lever.yaml --plot @-c.svg",
     "init @-new.yaml",
-    "fe hinge @.yaml --output @-deck; fe dome @.yaml --output @-deck",
+    "fe hinge @.yaml --output @-deck; fe dome @.yaml --output @-deck; "
+    "fe unit @.yaml --output @-deck; fe finger @.yaml --output @-deck",
     "stress @.yaml --only patterns -o @-stress.parquet",
 ]
 

@@ -309,7 +309,7 @@ def test_files_get_the_permissions_of_new_files(run: Any, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("spec", "name"),
     [
-        ("twenty_unit.yaml", "states.parquet"),
+        pytest.param("twenty_unit.yaml", "states.parquet", marks=pytest.mark.slow),
         ("three_unit.yaml", "states.svg"),
     ],
 )

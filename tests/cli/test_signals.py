@@ -18,6 +18,8 @@ SIGNALS = [
     (signal.SIGINT, ExitCode.INTERRUPTED, "interrupted"),
     (signal.SIGTERM, ExitCode.TERMINATED, "terminated"),
 ]
+SIGINT, SIGTERM = SIGNALS
+SLOW = pytest.mark.slow
 WRITING = ("predict", "twenty_unit.yaml", "-o", "states.parquet")
 
 
@@ -114,7 +116,7 @@ run_and_exit(app)
     assert done.stderr == f"dpg: {word}; nothing half-written is left\n"
 
 
-@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+@pytest.mark.parametrize(("number", "code", "word"), [SIGTERM, pytest.param(*SIGINT, marks=SLOW)])
 def test_an_interrupt_while_nobody_reads(
     start: Any, number: signal.Signals, code: int, word: str
 ) -> None:
@@ -129,7 +131,7 @@ def test_an_interrupt_while_nobody_reads(
     assert process.stderr.read().decode() == f"dpg: {word}; nothing half-written is left\n"
 
 
-@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+@pytest.mark.parametrize(("number", "code", "word"), [SIGINT, pytest.param(*SIGTERM, marks=SLOW)])
 def test_an_interrupt_while_writing_leaves_nothing(
     start: Any, folder: Path, number: int, code: int, word: str
 ) -> None:
@@ -142,7 +144,7 @@ def test_an_interrupt_while_writing_leaves_nothing(
     assert not list(folder.glob("*states*")) + list(folder.glob(".states*"))
 
 
-@pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
+@pytest.mark.parametrize(("number", "code", "word"), [SIGTERM, pytest.param(*SIGINT, marks=SLOW)])
 def test_an_interrupt_leaves_the_old_table_as_it_was(
     start: Any, folder: Path, number: int, code: int, word: str
 ) -> None:
@@ -157,6 +159,7 @@ def test_an_interrupt_leaves_the_old_table_as_it_was(
     assert not list(folder.glob(".states*"))
 
 
+@pytest.mark.slow
 def test_a_closed_terminal_leaves_nothing(start: Any, folder: Path) -> None:
     process = start(*WRITING)
     wait_until(is_writing(folder), process)
@@ -166,7 +169,7 @@ def test_a_closed_terminal_leaves_nothing(start: Any, folder: Path) -> None:
     assert not list(folder.glob(".states*"))
 
 
-@pytest.mark.parametrize("form", ["json", "csv"])
+@pytest.mark.parametrize("form", ["json", pytest.param("csv", marks=pytest.mark.slow)])
 def test_an_interrupt_while_printing(start: Any, form: str) -> None:
     process = start("predict", "twenty_unit.yaml", "--format", form)
     assert process.stdout.readline()

@@ -18,6 +18,7 @@ SMALL = (
     ("init", "-"),
 )
 HELP = (("--version",), ("predict", "--help"))
+SLOW = pytest.mark.slow
 BUFFERING = ({}, {"PYTHONUNBUFFERED": "1"})
 
 
@@ -50,7 +51,7 @@ def test_a_reader_that_has_had_enough_ends_it_quietly(
     assert "dpg:" not in result.stderr
 
 
-@pytest.mark.parametrize("form", ["csv", "json", "table"])
+@pytest.mark.parametrize("form", ["csv", *(pytest.param(f, marks=SLOW) for f in ("json", "table"))])
 def test_head_of_a_million_rows(start: Any, form: str) -> None:
     process = start("predict", "twenty_unit.yaml", "--format", form)
     assert process.stdout.readline()
@@ -81,7 +82,9 @@ def test_the_file_is_written_when_nobody_reads_the_rows(
     assert (folder / "states.run.json").is_file()
 
 
-@pytest.mark.parametrize("arguments", [*SMALL, *HELP])
+@pytest.mark.parametrize(
+    "arguments", [SMALL[0], SMALL[-1], HELP[0], *(pytest.param(a, marks=SLOW) for a in SMALL[1:-1])]
+)
 def test_a_full_disk_behind_standard_output_is_2(
     run: Any, full: int, arguments: tuple[str, ...]
 ) -> None:

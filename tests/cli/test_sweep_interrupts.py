@@ -50,9 +50,20 @@ def launch(folder: Path, mark: str) -> Iterator[Launch]:
     (folder / "eight_unit.yaml").write_bytes((configs / "eight_unit.yaml").read_bytes())
     (folder / "sweep.yaml").write_text(SWEEP)
 
-    def started(*options: str, output: str = "out", **more: Any) -> "subprocess.Popen[bytes]":
+    def started(
+        *options: str, output: str = "out", before: str = "", **more: Any
+    ) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(
-            [*PROGRAM, "sweep", "sweep.yaml", "-o", output, "-q", *options],
+            [
+                *PROGRAM[:2],
+                before + PROGRAM[2],
+                "sweep",
+                "sweep.yaml",
+                "-o",
+                output,
+                "-q",
+                *options,
+            ],
             cwd=folder,
             env={**os.environ, MARK: mark},
             stdout=subprocess.PIPE,
@@ -294,7 +305,8 @@ def test_a_kill_while_the_tables_are_written_leaves_no_rubbish(
     launch: Launch, folder: Path, mark: str, undisturbed: tuple[dict[str, bytes], float]
 ) -> None:
     """What a killed run left is cleared away by the run that ends the sweep."""
-    process = launch("-j", "2")
+    waits = "import time, dpgcli.files.table_writer as t; t.seal = lambda _: time.sleep(60); "
+    process = launch("-j", "2", before=waits)
     assert wait_until(lambda: list((folder / "out").glob(".states.parquet.*.tmp")))
     process.kill()
     finished(process)

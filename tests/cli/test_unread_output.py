@@ -48,6 +48,7 @@ FEW = (
     "        yield block\n"
     "Prediction.blocks = blocks"
 )
+SLOW = pytest.mark.slow
 Unread = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
@@ -62,7 +63,11 @@ def unread(run: Any, folder: Path) -> Iterator[Unread]:
     os.close(writing)
 
 
-@pytest.mark.parametrize("env", [BUFFERED, UNBUFFERED], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize(
+    "env",
+    [UNBUFFERED, pytest.param(BUFFERED, marks=SLOW)],
+    ids=["unbuffered", "buffered"],
+)
 @pytest.mark.parametrize(
     ("words", "before", "code"),
     [
@@ -81,7 +86,7 @@ def test_the_verdict_stands(
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("before", [KILLS, ""])
+@pytest.mark.parametrize("before", [KILLS, pytest.param("", marks=SLOW)])
 def test_of_tables_that_are_made_joined_and_judged(
     unread: Unread, folder: Path, before: str
 ) -> None:
@@ -116,10 +121,20 @@ def test_a_sweep_writes_all_its_files(unread: Unread, folder: Path) -> None:
     [
         (("predict", "three_unit.yaml", "--format", "csv", "-o", "a.parquet"), ["a.parquet"]),
         (("predict", "three_unit.yaml", "--plot", "a.svg"), ["a.svg"]),
-        (("compare", "study.yaml", "tips.csv", "--plot", "a.svg"), ["a.svg"]),
-        (("fit", "hinge", CURVE, "-o", "a.yaml", "--plot", "a.svg"), ["a.yaml", "a.svg"]),
+        pytest.param(
+            ("compare", "study.yaml", "tips.csv", "--plot", "a.svg"), ["a.svg"], marks=SLOW
+        ),
+        pytest.param(
+            ("fit", "hinge", CURVE, "-o", "a.yaml", "--plot", "a.svg"),
+            ["a.yaml", "a.svg"],
+            marks=SLOW,
+        ),
         (("fe", "hinge", "three_unit.yaml", "--out", "deck", "--mesh", "coarse"), ["deck"]),
-        (("stress", "--only", "mirror", "--format", "json", "-o", "a.parquet"), ["a.parquet"]),
+        pytest.param(
+            ("stress", "--only", "mirror", "--format", "json", "-o", "a.parquet"),
+            ["a.parquet"],
+            marks=SLOW,
+        ),
     ],
 )
 @pytest.mark.usefixtures("study")

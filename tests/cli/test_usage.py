@@ -25,7 +25,17 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 PROGRAM = "from dpgcli.__main__ import main; main()"
 SCRIPT = f"#!{sys.executable}\nif __name__ == '__main__':\n    {PROGRAM}\n"
 PREPARED = {"check": "sweep", "report": "sweep", "merge": "sweep"}
-SLOW = ("bench", "fe", "stress", "fit", "merge", "report", "sweep")  # their examples take long
+SLOW = (
+    "bench",
+    "check",
+    "compare",
+    "fe",
+    "fit",
+    "merge",
+    "report",
+    "stress",
+    "sweep",
+)  # their examples take long
 HINGE = "moment_N_mm,rotation_rad\n0,0\n2.4,0.1\n4.8,0.2\n"
 
 

@@ -30,10 +30,10 @@ def scripts(folder: Path) -> Path:
     ("start", "path", "method"),
     [
         (SCRIPT, None, "forkserver"),
-        (SCRIPT, "", "forkserver"),
+        pytest.param(SCRIPT, "", "forkserver", marks=pytest.mark.slow),
         (SCRIPT, f"nowhere{os.pathsep}.", "forkserver"),
         (MODULE, None, "forkserver"),
-        (SCRIPT, None, "spawn"),
+        pytest.param(SCRIPT, None, "spawn", marks=pytest.mark.slow),
         (MODULE, None, "spawn"),
     ],
 )

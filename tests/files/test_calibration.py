@@ -11,6 +11,7 @@ import pytest
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.fits import Parameter, fit_linear
 from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.design.outputs import Output
 from dpgcli.errors import OutputError, SpecError
 from dpgcli.files.calibration import (
     Calibration,
@@ -19,6 +20,7 @@ from dpgcli.files.calibration import (
     read_calibration,
     write_calibration,
 )
+from dpgcli.files.calibration.models import KnownErrors
 from dpgcli.files.calibration.results import (
     fitted,
     grid_of,
@@ -324,3 +326,58 @@ def test_a_grid_is_written_and_read_back(path: Path, method: GridMethod) -> None
         strict=True,
     ):
         assert np.array_equal(first, second)
+
+
+ERRORS = """\
+known_errors:
+  shapes: {largest: 0.05, rms: 0.02, against: states not given}
+  inverted_stiffness: {largest: 0.15, against: "moments: -10 N mm"}
+"""
+
+
+def test_what_is_known_of_outputs_is_written_and_read_back(path: Path) -> None:
+    found = read(path, WHOLE + ERRORS)
+    write_calibration(path, found)
+    known = read_as_it_is(path, path.read_text(encoding="utf-8")).known
+    assert known.known_errors == {
+        "shapes": (0.05, 0.02, "states not given"),
+        "inverted_stiffness": (0.15, None, "moments: -10 N mm"),
+    }
+    assert known.shape_error == known.known_errors["shapes"]
+    assert (known.warnings, known.residual) == (
+        ("no data from 1 to 14 mm",),
+        "1.2 mJ rms at 57 points",
+    )
+
+
+def test_a_fit_s_own_errors_of_states_come_first(path: Path) -> None:
+    quality = "quality: {n_points: 57, left_out_rms: 0.03, left_out_largest: 0.04}"
+    text = WHOLE.replace(WHOLE.splitlines()[-4], quality)
+    assert "residual_unit" not in text
+    known = read(path, text + ERRORS).known
+    assert known.shape_error is not None
+    assert known.shape_error[:2] == (0.04, 0.03)
+    assert known.residual == ""
+
+
+def test_one_point_has_no_residual(path: Path) -> None:
+    assert read(path, WHOLE.replace("n_points: 57", "n_points: 1")).known.residual == ""
+
+
+def test_outputs_are_those_that_are_told_apart() -> None:
+    assert [*KnownErrors.model_fields] == [output.key for output in Output]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("  shape: {largest: 1, against: x}", 'a known key, found "shape" (did you mean shapes?)'),
+        ("  shapes: {largest: -1, against: x}", "largest: expected a number >= 0, relative"),
+        ("  shapes: {rms: 1, against: x}", "largest: expected a number >= 0, relative, found noth"),
+        ("  shapes: {largest: 1}", "against: expected what it was compared with, a line of text"),
+    ],
+)
+def test_a_wrong_error_has_its_place(path: Path, line: str, said: str) -> None:
+    (problem,) = problems(path, f"{WHOLE}known_errors:\n{line}\n")
+    assert f"{len(WHOLE.splitlines()) + 2}:" in problem
+    assert said in problem

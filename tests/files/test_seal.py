@@ -65,9 +65,22 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("length", [10, 2**14, 2**16, 10**6])
+def test_metadata_may_be_long(tmp_path: Path, length: int) -> None:
+    """As of a sweep over a list of values: sealed, known again and replaced, damage seen."""
+    path, said = tmp_path / "designs.parquet", {"dpg.sweep": "v" * length, "dpg.z": "w"}
+    for _ in range(2):
+        write_table(path, schema(COLUMNS), [record_batch(COLUMNS, rows())], said)
+    content = path.read_bytes()
+    assert is_whole(path)
+    for place in (content.index(b"vvv"), content.rindex(b"vvv"), len(content) - 9):
+        path.write_bytes(flipped(content, 8 * place))
+        assert not is_whole(path)
+
+
 def test_a_table_is_sealed_and_reads_back(table: Path) -> None:
     assert is_whole(table)
-    designs, _ = read_designs(table)
+    designs = read_designs(table).columns
     assert designs["height_mm"].tolist() == [4.5, 6.0, 6.5]
     said = pq.read_metadata(table).metadata[KEY.encode()].decode()
     assert said != UNSEALED

@@ -78,7 +78,10 @@ def test_the_plan_computes_nothing(checkout: Path) -> None:
     assert "dpg explain" not in wrong.stdout
 
 
-@pytest.mark.parametrize("out", ["g/", "g//h", "$PWD/../pipeline/g"])
+@pytest.mark.parametrize(
+    "out",
+    ["$PWD/../pipeline/g/", *(pytest.param(o, marks=pytest.mark.slow) for o in ("g/", "g//h"))],
+)
 def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path, out: str) -> None:
     said = (
         "base: ../three_unit.yaml\n"
@@ -96,6 +99,7 @@ def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path,
     assert "not met: reach_max_mm < 41" in changed.stdout
 
 
+@pytest.mark.slow
 def test_other_code_judges_anew(checkout: Path) -> None:
     """Tables that are as they were are not computed again, but what is said of them is."""
     assert make(checkout).returncode == 0
@@ -118,6 +122,7 @@ def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     assert not (checkout / "configs" / "pipeline" / "out" / "checked").exists()
 
 
+@pytest.mark.slow
 def test_a_stricter_gate_is_held_against_the_tables_that_are_there(checkout: Path) -> None:
     assert make(checkout, "REQUIRE='min_barrier_mJ > 0.1'").returncode == 0
     for _ in range(2):
@@ -189,6 +194,7 @@ def test_the_workflow_installs_dpg_wherever_it_was_copied_to(tmp_path: Path, job
     assert shell(guard, ROOT, tmp_path, DPG="git+https://example.org/dpg").returncode == 0
 
 
+@pytest.mark.slow
 def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
     jobs, sweep = workflow()["jobs"], workflow()["env"]["SWEEP"]
     summary = checkout / "summary.md"

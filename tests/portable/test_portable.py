@@ -69,6 +69,7 @@ def test_predicting(folder: Path) -> None:
     assert not list(folder.glob(".*.tmp"))
 
 
+@pytest.mark.slow
 def test_a_sweep_by_spawned_workers_and_what_is_made_of_it(folder: Path) -> None:
     sweep = ("sweep", "sweep.yaml", "-q", "-j", "2", "-o")
     dpg(folder, *sweep, "out")

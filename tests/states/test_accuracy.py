@@ -44,7 +44,9 @@ def random_fingers(n_units: int, n_designs: int, seed: int) -> Finger:
     )
 
 
-@pytest.mark.parametrize("n_units", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize(
+    "n_units", [1, 3, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 5, 8))]
+)
 def test_bounds_cover_the_true_error_of_random_fingers(n_units: int) -> None:
     n_designs = 1000
     finger = random_fingers(n_units, n_designs, seed=n_units)

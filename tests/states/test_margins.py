@@ -89,7 +89,7 @@ def fold(finger: Finger, place: int, name: str, near: float) -> float:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_limits_are_folds(seed: int, name: str) -> None:
     finger = graded(seed)
     found = limit_of(limits_of(graded, seed), name)

@@ -137,7 +137,9 @@ def test_every_method_and_tolerance_ends_in_the_same_states(law: Callable[..., o
 
 
 @pytest.mark.parametrize("law", [PUBLISHED, PushOnly(PUBLISHED)], ids=["published", "push-only"])
-@pytest.mark.parametrize("distance", [1e-3, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize(
+    "distance", [1e-3, 1e-10, *(pytest.param(d, marks=pytest.mark.slow) for d in (1e-6, 1e-8))]
+)
 @pytest.mark.parametrize("name", ["force_linearity", "hinge_stiffness", "wall_compliance"])
 def test_wells_behind_walls_are_told_from_barriers_next_to_a_fold(
     law: object, distance: float, name: str

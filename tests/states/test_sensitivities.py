@@ -46,7 +46,7 @@ def outputs(finger: Finger) -> dict[str, Array]:
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
 @pytest.mark.parametrize("compliance", [0.0, 0.05])
-@pytest.mark.parametrize("stiffness", [1e2, 1e4, np.inf])
+@pytest.mark.parametrize("stiffness", [1e2, np.inf, pytest.param(1e4, marks=pytest.mark.slow)])
 def test_they_are_the_slopes_of_states_that_are_solved_again(
     graded_finger: Fingers, stiffness: float, compliance: float, law: DomeLaw
 ) -> None:

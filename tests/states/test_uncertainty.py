@@ -118,7 +118,9 @@ def drawn_apertures(finger: Finger, pattern: str, sigma: Array, mount: float) ->
 
 
 @pytest.mark.parametrize("mount", [-0.4, 0.0, 0.3])
-@pytest.mark.parametrize("pattern", ["000", "101", "111"])
+@pytest.mark.parametrize(
+    "pattern", ["101", *(pytest.param(p, marks=pytest.mark.slow) for p in ("000", "111"))]
+)
 def test_that_of_the_aperture_is_the_scatter_of_grippers_that_are_drawn(
     reference_finger: Fingers, pattern: str, mount: float
 ) -> None:

@@ -12,8 +12,9 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, bistable
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
+from dpgcli.reference.units import extended_units, inverted_rest
 from dpgcli.states.certify import Settled, Status
-from dpgcli.states.rigid_unit import turn_of
+from dpgcli.states.rigid_unit import tangent_of
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
@@ -38,7 +39,15 @@ def settled(finger: Finger, patterns: Flags, formulate: Formulate = chain_potent
 
 
 @pytest.mark.parametrize(("formulate", "bars"), FORMULATIONS)
-@pytest.mark.parametrize("compliance", [*COMPLIANCES, (0.0, 0.7)], ids=str)
+@pytest.mark.parametrize(
+    "compliance",
+    [
+        (0.0, 0.7),
+        *COMPLIANCES[::2],
+        *(pytest.param(c, marks=pytest.mark.slow) for c in COMPLIANCES[1::2]),
+    ],
+    ids=str,
+)
 def test_states_are_those_of_extended_precision(
     formulate: Formulate,
     bars: float,
@@ -158,7 +167,7 @@ def test_the_opening_behind_a_wall_is_the_root(stroke: float, compliance: float)
     finger = uniform_finger(1, **{**STUDY, "hinge_stiffness": 300.0, "stroke": stroke})
     finger = finger.changed(wall_compliance=np.array([[compliance]]))
     extension = np.array([[-0.5], [1e-3], [0.7], [1.3]]) * stroke
-    opening = 21.5 * np.sin(turn_of(finger, extension.reshape(1, -1)).ravel())
+    opening = 21.5 * np.sin(np.arctan(tangent_of(finger, extension.reshape(1, -1)).ravel()))
     for y, x in zip(extension.ravel(), opening, strict=True):
 
         def excess(m: float, y: float = float(abs(y))) -> float:
@@ -195,3 +204,44 @@ def test_a_batch_of_soft_and_rigid_walls_has_the_wells_of_each_alone(law: DomeLa
         if exists:
             assert together.extension[0, lane] == pytest.approx(alone.extension[0, 0], abs=1e-9)
             assert together.barrier[0, lane] == pytest.approx(alone.barrier[0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("compliance", "barrier"), [(0.0, 197.558), (1e-9, 197.558), (1e-5, 197.570), (0.1, 399.394)]
+)
+@pytest.mark.parametrize("law", [PUBLISHED, PushOnly(PUBLISHED)], ids=lambda law: law.description)
+def test_the_barrier_of_a_faint_hinge_beyond_its_bars(
+    law: DomeLaw, compliance: float, barrier: float
+) -> None:
+    """Corners within 1e-14 of 90 degrees; barriers by a minimizer in 40 digits."""
+    values = {"segment_height": 20.0, "stroke": 64.0, "bistable_stiffness": 13.0}
+    springs = {"force_linearity": 0.001, "hinge_stiffness": 0.003}
+    finger = replace(uniform_finger(1, **{**STUDY, **values, **springs}), law=law)
+    finger = finger.changed(wall_compliance=np.array([[compliance]]))
+    assert barriers(finger, inverted_wells(finger))[0] == pytest.approx(barrier, abs=2e-3)
+
+
+@pytest.mark.parametrize("compliance", [1e-12, 1e-9, 1e-5, 0.1])
+def test_a_dome_too_large_for_its_bars_has_no_well_behind_a_wall(compliance: float) -> None:
+    values = {"segment_height": 20.0, "stroke": 90.0, "bistable_stiffness": 13.0}
+    springs = {"force_linearity": 0.001, "hinge_stiffness": 0.015}
+    finger = uniform_finger(1, **{**STUDY, **values, **springs})
+    finger = finger.changed(wall_compliance=np.array([[compliance]]))
+    wells = inverted_wells(finger)
+    assert not wells.exists.any()
+    assert barriers(finger, wells)[0] == 0.0
+
+
+def test_the_reference_knows_openings_beyond_the_bars() -> None:
+    """Where a step of Newton's method by the opening leaves it: corners near 90 degrees."""
+    values = {"segment_height": 20.0, "stroke": 64.0, "bistable_stiffness": 13.0}
+    springs = {"force_linearity": 0.001, "hinge_stiffness": 24.0}
+    finger = uniform_finger(1, **{**STUDY, **values, **springs})
+    finger = finger.changed(wall_compliance=np.array([[1e-3]]))
+    from mpmath import workdps
+
+    with workdps(40):
+        angle, wall = inverted_rest(extended_units(finger)[0])
+    found = inverted_wells(finger)
+    assert found.angle[0, 0] == pytest.approx(float(angle), rel=1e-9)
+    assert found.extension[0, 0] - 40.0 * np.sin(found.angle[0, 0]) == pytest.approx(float(wall))

@@ -115,7 +115,9 @@ def test_one_long_design_takes_the_memory_of_a_block(
     assert peaks[1] < 1.5 * peaks[0]
 
 
-@pytest.mark.parametrize("rows", [2**3, 2**6, 2**9])
+@pytest.mark.parametrize(
+    "rows", [2**6, *(pytest.param(2**n, marks=pytest.mark.slow) for n in (3, 9))]
+)
 @pytest.mark.parametrize("base", ["three_unit", "gripper"])
 def test_a_design_is_the_same_however_its_states_are_cut(
     study: Any, tables: Any, monkeypatch: pytest.MonkeyPatch, rows: int, base: str

@@ -69,7 +69,9 @@ def test_processes_give_the_bytes_of_a_serial_run(
     assert finish(study(*AXES), processes(n_workers)) == expected
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))]
+)
 def test_a_sweep_that_is_stopped_again_and_again(
     study: Any, expected: dict[str, bytes], seed: int
 ) -> None:
@@ -166,7 +168,9 @@ def test_a_damaged_description_is_not_believed(study: Any) -> None:
     assert made.store.said() == {}
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff"])
+@pytest.mark.parametrize(
+    "content", [b"[]", b"\xff", *(pytest.param(c, marks=pytest.mark.slow) for c in (b"", b"{"))]
+)
 def test_a_damaged_description_is_written_again(
     study: Any, expected: dict[str, bytes], content: bytes
 ) -> None:

@@ -1,6 +1,7 @@
 """Chunks at a workplace: every case once, whatever dies."""
 
 import errno
+import gc
 import importlib
 import os
 import resource
@@ -280,6 +281,24 @@ def test_a_system_without_semaphores_is_named(
         f"workers cannot be started: {why}, for semaphores (/dev/shm on Linux). "
         "Without workers: jobs 1"
     )
+
+
+def test_an_interrupt_while_a_pool_is_made_leaves_no_semaphore(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made, gone = set[str](), set[str]()
+
+    def interrupted(name: str, _: str) -> None:
+        made.add(name)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("multiprocessing.resource_tracker.register", interrupted)
+    monkeypatch.setattr("multiprocessing.resource_tracker.unregister", lambda n, _: gone.add(n))
+    with pytest.raises(KeyboardInterrupt):
+        process_pool(1)
+    gc.collect()
+    assert made
+    assert gone == made
 
 
 def test_a_system_without_a_place_for_sockets_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,18 +1,25 @@
 """Decks for CalculiX as text; the same input gives the same bytes. Units: mm, N, MPa, t, s."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array
 from dpgcli.calibration.fe.bricks import Bricks
+from dpgcli.calibration.fe.cards import (
+    END_OF_STEP,
+    digits,
+    elastic_lines,
+    force_lines,
+    mesh_lines,
+    set_lines,
+)
 from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS
 
-UNITS = "Units: mm, N, MPa, s; mass in t."
 DENSITY = 1.2e-9
 """Density in t/mm^3, that of silicones. It only sets the clock: see `pulse`."""
 
@@ -61,15 +68,15 @@ def dome_deck(dome: DomeShape, mesh: DomeMesh, loading: Pulse, words: Sequence[s
     shear, bulk = moduli(dome.elastic_modulus, dome.poisson)
     lines = [
         *(f"** {line}" for line in words),
-        *_mesh_lines(nodes, mesh.elements, "CAX8R"),
-        *_numbers("*ELSET, ELSET=LOADED", mesh.loaded),
-        *_numbers("*NSET, NSET=FIXED", mesh.fixed),
-        *_numbers("*NSET, NSET=AXIS", mesh.axis),
+        *mesh_lines(nodes, mesh.elements, "CAX8R"),
+        *set_lines("*ELSET, ELSET=LOADED", mesh.loaded),
+        *set_lines("*NSET, NSET=FIXED", mesh.fixed),
+        *set_lines("*NSET, NSET=AXIS", mesh.axis),
         "*MATERIAL, NAME=RUBBER",
         "*HYPERELASTIC, NEO HOOKE",
-        f"{_number(shear / 2)}, {_number(2 / bulk)}",
+        f"{digits(shear / 2)}, {digits(2 / bulk)}",
         "*DENSITY",
-        _number(DENSITY),
+        digits(DENSITY),
         "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER",
         "*BOUNDARY",
         "FIXED, 1, 2",
@@ -112,26 +119,21 @@ def hinge_deck(
 
     `words` become its comments.
     """
-    forces = largest_moment * couple(chambers, mesh)
-    step = _number(1 / MOMENT_STEPS)
+    step = digits(1 / MOMENT_STEPS)
     lines = [
         *(f"** {line}" for line in words),
-        *_mesh_lines(mesh.nodes, mesh.elements, "C3D20R"),
-        *_numbers("*NSET, NSET=FIXED", _where(layer_end(chambers, mesh, 0.0))),
-        *_numbers("*NSET, NSET=SYMMETRY", _where(on_plane(mesh, 2, 0.0))),
-        "*MATERIAL, NAME=RUBBER",
-        "*ELASTIC",
-        f"{_number(chambers.elastic_modulus)}, {_number(chambers.poisson)}",
-        "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER",
+        *mesh_lines(mesh.nodes, mesh.elements, "C3D20R"),
+        *set_lines("*NSET, NSET=FIXED", np.flatnonzero(layer_end(chambers, mesh, 0.0))),
+        *set_lines("*NSET, NSET=SYMMETRY", np.flatnonzero(on_plane(mesh, 2, 0.0))),
+        *elastic_lines(chambers.elastic_modulus, chambers.poisson),
         "*BOUNDARY",
         "FIXED, 1, 3",
         "SYMMETRY, 3, 3",
         "*STEP, NLGEOM, INC=1000",
         "*STATIC",
         f"{step}, 1, 1e-6, {step}",
-        "*CLOAD",
-        *(f"{node + 1}, 1, {_number(forces[node])}" for node in np.flatnonzero(forces)),
-        *_end_of_step(),
+        *force_lines(couple(chambers, mesh), largest_moment),
+        *END_OF_STEP,
     ]
     return "\n".join(lines) + "\n"
 
@@ -151,33 +153,10 @@ def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
     )
 
 
-def _mesh_lines(nodes: Array, elements: Indices, kind: str) -> Iterator[str]:
-    """Nodes and elements, at most fifteen numbers to a line as CalculiX wants it."""
-    yield "*NODE, NSET=ALL"
-    for number, point in enumerate(nodes, start=1):
-        yield ", ".join([str(number), *map(_number, point)])
-    yield f"*ELEMENT, TYPE={kind}, ELSET=BODY"
-    for number, element in enumerate(elements, start=1):
-        yield from _wrapped((number, *(element + 1)), 15)
-
-
-def _numbers(head: str, indices: Indices) -> Iterator[str]:
-    """A set of nodes or elements."""
-    yield head
-    yield from _wrapped(indices + 1, 15)
-
-
-def _wrapped(numbers: Iterable[int], n_per_line: int) -> Iterator[str]:
-    words = [str(number) for number in numbers]
-    for start in range(0, len(words), n_per_line):
-        more = "," if start + n_per_line < len(words) else ""
-        yield ", ".join(words[start : start + n_per_line]) + more
-
-
 def _pulse_lines(loading: Pulse) -> Iterator[str]:
     times = (0.0, *loading.corners)
     for time, pressure in zip(times, loading.pressure(np.array(times)), strict=True):
-        yield f"{_number(time)}, {_number(pressure)}"
+        yield f"{digits(time)}, {digits(pressure)}"
 
 
 def _dynamic_step(duration: float, period: float) -> list[str]:
@@ -185,20 +164,8 @@ def _dynamic_step(duration: float, period: float) -> list[str]:
     return [
         "*STEP, NLGEOM, INC=100000",
         "*DYNAMIC, ALPHA=-0.3",
-        ", ".join(map(_number, (largest, duration, smallest, largest))),
+        ", ".join(map(digits, (largest, duration, smallest, largest))),
         "*DLOAD, AMPLITUDE=PULSE",
         "LOADED, P2, 1",
-        *_end_of_step(),
+        *END_OF_STEP,
     ]
-
-
-def _end_of_step() -> list[str]:
-    return ["*NODE PRINT, NSET=ALL", "U", "*END STEP"]
-
-
-def _where(flags: Flags) -> Indices:
-    return np.flatnonzero(flags)
-
-
-def _number(value: float) -> str:
-    return f"{value:.12g}"

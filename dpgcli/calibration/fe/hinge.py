@@ -45,7 +45,7 @@ def chamber_bricks(chambers: Chambers, density: int) -> Bricks:
     """The mesh: one brick through walls, lid and layer, `density` along a gap or half a chamber."""
     lines = _lines(chambers, density)
     x, y, z = np.meshgrid(*((line[1:] + line[:-1]) / 2 for line in lines), indexing="ij")
-    return bricks(lines, _is_solid(chambers, x, y, z))
+    return bricks(lines, is_solid(chambers, x, y, z))
 
 
 def _lines(chambers: Chambers, density: int) -> tuple[Array, Array, Array]:
@@ -62,7 +62,8 @@ def _lines(chambers: Chambers, density: int) -> tuple[Array, Array, Array]:
     )
 
 
-def _is_solid(chambers: Chambers, x: Array, y: Array, z: Array) -> Flags:
+def is_solid(chambers: Chambers, x: Array, y: Array, z: Array) -> Flags:
+    """Flags of the points within walls, lids and layer, of chambers however many."""
     within = x % chambers.pitch
     top = chambers.layer_thickness + chambers.width
     is_layer = y < chambers.layer_thickness
@@ -89,20 +90,25 @@ def layer_end(chambers: Chambers, mesh: Bricks, place: float) -> Flags:
 
 
 def couple(chambers: Chambers, mesh: Bricks) -> Array:
-    """Forces along x (n,) in N on the free end of the layer that make a moment of 1 N mm.
+    """Forces along x (n,) in N on the free end of the layer that make a moment of 1 N mm."""
+    return end_couple(mesh, layer_end(chambers, mesh, mesh.nodes[:, 0].max()))
+
+
+def end_couple(mesh: Bricks, is_loaded: Flags) -> Array:
+    """Forces along x (n,) in N on flagged nodes of faces across x that make a moment of 1 N mm.
 
     It opens the gaps: clockwise, the chambers being above their layer. The traction grows with
-    the height over the middle of the layer, as in a bent beam; this half of the model bears one
+    the height over the middle of the faces, as in a bent beam; this half of the model bears one
     half of the moment.
     """
-    is_loaded = layer_end(chambers, mesh, mesh.nodes[:, 0].max())
     faces = mesh.elements[:, END_FACE]
     faces = faces[is_loaded[faces].all(axis=1)]
     points, weights = gauss(2)
     shapes = quad_shapes(points)
     corners = mesh.nodes[faces]
     area = np.ptp(corners[..., 1], axis=1) * np.ptp(corners[..., 2], axis=1) / 4
-    height = corners[..., 1] @ shapes.T - chambers.layer_thickness / 2
+    middle = (corners[..., 1].min() + corners[..., 1].max()) / 2
+    height = corners[..., 1] @ shapes.T - middle
     forces = np.zeros(len(mesh.nodes))
     np.add.at(forces, faces, (area[:, None] * height * weights) @ shapes)
     return np.asarray(forces / (2 * forces @ mesh.nodes[:, 1]))

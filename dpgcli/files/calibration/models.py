@@ -166,11 +166,39 @@ class Quality(Section):
     )
 
     @property
+    def residual(self) -> str:
+        """What is left of the data, in words; empty where nothing says it."""
+        if self.rms_residual is None or self.residual_unit is None or self.n_points < 2:
+            return ""
+        return f"{self.rms_residual:.3g} {self.residual_unit} rms at {self.n_points} points"
+
+    @property
     def leave_one_out(self) -> tuple[float, float] | None:
         """Root mean square and largest error of states, each predicted from the others."""
         if self.left_out_rms is None or self.left_out_largest is None:
             return None
         return self.left_out_rms, self.left_out_largest
+
+
+class KnownError(Section):
+    """Errors of one kind of output, as shares of it, and what it was compared with."""
+
+    largest: Size = Field(description="a number >= 0, relative")
+    rms: Size | None = Field(default=None, description="a number >= 0, relative")
+    against: str = Field(description="what it was compared with, a line of text")
+
+
+class KnownErrors(Section):
+    """By output, as `dpg explain` lists them; of shapes as shares of the deflection."""
+
+    shapes: KnownError | None = None
+    energies_and_barriers: KnownError | None = None
+    barriers: KnownError | None = None
+    ground_stiffness: KnownError | None = None
+    inverted_stiffness: KnownError | None = None
+    stiffness_along_the_bars: KnownError | None = None
+    pressures: KnownError | None = None
+    forces: KnownError | None = None
 
 
 class DataFile(Section):
@@ -198,6 +226,9 @@ class Calibration(Section):
     curve: Curve | None = Field(default=None, description="the dome's energy over its travel")
     grid: Grid | None = Field(default=None, description="a section of points")
     quality: Quality | None = Field(default=None, description="a section")
+    known_errors: KnownErrors | None = Field(
+        default=None, description="a section of errors by output"
+    )
     warnings: list[str] = Field(default_factory=list, description="a list of texts")
     sources: list[DataFile] = Field(default_factory=list, description="a list of files")
 
@@ -205,6 +236,7 @@ class Calibration(Section):
     def known(self) -> calibrations.Calibration:
         """The value that designs are resolved with."""
         values = {} if self.values is None else self.values.given()
+        errors = {} if self.known_errors is None else self.known_errors.given()
         return calibrations.Calibration(
             self.file,
             {k: calibrations.Fitted(v.value, v.standard_error) for k, v in values.items()},
@@ -213,6 +245,9 @@ class Calibration(Section):
             None if self.curve is None else self.curve.known,
             None if self.grid is None else self.grid.known,
             None if self.quality is None else self.quality.leave_one_out,
+            {key: calibrations.KnownError(**dict(error)) for key, error in errors.items()},
+            "" if self.quality is None else self.quality.residual,
+            tuple(self.warnings),
         )
 
     @property

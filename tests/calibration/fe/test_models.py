@@ -17,18 +17,29 @@ from dpgcli.calibration.fe.models import (
     dome_model,
     expected_peak,
     hinge_model,
+    unit_model,
 )
+from dpgcli.calibration.fe.pushed import Push
 from dpgcli.errors import SolverError
 
 DOME = DomeShape(height=6.5, thickness=0.75, elastic_modulus=26.0)
 CHAMBERS = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 
 
-@pytest.fixture(params=["dome", "hinge"])
-def model(request: pytest.FixtureRequest) -> Model:
-    if request.param == "dome":
+PUSH = Push(stiffness=50.0, stroke=3.5, dome_height=6.5)
+
+
+def made(name: str) -> Model:
+    if name == "dome":
         return dome_model(DOME, "coarse", 0.2)
-    return hinge_model(CHAMBERS, "coarse", 5.0)
+    if name == "hinge":
+        return hinge_model(CHAMBERS, "coarse", 5.0)
+    return unit_model(CHAMBERS, PUSH, "coarse", 5.0)
+
+
+@pytest.fixture(params=["dome", "hinge", "unit"])
+def model(request: pytest.FixtureRequest) -> Model:
+    return made(request.param)
 
 
 def cards(deck: str) -> dict[str, list[str]]:
@@ -59,8 +70,7 @@ def test_a_deck_numbers_every_node_once(model: Model) -> None:
 
 
 def test_the_same_input_gives_the_same_bytes(model: Model) -> None:
-    again = dome_model(DOME, "coarse", 0.2) if model.name == "dome" else None
-    again = again or hinge_model(CHAMBERS, "coarse", 5.0)
+    again = made(model.name)
     assert again.deck == model.deck
     assert again.words == model.words
 

@@ -558,6 +558,7 @@ def spec_or_problems(data):
         str(error)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.dictionaries(NAMES, DATA, max_size=3))
 def test_any_data_is_a_spec_or_has_problems(data):

@@ -1,0 +1,193 @@
+"""What to trust of a finger's outputs: the basis of each and what is known of its error.
+
+It depends on the law, on where values are from, on walls and on what is assumed. Numbers of known
+errors are ours: `dpg compare` on finite-element fingers, and moments on a unit, at the study's
+dimensions; see the page trust of the manual.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from dpgcli.design.calibrations import Calibration
+from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
+from dpgcli.design.footing import Case, Footing
+from dpgcli.design.model_error import model_error_of
+from dpgcli.design.outputs import Basis, Output, Trust
+from dpgcli.design.rules import (
+    BISTABLE_STIFFNESS,
+    FORCE_LINEARITY,
+    HINGE_STIFFNESS,
+    SEGMENT_HEIGHT,
+    STROKE,
+)
+
+UNKNOWN = "unknown"
+SHALLOW = "a twentieth of finite elements' (3.2 mJ in an inverted dome, not 38–79)"
+SHALLOW_DOUBT = "published springs hold a twentieth of the energy that finite elements have"
+TAKE_A_CURVE = "take a dome's curve (dpg fit bistable, dpg fe dome) with law: push_only"
+PULLING = "domes at rest pull in this law; real ones do not touch their neighbor"
+RIGID_WALLS = "walls are taken as rigid, real ones give way"
+GIVE_WALLS = "say finger.wall_compliance_mm_per_N: dpg help laws"
+ASSUMED_BARS = "the stiffest way of a straight finger is that of its bars, k_L/n with 1e4 N/mm"
+ASSUMED_AREA = (
+    "a dome's area is assumed: the published snap force over finite elements' snap pressure"
+)
+SAMPLE = "sample the dome's curve between rest and its inverted well"
+CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
+WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
+DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
+
+
+def trusts_of(case: Case) -> tuple[Trust, ...]:
+    """What each output of a design rests on, in the order of `Output`."""
+    return (
+        _shapes(case),
+        _energies(case),
+        _barriers(case),
+        _ground(case),
+        _inverted(case),
+        _axial(case),
+        _pressures(case),
+        _forces(case),
+    )
+
+
+def warnings_of(case: Case) -> tuple[str, ...]:
+    """The warnings of fits whose values, or curve, are in use, each with its file's name."""
+    used = {value.file for each in case.values.values() for value in each}
+    return tuple(
+        f"{file.file}: {warning}"
+        for place, file in enumerate(case.design.calibrations)
+        if isinstance(file, Calibration) and (place in used or file is case.domes.calibration)
+        for warning in file.warnings
+    )
+
+
+def _shapes(case: Case) -> Trust:
+    """Decided by walls, else by the segment height, unless something else is extrapolated."""
+    lead = case.footings[WALL_COMPLIANCE if case.has_walls else SEGMENT_HEIGHT.key]
+    gravest = case.gravest(*(key for key in case.footings if key != LINEAR_STIFFNESS))
+    lead = gravest if gravest.basis is Basis.EXTRAPOLATED else lead
+    error = model_error_of(case).text.partition(";")[0]
+    error = UNKNOWN if error.startswith(UNKNOWN) else error
+    return _checked(Trust(Output.SHAPES, lead.basis, error, str(lead)), lead)
+
+
+def _energies(case: Case) -> Trust:
+    lead, curve = case.gravest(*DOMES), case.domes.calibration
+    source = str(lead) if curve is None else f"curve of {curve.file}, {lead}"
+    if case.has_published_domes:
+        found = Trust(Output.ENERGIES, lead.basis, SHALLOW, source)
+        return replace(found, doubt=SHALLOW_DOUBT, instead=TAKE_A_CURVE)
+    error = case.known_error(Output.ENERGIES, *DOMES, STROKE.key) or _fit_error(lead)
+    return _checked(Trust(Output.ENERGIES, lead.basis, error, source), lead)
+
+
+def _barriers(case: Case) -> Trust:
+    energies = replace(_energies(case), output=Output.BARRIERS)
+    known, gaps = case.known_error(Output.BARRIERS, *DOMES), [*_gaps(case)]
+    if known or not gaps:
+        return replace(energies, known_error=known or energies.known_error)
+    stretches = ", ".join("{:.4g} to {:.4g} mm".format(*gap) for _, gap in gaps)
+    said = f"nothing is sampled in {gaps[0][0]} from {stretches} of the dome's travel"
+    is_bridged = case.domes.calibration is not None
+    how = "bridged by a polynomial" if is_bridged else "the fitted law goes on there"
+    return replace(
+        energies,
+        basis=Basis.ASSUMED if is_bridged else Basis.EXTRAPOLATED,
+        known_error=UNKNOWN,
+        source=f"{said}: {how}",
+        doubt=f"{said}: {how}",
+        instead=SAMPLE,
+    )
+
+
+def _gaps(case: Case) -> Iterator[tuple[str | None, Sequence[float]]]:
+    """Stretches before the inverted well in which the dome's curve was not sampled."""
+    file = case.domes.calibration or case.footings[BISTABLE_STIFFNESS.key].calibration
+    if file is None or file.curve is None:
+        return
+    well = case.domes.travel
+    if not well and STROKE.key in file.values:
+        well = file.values[STROKE.key].value / file.curve.opening_per_travel
+    for gap in file.curve.gaps:
+        if not well or gap[0] < well:
+            yield file.file, gap
+
+
+def _ground(case: Case) -> Trust:
+    if case.pulls:
+        is_published = case.has_published_domes
+        basis = case.footings[BISTABLE_STIFFNESS.key].basis if is_published else Basis.ASSUMED
+        error = f"{50 if is_published else 'hundreds of'} times too stiff against finite elements"
+        found = Trust(Output.GROUND, basis, error, case.domes.law.description)
+        return replace(found, doubt=PULLING, instead="take law: push_only")
+    hinge = case.footings[HINGE_STIFFNESS.key]
+    known = case.known_error(Output.GROUND, HINGE_STIFFNESS.key)
+    if not known and hinge.basis in (Basis.FITTED, Basis.PUBLISHED):
+        known = f"within about 20 % of finite elements{case.elsewhere(hinge.key)}"
+    return _checked(Trust(Output.GROUND, hinge.basis, known or UNKNOWN, str(hinge)), hinge)
+
+
+def _inverted(case: Case) -> Trust:
+    if case.has_walls:
+        return _of_walls(case, Output.INVERTED, WITH_WALLS)
+    times = "6" if case.has_published_domes else "hundreds of" if case.pulls else "40–90"
+    error = f"{times} times too stiff against finite elements"
+    return _of_rigid_walls(case, Output.INVERTED, error)
+
+
+def _forces(case: Case) -> Trust:
+    if case.has_walls:
+        return _of_walls(case, Output.FORCES, "pushes within about 10 % of finite elements")
+    error = "pushes 13–43 % off finite elements; loads meet units that are too stiff"
+    return _of_rigid_walls(case, Output.FORCES, error)
+
+
+def _of_rigid_walls(case: Case, output: Output, error: str) -> Trust:
+    spring = case.footings[BISTABLE_STIFFNESS.key]
+    basis = spring.basis if case.has_published_domes else Basis.ASSUMED
+    source = f"rigid walls, {spring}"
+    return Trust(output, basis, error, source, doubt=RIGID_WALLS, instead=GIVE_WALLS)
+
+
+def _of_walls(case: Case, output: Output, error: str) -> Trust:
+    keys = (WALL_COMPLIANCE, BISTABLE_STIFFNESS.key, HINGE_STIFFNESS.key)
+    lead, known = case.gravest(*keys), case.known_error(output, *keys)
+    if not known and case.has_fitted_walls:
+        known = error + case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
+    return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
+
+
+def _axial(case: Case) -> Trust:
+    bars = case.footings[LINEAR_STIFFNESS]
+    error = case.known_error(Output.AXIAL, LINEAR_STIFFNESS) or UNKNOWN
+    found = Trust(Output.AXIAL, bars.basis, error, str(bars))
+    if bars.basis is not Basis.ASSUMED:
+        return found
+    return replace(found, doubt=ASSUMED_BARS, instead=f"say finger.{LINEAR_STIFFNESS}")
+
+
+def _pressures(case: Case) -> Trust:
+    spring, curve = case.footings[BISTABLE_STIFFNESS.key], case.domes.calibration
+    if curve is None:
+        found = Trust(Output.PRESSURES, Basis.ASSUMED, UNKNOWN, ASSUMED_AREA)
+        return replace(found, doubt=ASSUMED_AREA, instead=TAKE_A_CURVE)
+    error = case.known_error(Output.PRESSURES, BISTABLE_STIFFNESS.key) or UNKNOWN
+    source = f"curve of {curve.file}, {spring}"
+    return _checked(Trust(Output.PRESSURES, spring.basis, error, source), spring)
+
+
+def _checked(found: Trust, footing: Footing) -> Trust:
+    """The same, doubted where a value is taken where nothing backs it."""
+    if footing.basis is not Basis.EXTRAPOLATED:
+        return found
+    return replace(found, doubt=f"nothing backs it here: {footing}", instead=CALIBRATE_HERE)
+
+
+def _fit_error(lead: Footing) -> str:
+    """The error of a fitted value by its own file: a standard error, or the fit's residual."""
+    if lead.error is not None:
+        return f"{lead.name} ± {100.0 * lead.error:.2g} % (its fit)"
+    file = lead.calibration
+    return UNKNOWN if file is None or not file.residual else f"{file.residual} (its fit)"

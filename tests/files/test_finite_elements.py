@@ -1,0 +1,87 @@
+"""`calibration: finite_elements`: one word, its law, its values and what they are off by."""
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dpgcli as dpg
+from dpgcli.errors import SpecError
+from dpgcli.files.calibration import read_calibration
+from dpgcli.files.scene_file import read_spec, scene_of
+from dpgcli.files.scene_file.references import SHIPPED, SHIPPED_FILES
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+STUDY = CONFIGS / "three_unit.yaml"
+WORD = "finger.calibration=finite_elements"
+
+
+def finger_of(*settings: str) -> Any:
+    return scene_of(read_spec(STUDY, settings)).finger
+
+
+def test_one_word_brings_curve_walls_and_law() -> None:
+    finger = finger_of(WORD)
+    assert finger.law.description == "push-only law, tabulated energy of the dome"
+    assert finger.has_walls
+    assert finger.stroke[0, 0] == pytest.approx(13.708 - 6.5 - 3.0, abs=2e-3)
+
+
+def test_a_law_that_is_given_stays() -> None:
+    assert finger_of(WORD, "finger.law=published").law.description.startswith("published law")
+    assert finger_of("finger.law=push_only").law.description.startswith("push-only law, published")
+
+
+def test_it_stands_in_lists() -> None:
+    listed = finger_of("finger.calibration=[finite_elements, published]")
+    alone = finger_of(WORD)
+    for name, values in alone.arrays().items():
+        np.testing.assert_array_equal(getattr(listed, name), values)
+    assert listed.law.description == alone.law.description
+
+
+def test_a_file_before_it_comes_first() -> None:
+    push = CONFIGS / "calibration" / "push_3.5mm.yaml"
+    both = finger_of(f"finger.calibration=[{push}, finite_elements]")
+    assert both.bistable_stiffness[0, 0] == pytest.approx(50.0)
+    assert both.has_walls
+
+
+def test_another_modulus_softens_walls_and_hinges_alike() -> None:
+    one, half = (finger_of(WORD, f"finger.geometry.elastic_modulus_MPa={e}") for e in (26, 13))
+    for key, factor in (("wall_compliance", 2.0), ("hinge_stiffness", 0.5)):
+        assert getattr(half, key) == pytest.approx(factor * getattr(one, key), rel=1e-12)
+    assert half.segment_height == pytest.approx(one.segment_height)
+
+
+def test_without_the_dimensions_it_says_which() -> None:
+    with pytest.raises(SpecError, match="limiting_layer_thickness_mm"):
+        finger_of(WORD, "finger.geometry.limiting_layer_thickness_mm=null")
+
+
+@pytest.mark.parametrize("name", SHIPPED_FILES)
+def test_it_is_what_its_tables_give(name: str) -> None:
+    made = runpy.run_path(str(CONFIGS / "calibration" / "finite_elements.py"))
+    again = made[name.removesuffix(".yaml")]().model_dump(exclude_none=True)
+    shipped = read_calibration(SHIPPED / name).model_dump(exclude_none=True)
+    assert shipped.keys() == again.keys()
+    for section in ("values", "curve", "grid", "known_errors"):
+        assert _flat(shipped.get(section)) == pytest.approx(_flat(again.get(section)), rel=1e-6)
+
+
+def _flat(section: Any) -> dict[str, float]:
+    """The numbers of a section by their path."""
+    if isinstance(section, dict | list):
+        pairs = section.items() if isinstance(section, dict) else enumerate(section)
+        return {f"{k}.{p}": v for k, part in pairs for p, v in _flat(part).items()}
+    return {"": section} if isinstance(section, int | float) else {}
+
+
+def test_its_known_errors_are_said() -> None:
+    explained = dpg.explain(STUDY, settings=[WORD])
+    known = {row["output"]: row for row in explained.json["trust"]}
+    assert known["shapes"]["basis"] == "fitted"
+    assert "finger of three gaps" in known["shapes"]["known_error"]
+    assert known["barriers"]["basis"] == "assumed"

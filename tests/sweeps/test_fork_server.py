@@ -1,0 +1,72 @@
+"""The process that workers are forked from: early, a fork of the program itself."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/cmdline").exists(), reason="needs /proc to look at processes"
+)
+
+# prints whether the server goes on from here, whether a module is loaded here and in a worker, and
+# whether a file of ours is open there
+PROGRAM = """
+import os, signal, sys, threading
+from multiprocessing import forkserver
+from pathlib import Path
+from dpgcli.__main__ import answer_stops
+from dpgcli.sweeps import pool
+
+ENDING, N_THREADS = sys.argv[1:]
+answer_stops()
+for _ in range(int(N_THREADS)):
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+lasts, held = os.pipe()
+pool.start_fork_server("colorsys")
+server = forkserver._forkserver._forkserver_pid
+commands = {Path(f"/proc/{number}/cmdline").read_bytes() for number in (server, os.getpid())}
+workers = pool.process_pool(1)
+loaded = workers.submit(eval, "'colorsys' in __import__('sys').modules").result()
+workers.shutdown()
+files = {os.readlink(f"/proc/{server}/fd/{name}") for name in os.listdir(f"/proc/{server}/fd")}
+is_open = os.readlink(f"/proc/self/fd/{held}") in files
+print(len(commands) == 1, "colorsys" in sys.modules, loaded, is_open, flush=True)
+if ENDING == "SIGTERM":
+    os.kill(server, signal.SIGTERM)
+    _, status = os.waitpid(server, 0)
+    print(os.waitstatus_to_exitcode(status))
+else:
+    os.kill(server, getattr(signal, ENDING))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def said(ending: str, n_threads: int) -> tuple[list[str], str]:
+    """Words and complaints of the program; none of its processes outlives it, or this waits."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, ending, str(n_threads)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    return done.stdout.split(), done.stderr
+
+
+def test_it_goes_on_from_the_program_and_ends_with_it() -> None:
+    """What was imported is not imported again, no file stays open, and Ctrl-C is not for it."""
+    assert said("SIGINT", 0) == (["True", "True", "True", "False"], "")
+
+
+def test_it_is_terminated_without_a_word() -> None:
+    words, complaint = said("SIGTERM", 0)
+    assert words == ["True", "True", "True", "False", str(-signal.SIGTERM)]
+    assert complaint == ""
+
+
+def test_beside_other_threads_it_is_a_new_interpreter() -> None:
+    """These may hold locks, which nobody would open in a fork."""
+    assert said("SIGINT", 1)[0] == ["False", "False", "True", "False"]
