@@ -120,7 +120,7 @@ def test_columns_may_stand_in_any_order(tmp_path: Path, order: list[str]) -> Non
     assert list(found)[:3] == ["design", "height_mm", "calibration"]
     assert found.keys() == COLUMNS.keys()
     with_notes = pa.table({**COLUMNS, "notes": ["a"] * N}).select([*reversed(order), "notes"])
-    assert list(designs_in(with_notes, "t")[0])[:3] == ["design", "height_mm", "calibration"]
+    assert list(designs_in(with_notes, "t").columns)[:3] == ["design", "height_mm", "calibration"]
 
 
 @pytest.mark.parametrize("reasons", [["", "", "", "no such finger"], [""] * N])
