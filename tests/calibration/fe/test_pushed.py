@@ -221,6 +221,8 @@ def test_steps_of_the_deck(model: Model) -> None:
     found = cards(model.deck)
     temperatures = [lines for card, lines in found if card == "*TEMPERATURE"]
     assert temperatures == 4 * [["GAP1, 0"]] + 5 * [["GAP1, 1"]]
+    increments = [lines[0].split(",")[0] for card, lines in found if card == "*STATIC"]
+    assert increments == ["1"] * 4 + ["0.25"] + ["1"] * 4, "in small steps where the gap opens"
     loads = [lines for card, lines in found if card == "*CLOAD"]
     couples = [
         2 * sum(heights[int(node)] * float(force) for node, _, force in map(_cells, lines))
@@ -232,6 +234,12 @@ def test_steps_of_the_deck(model: Model) -> None:
 
 def _cells(line: str) -> list[str]:
     return line.split(", ")
+
+
+def test_ends_of_springs_stay_in_the_plane_of_symmetry(model: Model) -> None:
+    found = cards(model.deck)
+    held = [line for card, lines in found if card == "*BOUNDARY" for line in lines]
+    assert held == ["FIXED, 1, 3", "SYMMETRY, 3, 3", "ENDS, 3, 3"]
 
 
 def test_what_the_model_says_of_itself(model: Model) -> None:
@@ -257,6 +265,7 @@ def test_the_curve_of_a_unit_that_moves_as_told(mesh: Bricks) -> None:
     )  # fmt: skip
     assert curve.unit.tolist() == ["ground", "ground", "inverted", "inverted"]
     assert curve.moment_N_mm.tolist() == [0.0, 2.5, 0.0, -2.5]
+    assert curve.chamber1_angle_rad == pytest.approx(np.zeros(4))
     assert curve.chamber2_angle_rad == pytest.approx([0.0, -0.1, -0.3, -0.25])
     opened = opening(REFERENCE, mesh, PUSH, moved, 0)
     assert curve.opening_mm == pytest.approx([0.0, *opened])
