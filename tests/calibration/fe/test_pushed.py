@@ -294,7 +294,19 @@ def test_hinge_and_walls_of_a_unit_come_back() -> None:
     assert found.ground == pytest.approx(33.0)
     assert found.walls == pytest.approx(0.7)
     assert found.rotation == pytest.approx(0.26)
-    assert "k_theta 33 N mm/rad (ground: 33), c_w 0.7 mm/N" in unit_finding(found)
+    said = unit_finding(REFERENCE, table(33.0, 0.7))
+    assert said.endswith("k_theta 33 N mm/rad (ground: 33), c_w 0.7 mm/N.")
+
+
+def test_moments_that_are_too_large_are_said() -> None:
+    curve = table(33.0, 0.7)
+    narrow = replace(REFERENCE, separation=1.6)
+    assert unit_finding(narrow, curve).endswith(
+        " A moment closes the gap, where the chambers would touch: take smaller ones."
+    )
+    pulled = curve._replace(push_N=np.array([0.0, -0.1, 0.0, curve.push_N[3]]))
+    assert "the push becomes a pull" in unit_finding(REFERENCE, pulled)
+    assert "touch and one opens" in unit_finding(narrow, pulled)
 
 
 @pytest.mark.parametrize("turn", ["moment_N_mm", "chamber2_angle_rad", "push_N"])
