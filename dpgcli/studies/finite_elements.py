@@ -1,5 +1,6 @@
 """Runs of CalculiX in a folder: the deck, the log, and what comes out, whole or not at all."""
 
+import math
 import os
 import shutil
 import signal
@@ -11,8 +12,9 @@ from pathlib import Path
 from typing import IO
 
 from dpgcli.calibration.fe.curves import csv_text
+from dpgcli.calibration.fe.finger import with_seconds
 from dpgcli.calibration.fe.models import Model
-from dpgcli.calibration.fe.results import displacements, reported_error, version
+from dpgcli.calibration.fe.results import displacements, reported_error, seconds, version
 from dpgcli.errors import Field, OutputError, SolverError, UsageError
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.temporary import temporary_folder
@@ -95,7 +97,10 @@ def run(model: Model, folder: Path, limits: Limits) -> str:
         raise SolverError(f"what ccx wrote ends at time {times[-1]:g} of {model.end:g}")
     outcome = model.outcome(times, moved)
     comments = model.comments(version(output.log), outcome.finding)
-    _write(curve_path(model, folder), csv_text(comments, outcome.curve))
+    took, curve = seconds(output.log), outcome.curve
+    if isinstance(curve, dict) and math.isfinite(took):  # known states may say what each took
+        curve = with_seconds(curve, took)
+    _write(curve_path(model, folder), csv_text(comments, curve))
     return outcome.finding
 
 

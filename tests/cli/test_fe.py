@@ -47,9 +47,14 @@ def prepared(folder: Path, n_rows: int | None = None) -> None:
     cos, sin = np.cos(0.1), np.sin(0.1)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     moved = np.where(nodes[:, :1] > 12.25, nodes @ turn - nodes, 0.0)
+    write_displacements(folder / "prepared.dat", moved[:n_rows])
+
+
+def write_displacements(path: Path, moved: Any) -> None:
+    """Displacements at the end of one step, as CalculiX prints them."""
     rows = [f"{n:10d} {x:13.6E} {y:13.6E} {z:13.6E}" for n, (x, y, z) in enumerate(moved, start=1)]
     head = "\n displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
-    (folder / "prepared.dat").write_text(head + "\n".join(rows[:n_rows]) + "\n")
+    path.write_text(head + "\n".join(rows) + "\n")
 
 
 def files(folder: Path) -> set[str]:
@@ -158,12 +163,14 @@ def test_states_of_a_finger_are_data_to_compare_with(call: Any, folder: Path, fa
     chambers = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
     nodes = pushed_bricks(chambers, PUSHED_CELLS["coarse"], 4).nodes
     moved = np.where(nodes[:, :1] > 39.0, [3.45, -0.5, 0.0], 0.0)
-    rows = [f"{n:10d} {x:13.6E} {y:13.6E} {z:13.6E}" for n, (x, y, z) in enumerate(moved, start=1)]
-    head = "\n displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
-    (folder / "prepared.dat").write_text(head + "\n".join(rows) + "\n")
+    write_displacements(folder / "prepared.dat", moved)
     fake('cp ../../prepared.dat "$1.dat"')
+    assert call(*FINGER, "--pattern", "00?", "--run").exit_code == ExitCode.DONE
+    assert "seconds" not in (folder / "deck" / "finger.csv").read_text()
+    fake('cp ../../prepared.dat "$1.dat"; echo " Total CalculiX Time: 38.250000"')
     result = call(*FINGER, "--pattern", "00?", "--run")
     assert result.exit_code == ExitCode.DONE
+    assert rows(folder / "deck" / "finger.csv")["seconds"].tolist() == [19.125, 19.125]
     assert "2 states; tip of 001: 55.45, -0.5 mm. (" in result.stderr
     compared = call("compare", "three_unit.yaml", "deck/finger.csv")
     assert compared.exit_code == ExitCode.DONE, compared.stderr
@@ -467,7 +474,7 @@ def test_a_real_finger_is_that_of_the_given_table(call: Any, folder: Path) -> No
     assert call(*FINGER[:-1], "medium", *options, "--run", "-q").exit_code == ExitCode.DONE
     states = rows(folder / "deck" / "finger.csv")
     table = table[[1, 3, 4]]
-    assert states.dtype.names == table.dtype.names
+    assert states.dtype.names == (*table.dtype.names, "seconds")
     tips, given = (np.stack([t["tip_x_mm"], t["tip_y_mm"]]) for t in (states, table))
     assert (np.hypot(*(tips - given)) < 0.015 * np.hypot(*(given - [[52.0], [0.0]]))).all()
     for gap in (1, 2, 3):

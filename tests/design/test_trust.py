@@ -371,6 +371,16 @@ def test_a_file_that_does_not_say_where_it_holds_is_extrapolated() -> None:
     assert found[Output.ENERGIES].instead == "calibrate at this geometry: dpg help calibration"
 
 
+def test_walls_are_known_beside_a_pushing_dome_of_a_curve_alone() -> None:
+    pulled = with_files(TABULATED, WALLS)
+    no_curve = with_files(replace(BASE, law="push_only"), WALLS)
+    for design in (pulled, no_curve):
+        assert trusts(design)[Output.INVERTED].known_error == "unknown"
+        assert trusts(design)[Output.FORCES].known_error == "unknown"
+    assert resolve(pulled).model_error.text.startswith("unknown for this law and these values")
+    assert resolve(no_curve).model_error.text.startswith("unknown for these walls; fitted ones")
+
+
 def test_walls_do_not_hide_a_dome_that_nothing_backs() -> None:
     found = trusts(sized(walled(with_files(PUSHED, HINGE)), dome_height_mm=8.0))
     for output in (Output.INVERTED, Output.FORCES):
@@ -385,6 +395,8 @@ def test_of_graded_units_the_least_trusted_counts() -> None:
     assert trusts(graded)[Output.ENERGIES].basis is Basis.EXTRAPOLATED
     own = replace(BASE, overrides={"3": GivenValues(lattice=arrays({WALL: 0.7}))})
     assert "walls are taken as rigid" in trusts(own)[Output.INVERTED].doubt
+    high = sized(own, dome_height_mm=8.5)
+    assert trusts(high)[Output.SHAPES].basis is Basis.EXTRAPOLATED, "whatever walls are assumed"
 
 
 def test_values_carried_to_another_geometry_say_where_the_error_was_found() -> None:

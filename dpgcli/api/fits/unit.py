@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dpgcli.api.fits.finger import errors_of, targets_of
 from dpgcli.api.fits.result import (
     FitResult,
@@ -12,6 +14,7 @@ from dpgcli.api.fits.result import (
     check_loss,
     fit_result,
     geometry_from,
+    sizes,
     warned,
 )
 from dpgcli.api.inputs import as_texts, check_resampling, chosen, files_of
@@ -21,6 +24,8 @@ from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import Frame
 from dpgcli.calibration.unit import unit_finger
 from dpgcli.design import geometry as rules
+from dpgcli.design.dimensions import without_unit
+from dpgcli.design.rules import HINGE_STIFFNESS
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
@@ -69,7 +74,8 @@ def fit_unit(
     known = read_states(curve, 1)
     lever = _lever(at)
     base = unit_finger(known, lever or STUDY["segment_height"])
-    check_loads(curve, known, base)
+    expected = np.array([[_hinge(at)]])
+    check_loads(curve, known, base.changed(hinge_stiffness=expected))
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
     met = targets_of(known, target, with_walls=has_pushes)
@@ -89,6 +95,13 @@ def fit_unit(
         partial(draw_turns, study, found, name_of(curve)),
         files=files_of(curve, spec),
     )
+
+
+def _hinge(at: Geometry | None) -> float:
+    """The hinge stiffness (N mm/rad) that the inferred rule expects; the study's by default."""
+    given, needs = sizes(at), HINGE_STIFFNESS.needs
+    study = {need: getattr(rules.REFERENCE, without_unit(need)) for need in needs}
+    return float(rules.hinge_stiffness(*(given.get(need, study[need]) for need in needs)))
 
 
 def _lever(at: Geometry | None) -> float | None:

@@ -52,6 +52,12 @@ def finger_states(
     }
 
 
+def with_seconds(states: Columns, seconds: float) -> Columns:
+    """States with the seconds that each took, in equal shares; the one at rest comes with them."""
+    count = len(states["pattern"])
+    return states | {"seconds": np.full(count, seconds / count)}
+
+
 def frame_words(chambers: Chambers) -> tuple[str, ...]:
     """Where the lattice's stations lie in these states: at mid-chamber, on the layer's middle."""
     along, up = chambers.outer_length / 2, chambers.layer_thickness / 2

@@ -10,6 +10,7 @@ from dpgcli.errors import SolverError
 _HEAD = re.compile(r"^ *displacements \(vx,vy,vz\) for set \S+ and time +(\S+) *$", re.MULTILINE)
 _SHORT = re.compile(r"(?<=[0-9.])([+-][0-9]{2,3})$")
 _VERSION = re.compile(r"CalculiX Version ([0-9][0-9.]*)")
+_SECONDS = re.compile(r"^ *Total CalculiX Time: +([0-9.]+) *$", re.MULTILINE)
 _ERROR = re.compile(r"^ *\*ERROR.*(?:\n(?! *\*|\s*$).*){0,2}", re.MULTILINE)
 
 
@@ -37,6 +38,16 @@ def version(log: str) -> str:
     """
     match = _VERSION.search(log)
     return match[1].rstrip(".") if match else "of unknown version"
+
+
+def seconds(log: str) -> float:
+    """The seconds that a run took, as its log says; NaN if it does not.
+
+    >>> seconds(" Total CalculiX Time: 38.250000")
+    38.25
+    """
+    match = _SECONDS.search(log)
+    return float(match[1]) if match else float("nan")
 
 
 def reported_error(log: str) -> str:
