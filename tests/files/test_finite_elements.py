@@ -113,6 +113,6 @@ def test_its_known_errors_are_said() -> None:
     trusts = dpg.explain(STUDY, settings=[WORD]).trusts
     known = {trust.record["output"]: trust.record for trust in trusts}
     assert known["shapes"]["basis"] == "fitted"
-    assert "was not fitted to are off by 7 %" in known["shapes"]["known_error"]
+    assert "are off by 7 % of the deflection (rms)" in known["shapes"]["known_error"]
     assert "none of it fitted" in known["inverted stiffness"]["known_error"]
     assert known["barriers"]["basis"] == "assumed"
