@@ -23,6 +23,7 @@ from dpgcli.files.layout import (
     GROUPED,
     NUMBER,
     Marks,
+    doubtful_point,
     is_number,
     marks_in,
     rows_in,
@@ -52,6 +53,10 @@ CUT = Message(
     " the lines above the numbers, and choose columns by place",
 )
 DECIMALS = "with decimal commas? write decimal points, or part cells by semicolons"
+WHICH_MARK = (
+    "thousands, or a decimal comma? write a decimal point",
+    "thousands, or decimals? write as many decimals everywhere, or none",
+)
 TO_BEGIN = Message(
     "a title that stands there once, or a column's place; ",
     Field("skip"),
@@ -140,7 +145,8 @@ class Sheet:
         """The marks of its numbers: those of the columns that are mostly numbers."""
         columns = [[row[place] for row in self.rows] for place in range(len(self.names))]
         mostly = [cells for cells in columns if 2 * sum(map(is_number, cells)) >= len(cells)]
-        return marks_in([cell for cells in mostly for cell in cells], self.separator)
+        marks = marks_in([cell for cells in mostly for cell in cells], self.separator)
+        return replace(marks, doubtful=marks.doubtful or doubtful_point(mostly))
 
     def _no_number(self, cell: str) -> tuple[str, str, str]:
         """Expected, found and hint where there is no number."""
@@ -149,7 +155,7 @@ class Sheet:
             expected = f"a number of at most {LARGEST:g}"
             return expected, shown(cell), "is the unit another one?"
         if self.marks.doubtful and GROUPED.fullmatch(cell):
-            return "a number", shown(cell), "thousands, or a decimal comma? write a decimal point"
+            return "a number", shown(cell), WHICH_MARK["." in cell]
         if is_number(cell):
             mark = "point" if self.marks.decimal == "." else "comma, as elsewhere"
             return "a number", shown(cell), f"write a decimal {mark}"

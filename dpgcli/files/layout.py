@@ -24,6 +24,7 @@ QUOTED = re.compile('"[^"]*"')
 SAMPLE = 200  # of the last lines, which are of the table
 NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?", re.ASCII)
 GROUPED = re.compile(r"[-+]?[1-9][0-9]{0,2}([.,'\u00a0\u202f])[0-9]{3}(?:\1[0-9]{3})*", re.ASCII)
+GROUP = 3  # digits
 LOOSE = ("'", "\u00a0", "\u202f")  # which can be nothing but groups
 ANY_MARK = re.compile(
     r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
@@ -56,12 +57,14 @@ class Marks:
         >>> Marks(",", ".").plain("1.234,5"), Marks().plain("1,5")
         ('1234.5', '1,5')
         """
+        if self.doubtful and GROUPED.fullmatch(cell):
+            return f"?{cell}"  # which is no number
         whole, mark, rest = cell.partition(self.decimal)
         groups = GROUPED.fullmatch(whole)
         if groups is not None and groups[1] in (self.grouping, *LOOSE):
             whole = whole.replace(groups[1], "")
         if self.decimal == "," and "." in whole:
-            return f"?{cell}"  # which is no number
+            return f"?{cell}"
         return f"{whole}.{rest}" if mark else whole
 
 
@@ -224,3 +227,21 @@ def marks_in(cells: Sequence[str], separator: str) -> Marks:
     if all(GROUPED.fullmatch(cell) for cell in marked[","]):
         return Marks(doubtful=marked[","][0])
     return Marks(",")
+
+
+def doubtful_point(columns: Sequence[Sequence[str]]) -> str:
+    """The first number of some columns whose point may group thousands; empty if there is none.
+
+    Points that are all followed by three digits, in a column where others have none, as in 950,
+    1.000: a machine that writes decimals writes as many of each.
+
+    >>> doubtful_point([["950", "1.000"]]), doubtful_point([["1.125", "1.250"], ["1", "2"]])
+    ('1.000', '')
+    """
+    numbers = [list(filter(is_number, cells)) for cells in columns]
+    flat = [cell for cells in numbers for cell in cells]
+    are_groups = all(GROUPED.fullmatch(cell) for cell in flat if "." in cell)
+    if not are_groups or any(cell.isdigit() and len(cell) > GROUP for cell in flat):
+        return ""
+    mixed = (cells for cells in numbers if not all("." in cell for cell in cells))
+    return next((cell for cells in mixed for cell in cells if "." in cell), "")

@@ -104,7 +104,9 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
-        raise UsageError(f"cannot read {path}: not a Parquet file") from error
+        is_of_system = type(error) is pa.ArrowException  # such as no more threads
+        why = str(error).lower() if is_of_system else "not a Parquet file"
+        raise UsageError(f"cannot read {path}: {why}") from error
     raise UsageError(f"{path} is {DAMAGED}")
 
 

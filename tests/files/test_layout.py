@@ -108,6 +108,8 @@ def test_whatever_the_program_the_numbers_are_the_same(read: Read, content: str 
     [
         ("Ext;Load\n0,5;1\n1.5;2\n", '2: travel_mm: expected a number, found "0,5" (write a dec'),
         ("Ext;Load\n1,234;1\n2,345;2\n", '2: travel_mm: expected a number, found "1,234" (thous'),
+        ("Ext;Load\n950;1\n1.000;2\n", '3: travel_mm: expected a number, found "1.000" (thousands'),
+        ("Ext\tLoad\n0\t1\n1\t1.250.000\n", '3: force_N: expected a number, found "1.250.000"'),
         ("Ext;Load\n1.234,5;1\n2.5;2\n", '3: travel_mm: expected a number, found "2.5" (write a'),
         ('Ext,Load\n1,2\n3,4\n"5,5",6\n', '4: travel_mm: expected a number, found "5,5" (write'),
         ("Ext,Load\n0,5,1\n1,5,2\n", "2: row: expected 2 cells, found 3"),
@@ -150,6 +152,20 @@ def test_a_name_with_a_unit_of_its_own_is_not_contradicted(read: Read) -> None:
         said
         == "force_N: expected N, as the name has it, found kN beside it (say which: units force=N)"
     )
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "1.125;1\n2.250;2\n",
+        "0.500;1\n1;2\n1.125;3\n",
+        "1.125;950\n120.0;1.000\n1;1200\n",
+        "1.0;1.125\n2;3\n",
+    ],
+)
+def test_a_point_is_a_decimal_one_unless_it_may_be_another(read: Read, rows: str) -> None:
+    found = read(f"Ext;Load\n{rows}").curve.travel.tolist()
+    assert found == [float(row.partition(";")[0]) for row in rows.splitlines()]
 
 
 def test_columns_by_place_signs_and_lines_above(read: Read) -> None:

@@ -179,6 +179,17 @@ def test_too_little_memory_is_said(
         read(tmp_path)
 
 
+def test_what_the_system_refuses_says_nothing_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reading(*_: Any, **__: Any) -> None:
+        raise pa.ArrowException("Unknown error: Failed to launch worker thread")
+
+    monkeypatch.setattr(pq.ParquetFile, "read", reading)
+    with pytest.raises(UsageError, match=r"t\.parquet: unknown error: failed to launch worker"):
+        read(tmp_path)
+
+
 def test_a_column_twice(tmp_path: Path) -> None:
     table = pa.table(COLUMNS)
     pq.write_table(table.append_column("n_stable", table["n_stable"]), tmp_path / "t.parquet")
