@@ -234,7 +234,7 @@ def rules_of(
     rules = [requirement(text, numbers) for text in texts]
     known = {trust.output: trust for trust in study.trusts}
     trusts = {c.name: [known[o] for o in c.outputs if o in known] for c in columns}
-    if strict:
+    if strict and known:  # else there is no design to judge
         check_beyond_doubt(rules, trusts)
     return rules, [doubt for rule in rules for doubt in doubts(rule, trusts)]
 

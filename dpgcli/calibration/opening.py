@@ -14,7 +14,7 @@ def parse_number(text: str) -> float | None:
     >>> parse_number("3.5"), parse_number("-1"), parse_number("3,5")
     (3.5, None, None)
     """
-    if not re.fullmatch(r"\s*[0-9]*\.?[0-9]*(?:[eE][-+]?[0-9]+)?\s*", text):
+    if not re.fullmatch(r"\s*[0-9]*(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?\s*", text):
         return None
     try:
         value = float(text)

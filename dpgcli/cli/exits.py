@@ -39,6 +39,12 @@ SOON = 0.01  # s
 MOST_ROWS = 10  # of data whose problems are shown
 # open files, disk, processes, memory
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
+REFUSALS = (  # of memory, by the loader of libraries and by those that start threads
+    "failed to map segment",
+    "annot allocate memory",
+    "can't start new thread",
+    "Failed to launch worker thread",
+)
 
 
 class ExitCode(IntEnum):
@@ -122,6 +128,10 @@ def _fail_if_refused(error: Exception) -> None:
         fail(ExitCode.USAGE, "the working folder was deleted: change to one that is there")
     if isinstance(error, OSError) and error.errno in EXHAUSTED:
         fail(ExitCode.USAGE, f"the system refuses: {error}")
+    if isinstance(error, MemoryError):  # of NumPy and pyarrow as well
+        fail(ExitCode.USAGE, f"the system refuses more memory: {str(error) or 'there is no more'}")
+    if any(text in str(error) for text in REFUSALS):
+        fail(ExitCode.USAGE, f"the system refuses: {error}")
 
 
 def check_failed(n_failed: int, max_failed: int) -> None:
@@ -177,6 +187,9 @@ def _code_of(app: Callable[..., object]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         say(f"dpg: interrupted; {NOTHING_HALF}")
         return ExitCode.INTERRUPTED
+    except MemoryError:
+        say("dpg: the system refuses more memory")
+        return ExitCode.USAGE
     except OSError as error:  # commands answer for their own: these are of shell completion
         say(f"dpg: cannot install completion: {error}")
         return ExitCode.USAGE

@@ -162,8 +162,8 @@ def millimeters(option: str, text: str) -> float:
     """A length with its unit as a number of mm: 0.01mm, 10um; a plain number is mm."""
     from dpgcli.errors import UsageError
 
-    number = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
-    match = re.fullmatch(rf"\s*({number})\s*(\w*)\s*", text)
+    number = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:e[-+]?[0-9]+)?"
+    match = re.fullmatch(rf"\s*({number})\s*([^\W\d]*)\s*", text)
     length = 0.0
     if match is not None and match[2] in POWERS:
         with suppress(ArithmeticError):  # beyond what a number can be

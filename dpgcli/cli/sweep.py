@@ -199,14 +199,19 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
 
 
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
-    """Files of their own, none of them one that is read."""
+    """Files of their own, none of them one that is read, nor where parts are kept."""
+    from dpgcli.errors import UsageError
     from dpgcli.files.output import check_apart, check_appendable, check_not_read
-    from dpgcli.studies.sweep import outputs
+    from dpgcli.studies.sweep import PARTS, outputs
 
-    written = [path for path, _ in outputs(study.folder)]
-    written += [path for path in (depfile, summary_file) if path is not None]
-    check_not_read(study.sweep.files, written)
-    check_apart(written)
+    tables = [path for path, _ in outputs(study.folder)]
+    own = [path for path in (depfile, summary_file) if path is not None]
+    check_not_read(study.sweep.files, tables + own)
+    check_apart(tables + own)
+    parts = (study.folder / PARTS).resolve()
+    for path in own:
+        if path.resolve().is_relative_to(parts):
+            raise UsageError(f"{path}: expected a name outside of {PARTS}, where parts are kept")
     if summary_file is not None:
         check_appendable(summary_file, study.sweep.files)
 

@@ -44,11 +44,6 @@ class Footing:
         """The value in words."""
         return without_unit(self.key).replace("_", " ")
 
-    @property
-    def elsewhere(self) -> str:
-        """Where a known error was found, if the value was moved from there."""
-        return ELSEWHERE if self.origin in MOVED else ""
-
 
 @dataclass(frozen=True)
 class Case:
@@ -130,12 +125,17 @@ class Case:
         number = of_design(self.values[key][0].numbers, self.place)
         return bool(_are_study_s(key, np.array([number]))[0])
 
+    def elsewhere(self, *keys: str) -> str:
+        """Where a known error was found, if one of the values was moved from there."""
+        found = (self.footings[key].origin for key in keys if key in self.footings)
+        return ELSEWHERE if any(origin in MOVED for origin in found) else ""
+
     def known_error(self, output: Output, *keys: str) -> str:
         """What the first file behind these values knows of an output's error; empty if none."""
         for footing in (self.footings[key] for key in keys if key in self.footings):
             file = footing.calibration
             if file is not None and (known := file.known_errors.get(output.key)) is not None:
-                return f"{known.text}, against {known.against}{footing.elsewhere}"
+                return f"{known.text}, against {known.against}{self.elsewhere(footing.key)}"
         return ""
 
 

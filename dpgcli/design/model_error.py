@@ -10,7 +10,7 @@ from dpgcli.design.dimensions import WALL_COMPLIANCE
 from dpgcli.design.footing import ELSEWHERE, MOVED, Case
 from dpgcli.design.outputs import Basis
 from dpgcli.design.problems import of_design
-from dpgcli.design.rules import SEGMENT_HEIGHT, Value
+from dpgcli.design.rules import HINGE_STIFFNESS, SEGMENT_HEIGHT, Value
 from dpgcli.design.scene import ORIGINS, UNKNOWN, ModelError
 
 CURLED = "shapes curl 13–24 % too far against finite elements"
@@ -19,11 +19,14 @@ WITH_HEIGHT = "shapes within 1–8 % of the deflection against finite elements"
 WITH_WALLS = "shapes within 1–6 % of the deflection against finite elements"
 WITH_BOTH = "shapes within 3–10 % of the deflection against finite elements"  # and a fitted height
 THE_REST = (
-    "pushes within about 10 %, inverted units' stiffness within 30 %, with walls fitted to them"
+    "pushes within about 10 %, inverted units' stiffness within 30 % (60 % if walls are fitted to "
+    "shapes)"
 )
+FITTED_HEIGHT = "with a segment height fitted to them"
 OTHER_WALLS = (
     "unknown for these walls; fitted ones bring shapes within 1–6 % of the deflection, pushes "
-    "within about 10 % and inverted units' stiffness within 30 % of finite elements"
+    "within about 10 % and inverted units' stiffness within 30 % of finite elements (60 % if they "
+    "are fitted to shapes)"
 )
 
 
@@ -39,12 +42,27 @@ def model_error_of(case: Case) -> ModelError:
     return _of_walls(case) if case.has_walls else _of_height(case)
 
 
+def shapes_in(error: ModelError) -> str:
+    """The part of what is known that is about shapes.
+
+    >>> shapes_in(ModelError(f"{CURLED}; {CALIBRATE}")) == CURLED, shapes_in(UNKNOWN)
+    (True, 'unknown')
+    """
+    if error.text.startswith("unknown"):
+        return "unknown"
+    text = error.text
+    for rest in (CALIBRATE, THE_REST, FITTED_HEIGHT):
+        text = text.removesuffix(f"; {rest}")
+    return text
+
+
 def _of_walls(case: Case) -> ModelError:
     if case.pulls:
         return UNKNOWN
     if case.has_fitted_walls:
         shapes = WITH_WALLS if case.has_geometric_height else WITH_BOTH
-        return ModelError(f"{shapes}{case.footings[WALL_COMPLIANCE].elsewhere}; {THE_REST}")
+        where = case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
+        return ModelError(f"{shapes}{where}; {THE_REST}")
     return ModelError(OTHER_WALLS)
 
 
@@ -58,14 +76,17 @@ def _of_height(case: Case) -> ModelError:
         return ModelError(f"{CURLED}{where}; {CALIBRATE}")
     if height.basis is not Basis.FITTED:
         return UNKNOWN
-    return ModelError(f"{WITH_HEIGHT}{height.elsewhere}; with a segment height fitted to them")
+    where = case.elsewhere(SEGMENT_HEIGHT.key)
+    return ModelError(f"{WITH_HEIGHT}{where}; {FITTED_HEIGHT}")
 
 
 def _left_out(file: Calibration, known: KnownError, own: Sequence[Value], place: int) -> ModelError:
-    """The errors of states that a fit has not seen, as its calibration says."""
+    """The errors of states that a fit has not seen, or of others, as its calibration says."""
     rms = known.largest if known.rms is None else known.rms
     sizes = f"{100.0 * rms:.2g} % of the deflection (rms), {100.0 * known.largest:.2g} % at most"
     text = f"states that {file.file} was not fitted to are off by {sizes}"
+    if known.against:
+        text = f"shapes by {file.file} are off by {sizes}, against {known.against}"
     if any(ORIGINS[int(of_design(value.origin, place))] in MOVED for value in own):
         text += ", at the geometry of the fit, which is another"
     return ModelError(text, rms)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.design.footing import Case, Footing
-from dpgcli.design.model_error import model_error_of
+from dpgcli.design.model_error import model_error_of, shapes_in
 from dpgcli.design.outputs import Basis, Output, Trust
 from dpgcli.design.rules import (
     BISTABLE_STIFFNESS,
@@ -34,6 +34,7 @@ ASSUMED_AREA = (
 )
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
+WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
 DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
 
 
@@ -67,8 +68,7 @@ def _shapes(case: Case) -> Trust:
     lead = case.footings[WALL_COMPLIANCE if case.has_walls else SEGMENT_HEIGHT.key]
     gravest = case.gravest(*(key for key in case.footings if key != LINEAR_STIFFNESS))
     lead = gravest if gravest.basis is Basis.EXTRAPOLATED else lead
-    error = model_error_of(case).text.partition(";")[0]
-    error = UNKNOWN if error.startswith(UNKNOWN) else error
+    error = shapes_in(model_error_of(case))
     return _checked(Trust(Output.SHAPES, lead.basis, error, str(lead)), lead)
 
 
@@ -124,13 +124,13 @@ def _ground(case: Case) -> Trust:
     hinge = case.footings[HINGE_STIFFNESS.key]
     known = case.known_error(Output.GROUND, HINGE_STIFFNESS.key)
     if not known and hinge.basis in (Basis.FITTED, Basis.PUBLISHED):
-        known = f"within about 20 % of finite elements{hinge.elsewhere}"
+        known = f"within about 20 % of finite elements{case.elsewhere(hinge.key)}"
     return _checked(Trust(Output.GROUND, hinge.basis, known or UNKNOWN, str(hinge)), hinge)
 
 
 def _inverted(case: Case) -> Trust:
     if case.has_walls:
-        return _of_walls(case, Output.INVERTED, "within 30 % of finite elements")
+        return _of_walls(case, Output.INVERTED, WITH_WALLS)
     times = "6" if case.has_published_domes else "hundreds of" if case.pulls else "40–90"
     error = f"{times} times too stiff against finite elements"
     return _of_rigid_walls(case, Output.INVERTED, error)
@@ -154,7 +154,7 @@ def _of_walls(case: Case, output: Output, error: str) -> Trust:
     keys = (WALL_COMPLIANCE, BISTABLE_STIFFNESS.key, HINGE_STIFFNESS.key)
     lead, known = case.gravest(*keys), case.known_error(output, *keys)
     if not known and case.has_fitted_walls:
-        known = error + case.footings[WALL_COMPLIANCE].elsewhere
+        known = error + case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
     return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
 
 

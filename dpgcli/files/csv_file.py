@@ -3,6 +3,7 @@
 import hashlib
 import io
 import math
+from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -22,6 +23,7 @@ from dpgcli.files.layout import (
     GROUPED,
     NUMBER,
     Marks,
+    doubtful_point,
     is_number,
     marks_in,
     rows_in,
@@ -45,6 +47,16 @@ FOREIGN = {
 }
 WESTERN = frozenset("äöüÄÖÜßéèêàâçñáíóúåøæÅØÆôîïëìòùõãÉÈÇÑ°µ²³·±–—’“”…€×«»§® ")
 TO_COMMENT = "behind the # of a comment stands a space"
+CUT = Message(
+    "a title that blanks or commas cut in two goes into quotes; or ",
+    Field("skip"),
+    " the lines above the numbers, and choose columns by place",
+)
+DECIMALS = "with decimal commas? write decimal points, or part cells by semicolons"
+WHICH_MARK = (
+    "thousands, or a decimal comma? write a decimal point",
+    "thousands, or decimals? write as many decimals everywhere, or none",
+)
 TO_BEGIN = Message(
     "a title that stands there once, or a column's place; ",
     Field("skip"),
@@ -133,7 +145,8 @@ class Sheet:
         """The marks of its numbers: those of the columns that are mostly numbers."""
         columns = [[row[place] for row in self.rows] for place in range(len(self.names))]
         mostly = [cells for cells in columns if 2 * sum(map(is_number, cells)) >= len(cells)]
-        return marks_in([cell for cells in mostly for cell in cells], self.separator)
+        marks = marks_in([cell for cells in mostly for cell in cells], self.separator)
+        return replace(marks, doubtful=marks.doubtful or doubtful_point(mostly))
 
     def _no_number(self, cell: str) -> tuple[str, str, str]:
         """Expected, found and hint where there is no number."""
@@ -142,7 +155,7 @@ class Sheet:
             expected = f"a number of at most {LARGEST:g}"
             return expected, shown(cell), "is the unit another one?"
         if self.marks.doubtful and GROUPED.fullmatch(cell):
-            return "a number", shown(cell), "thousands, or a decimal comma? write a decimal point"
+            return "a number", shown(cell), WHICH_MARK["." in cell]
         if is_number(cell):
             mark = "point" if self.marks.decimal == "." else "comma, as elsewhere"
             return "a number", shown(cell), f"write a decimal {mark}"
@@ -226,7 +239,8 @@ def read_sheet(
         found = problems or [located(Location(file), "file", "a header and rows", "nothing")]
         raise SpecError(in_order(found))
     is_first = choice.skip is not None or not is_file
-    head = headed(rows, wanted, choice.columns, is_first=is_first)
+    is_parted_by_tabs = separator == "\t"  # which stand in no title
+    head = headed(rows, wanted, choice.columns, is_first=is_first, may_be_longer=is_parted_by_tabs)
     line = head.line
     below = [row for row in head.rows if is_file or row.line > 1]  # names that are numbers are none
     problems = [problem for problem in problems if (problem.line or 0) > line]
@@ -243,6 +257,8 @@ def read_sheet(
         tuple(_comments(lines[:line])) if is_file else (),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
+    if is_file and separator == ",":
+        problems += _untitled(sheet, head.untitled, line)
     if problems:
         raise SpecError(in_order(problems))
     return sheet
@@ -261,10 +277,27 @@ def _unfound(sheet: Sheet, choice: Choice) -> Iterator[Problem]:
             yield sheet.missing(title, hint=TO_BEGIN)
 
 
+def _untitled(sheet: Sheet, places: Sequence[int], header: int) -> Iterator[Problem]:
+    """Columns of numbers without a title, between commas: they may be decimals of those before.
+
+    The index that a data frame is written with, which has no title, is the first.
+    """
+    for place in places:
+        cells = (row[place] for row in sheet.rows if len(row) > place)
+        if number := next(filter(is_number, cells), ""):
+            expected, found = f"a title for column {place + 1}", f"none above {number}"
+            yield located(Location(sheet.file, header), "header", expected, found, DECIMALS)
+
+
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Location(sheet.file, header)
-    for name in dict.fromkeys(n for n in sheet.names if n and sheet.names.count(n) > 1):
+    for name in (name for name, count in Counter(sheet.names).items() if name and count > 1):
         yield located(top, "header", "each column once", f"{shown(name)} again")
+    longest = max(map(len, sheet.rows), default=0)
+    if sheet.titles and sheet.separator != "\t" and 0 < longest < len(sheet.names):
+        expected = f"{longest} titles, as many as cells below"
+        yield located(top, "header", expected, str(len(sheet.names)), CUT)
+        return
     for row, cells in enumerate(sheet.rows):
         if len(cells) != len(sheet.names):
             hint = TO_COMMENT if cells[0].startswith("#") else ""

@@ -14,6 +14,7 @@ class Head:
 
     `line` is that of the header. By name, `titles` are those of columns that were chosen, `units`
     what the file has behind a title or in a row of units; `reversed` are names whose numbers are.
+    `untitled` are places of columns without a title, behind the first that has one.
     """
 
     names: tuple[str, ...]
@@ -22,6 +23,7 @@ class Head:
     units: Mapping[str, str]
     titles: Mapping[str, str]
     reversed: frozenset[str]
+    untitled: tuple[int, ...]
 
 
 def headed(
@@ -30,10 +32,12 @@ def headed(
     columns: Mapping[str, str],
     *,
     is_first: bool = False,
+    may_be_longer: bool = False,
 ) -> Head:
     """Find the header, and the columns that were chosen: titles by our names.
 
-    Where no row is one, columns are called by their places, from 1.
+    Where no row is one, columns are called by their places, from 1. If it `may_be_longer` than
+    the rows, titles at its end have no cells; else one may have been cut in two.
     """
     sources = [source.removeprefix("-") for source in columns.values()]
     place = 0 if is_first else header_in(rows, wanted, sources)
@@ -44,7 +48,9 @@ def headed(
     units = below.pop(0).cells if below and is_of_units(below[0]) else []
     found = dict(_found(titles, columns))
     names = _named(titles, found)
-    n_names = _width(names, below, {*found} | {n for n in names if n in wanted})
+    needed = {*found} | {n for n in names if n in wanted}
+    n_names = _width(names, below, needed if may_be_longer else names)
+    first = next((place for place, title in enumerate(titles) if title), 0)
     said = {name: unit for name, unit in zip(names, _units(titles, units), strict=True) if unit}
     return Head(
         tuple(names[:n_names]),
@@ -53,6 +59,7 @@ def headed(
         said,
         {name: titles[column] for name, (column, _) in found.items()},
         frozenset(name for name, (_, is_reversed) in found.items() if is_reversed),
+        tuple(place for place in range(first, n_names) if not titles[place]),
     )
 
 
@@ -83,7 +90,12 @@ def _place(titles: Sequence[str], source: str) -> int | None:
     for known in (titles, bare_titles):
         if source in known:
             return known.index(source) if list(known).count(source) == 1 else None
-    is_place = source.isascii() and source.isdigit() and 1 <= int(source) <= len(titles)
+    is_place = (
+        source.isascii()
+        and source.isdigit()
+        and len(source) < 7
+        and 1 <= int(source) <= len(titles)
+    )
     return int(source) - 1 if is_place else None
 
 

@@ -8,7 +8,7 @@ import csv
 import re
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from dpgcli.errors import Problem
 from dpgcli.files.places import Location, located
@@ -16,12 +16,18 @@ from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
 SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more
+BLANKS = re.compile("  +")  # no tabs, and none that group thousands
+IN_BRACKETS = r"[\[(<][^\[\]()<>]{0,30}[\])>]"
+WORD = re.compile(f"{IN_BRACKETS}|[^ ]+(?: {IN_BRACKETS})?")  # a title has its unit behind it
+PARTED = "\x1f"  # between cells that blanks part: a tab may stand within one
+QUOTED = re.compile('"[^"]*"')
 SAMPLE = 200  # of the last lines, which are of the table
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?", re.ASCII)
 GROUPED = re.compile(r"[-+]?[1-9][0-9]{0,2}([.,'\u00a0\u202f])[0-9]{3}(?:\1[0-9]{3})*", re.ASCII)
+GROUP = 3  # digits
 LOOSE = ("'", "\u00a0", "\u202f")  # which can be nothing but groups
 ANY_MARK = re.compile(
-    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*[.,]?[0-9]*|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
+    r"[-+]?(?:[0-9]+(?:[.,'\u00a0\u202f][0-9]{3})*(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?",
     re.ASCII,
 )
 
@@ -51,12 +57,14 @@ class Marks:
         >>> Marks(",", ".").plain("1.234,5"), Marks().plain("1,5")
         ('1234.5', '1,5')
         """
+        if self.doubtful and GROUPED.fullmatch(cell):
+            return f"?{cell}"  # which is no number
         whole, mark, rest = cell.partition(self.decimal)
         groups = GROUPED.fullmatch(whole)
         if groups is not None and groups[1] in (self.grouping, *LOOSE):
             whole = whole.replace(groups[1], "")
         if self.decimal == "," and "." in whole:
-            return f"?{cell}"  # which is no number
+            return f"?{cell}"
         return f"{whole}.{rest}" if mark else whole
 
 
@@ -85,10 +93,10 @@ class _Lines:
 
 
 def _parted(text: str, separator: str) -> str:
-    """A line with tabs where the blanks between its cells were."""
-    if separator.strip() or separator == "\t":
-        return text
-    return re.sub(r"\s{2,}" if len(separator) > 1 else r"\s+", "\t", text.strip())
+    """A line with a mark where the blanks between its cells were."""
+    if separator == " ":
+        return PARTED.join(WORD.findall(text))
+    return text if separator.strip(" ") else BLANKS.sub(PARTED, text)
 
 
 def rows_in(
@@ -99,7 +107,7 @@ def rows_in(
     Without comments, as a data frame is, rows of empty cells count.
     """
     source = _Lines(lines, separator, has_comments)
-    mark = separator if separator.strip() else "\t"
+    mark = separator if separator.strip(" ") else PARTED
     reader = csv.reader(source, delimiter=mark, skipinitialspace=True, strict=True)
     rows: list[Row] = []
     problems: list[Problem] = []
@@ -123,14 +131,18 @@ def _in_one_line(cell: str) -> str:
 
 
 def separator_of(lines: Sequence[str]) -> str:
-    r"""What parts the cells: that by which the last lines have the most numbers.
+    r"""What parts the cells: tabs, or that by which the last lines have the most numbers.
 
     >>> separator_of(["Kraft in N;Weg", "0,5;1,5"]), separator_of(["a\tb", "1\t2"])
     (';', '\t')
     >>> separator_of(["a b", "1  2.5"]), separator_of(["a", "1"])
     ('  ', ',')
+    >>> separator_of(["No.\tForce", "Dome 1\t2"])  # by blanks it has as many numbers
+    '\t'
     """
     last = [line for line in lines if line.strip()][-SAMPLE:]
+    if 2 * sum(map(_has_tab_between_cells, last)) > len(last):
+        return "\t"
 
     def score(separator: str) -> int:
         rows, _ = rows_in(last, separator)
@@ -140,6 +152,12 @@ def separator_of(lines: Sequence[str]) -> str:
         return 2 * n_numbers - len(cells)
 
     return max(SEPARATORS, key=score)
+
+
+def _has_tab_between_cells(line: str) -> bool:
+    """Whether a tab parts two cells, rather than stand in one or beside another separator."""
+    parts = [part for cell in QUOTED.sub("q", line).split("\t") if (part := cell.strip())]
+    return any(a[-1] not in ",;|" and b[0] not in ",;|" for a, b in pairwise(parts))
 
 
 def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str]) -> int:
@@ -209,3 +227,21 @@ def marks_in(cells: Sequence[str], separator: str) -> Marks:
     if all(GROUPED.fullmatch(cell) for cell in marked[","]):
         return Marks(doubtful=marked[","][0])
     return Marks(",")
+
+
+def doubtful_point(columns: Sequence[Sequence[str]]) -> str:
+    """The first number of some columns whose point may group thousands; empty if there is none.
+
+    Points that are all followed by three digits, in a column where others have none, as in 950,
+    1.000: a machine that writes decimals writes as many of each.
+
+    >>> doubtful_point([["950", "1.000"]]), doubtful_point([["1.125", "1.250"], ["1", "2"]])
+    ('1.000', '')
+    """
+    numbers = [list(filter(is_number, cells)) for cells in columns]
+    flat = [cell for cells in numbers for cell in cells]
+    are_groups = all(GROUPED.fullmatch(cell) for cell in flat if "." in cell)
+    if not are_groups or any(cell.isdigit() and len(cell) > GROUP for cell in flat):
+        return ""
+    mixed = (cells for cells in numbers if not all("." in cell for cell in cells))
+    return next((cell for cells in mixed for cell in cells if "." in cell), "")

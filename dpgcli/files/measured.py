@@ -12,6 +12,7 @@ from dpgcli.design.dimensions import SMALLEST, unit_of
 from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.calibration.models import Values
 from dpgcli.files.csv_file import AS_IT_IS, Choice, Sheet, Tabular, read_sheet
+from dpgcli.files.layout import is_number
 from dpgcli.files.own_units import chosen_units, in_own_units
 from dpgcli.files.places import in_order
 from dpgcli.files.plausible import other_scales, other_springs, wrong_signs
@@ -227,13 +228,8 @@ def _unused(sheet: Sheet, known: Mapping[str, str]) -> tuple[str, ...]:
 
 def _is_numeric(sheet: Sheet, name: str) -> bool:
     """Whether at least one cell of a column is a number, so that all should be."""
-    for cell in sheet.cells(name):
-        try:
-            float(cell.replace(",", "."))  # whatever the decimal mark
-        except ValueError:
-            continue
-        return True
-    return False
+    cells = sheet.cells(name)
+    return any(is_number(cell) or cell.lstrip("+-").lower() in ("inf", "nan") for cell in cells)
 
 
 def _chosen(sheet: Sheet, where: str) -> Sheet:

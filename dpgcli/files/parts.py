@@ -174,7 +174,8 @@ class PartStore:
         with suppress(OSError):
             for path in self.folder.iterdir():
                 is_temporary = path.name.startswith(".") and path.suffix == ".tmp"
-                if is_temporary or path.name == SAID or NAME.fullmatch(path.name):
+                is_own = is_temporary or path.name == SAID or NAME.fullmatch(path.name)
+                if is_own and not path.is_dir():
                     path.unlink()
             self.folder.rmdir()
             self.folder.parent.rmdir()
@@ -186,7 +187,7 @@ class PartStore:
         may be halved afterwards.
         """
         matches = ((NAME.fullmatch(path.name), path) for path in self.folder.glob("*.part"))
-        found = [Part(int(m[1]), int(m[2]), path) for m, path in matches if m]
+        found = [Part(int(m[1]), int(m[2]), p) for m, p in matches if m and not p.is_dir()]
         found.sort(key=lambda part: (part.start, -part.stop, part.path))
         reached = accumulate((part.stop for part in found), max, initial=0)
         return [part for part, before in zip(found, reached, strict=False) if part.stop > before]

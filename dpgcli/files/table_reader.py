@@ -19,10 +19,12 @@ from dpgcli.errors import UsageError
 from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
 from dpgcli.files.trust import outputs_of, trusts_in
+from dpgcli.sweeps.metrics import METRICS
 
 TEXTS = ("calibration", "status", "reason", "accuracy_level")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
+OTHERS = {*NEEDED, *TEXTS, "error_bound_mm", *(metric.name for metric in METRICS)}  # not swept
 MOST_FACTS = 2**26  # bytes
 DAMAGED = (
     "damaged: its bytes are not those of its SHA-256, or it has none any more; "
@@ -102,7 +104,9 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
-        raise UsageError(f"cannot read {path}: not a Parquet file") from error
+        is_of_system = type(error) is pa.ArrowException  # such as no more threads
+        why = str(error).lower() if is_of_system else "not a Parquet file"
+        raise UsageError(f"cannot read {path}: {why}") from error
     raise UsageError(f"{path} is {DAMAGED}")
 
 
@@ -146,9 +150,9 @@ def _readable(source: str, described: Any) -> list[str]:
         )
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
-    swept = names[names.index("design") + 1 : names.index("calibration")]
+    swept = _swept(described)
     kept = []
-    for field in described:
+    for field in (described.field(name) for name in _in_our_order(names, swept)):
         is_readable = _is_number(field.type)
         if field.name in TEXTS:  # empty ones come back from CSV as numbers, or as nothing
             is_readable |= _is_text(field.type) or pa.types.is_null(field.type)
@@ -157,6 +161,24 @@ def _readable(source: str, described: Any) -> list[str]:
         elif field.name in (*NEEDED, *swept):
             raise _wrong_type(source, field.name, field.type)
     return kept
+
+
+def _swept(described: Any) -> list[str]:
+    """Columns of the swept values: between the design's number and its calibration.
+
+    In a table whose columns were put into another order, those that are none of our others.
+    """
+    names = described.names
+    between: list[str] = names[names.index("design") + 1 : names.index("calibration")]
+    if between and not OTHERS.intersection(between):
+        return between
+    numbers = (field.name for field in described if _is_number(field.type))
+    return [name for name in numbers if name not in OTHERS]
+
+
+def _in_our_order(names: list[str], swept: list[str]) -> list[str]:
+    first = ["design", *swept, "calibration"]
+    return first + [name for name in names if name not in first]
 
 
 def _is_number(kind: Any) -> bool:
@@ -183,7 +205,7 @@ def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
 def _plain(source: str, table: Any) -> Columns:
     """The columns of three plain types."""
     names = table.column_names
-    swept = names[names.index("design") + 1 : names.index("calibration")]
+    swept = _swept(table.schema)
     columns: Columns = {}
     for name in names:
         column = table.column(name)

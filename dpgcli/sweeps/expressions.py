@@ -108,6 +108,8 @@ def expression(text: str) -> Expression:
     """
     if len(text) > MOST_CHARACTERS:
         raise ExpressionError(f"longer than {MOST_CHARACTERS} characters")
+    if "#" in text:
+        raise ExpressionError("# would hide what stands behind it: there are no comments here")
     try:
         body = ast.parse(_without_digits(text.strip()), mode="eval").body
         names = frozenset(_names(body, MOST_LEVELS))

@@ -45,6 +45,20 @@ def test_tables_as_by_the_command(space: Path) -> None:
     assert found.report.startswith("# Design space\n\n4 designs over stroke_mm")
 
 
+def test_swept_values_are_told_apart_in_any_order_of_columns(space: Path) -> None:
+    """Every other column of designs is known, those of an accuracy level too."""
+    found = dpg.sweep("sweep.yaml", "out", target_error=1e-2, **SERIAL)
+    frame = found.designs.to_pandas()
+    (expected,) = dpg.check(frame, "stroke_mm > 3")
+    for order in (sorted(frame), list(reversed(frame.columns))):
+        (verdict,) = dpg.check(frame[order], "stroke_mm > 3")
+        assert [f.design for f in verdict.failures()] == [0, 1]
+        values = [f.values for f in verdict.failures()]
+        assert values == [f.values for f in expected.failures()]
+    frame[sorted(frame)].to_parquet("out/designs.parquet")
+    assert "## " in dpg.report("out")
+
+
 @pytest.mark.parametrize("is_named", [True, False])
 def test_data_are_a_sweep(space: Path, study: dict[str, Any], is_named: bool) -> None:
     base = "study.yaml" if is_named else study

@@ -305,3 +305,25 @@ def test_a_system_that_has_no_more_is_no_bug(
     result = call("predict", "three_unit.yaml")
     assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
     assert result.stderr == f"dpg: the system refuses: [Errno {code}] {os.strerror(code)}\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "the system refuses more memory: there is no more"),
+        (MemoryError("Unable to allocate 1 GiB"), "more memory: Unable to allocate 1 GiB"),
+        (ImportError("a.so: failed to map segment from shared object"), "refuses: a.so: failed to"),
+        (RuntimeError("can't start new thread"), "the system refuses: can't start new thread"),
+    ],
+)
+def test_a_system_without_memory_is_no_bug(
+    call: Call, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+) -> None:
+    def refused(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("dpgcli.api.inputs.read_document", refused)
+    result = call("predict", "three_unit.yaml")
+    assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
+    assert result.stderr.startswith("dpg: the system refuses")
+    assert said in result.stderr

@@ -149,6 +149,17 @@ def test_what_a_sweep_writes_has_names_of_its_own(
     assert not list((inputs / "out").iterdir())
 
 
+@pytest.mark.parametrize("option", ["--summary-file", "--depfile"])
+@pytest.mark.parametrize("name", [".parts", ".parts/sweep.d", "../out/.parts"])
+def test_nothing_else_is_written_where_parts_are_kept(
+    call: Call, inputs: Path, option: str, name: str
+) -> None:
+    result = call(*RUN, option, f"out/{name}")
+    assert (result.exit_code, result.stdout) == (ExitCode.USAGE, "")
+    assert f"out/{name}: expected a name outside of .parts, where parts are kept" in result.stderr
+    assert not list((inputs / "out").iterdir())
+
+
 def test_a_summary_is_not_appended_to_a_table_of_two_names(call: Call, inputs: Path) -> None:
     os.link(inputs / "done" / "designs.parquet", inputs / "summary.md")
     result = call(*RUN[:-1], "done", "--summary-file", "summary.md")

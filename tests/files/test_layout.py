@@ -1,20 +1,25 @@
 """Curves as other programs write them: each gives the same numbers, or a question."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dpgcli.errors import SpecError
+from dpgcli.calibration.opening import parse_number
+from dpgcli.cli.options import millimeters
+from dpgcli.errors import SpecError, UsageError
 from dpgcli.files.csv_file import Choice, read_sheet
-from dpgcli.files.layout import marks_in, separator_of
+from dpgcli.files.layout import NUMBER, is_number, marks_in, separator_of
 from dpgcli.files.measured import CURVE, Measured, read_curve
 from dpgcli.files.units import FACTORS, OWN, factor_of
 
 NAMED = Choice({"travel_mm": "Ext", "force_N": "Load"})
 TRAVEL, FORCE = [0.0, 0.5, 1.25, 1234.5], [0.25, 10.5, 1200.0, -3.75]
 ROWS = list(zip(TRAVEL, FORCE, strict=True))
+LONG = 40_000
+MANY = "9" * LONG
 UNITS = {"travel": "um", "force": "N"}
 Read = Callable[..., Measured]
 
@@ -46,6 +51,11 @@ def body(separator: str, decimal: str = ".", group: str = "", quote: str = "") -
     return "".join(separator.join(map(spelled, row)) + "\n" for row in ROWS)
 
 
+def labeled(rows: str, separator: str = "\t") -> str:
+    """Rows behind a label each, whose parts blanks would part."""
+    return "".join(f"Dome {n}{separator}{row}\n" for n, row in enumerate(rows.splitlines()))
+
+
 @pytest.mark.parametrize(
     "content",
     [
@@ -61,9 +71,20 @@ def body(separator: str, decimal: str = ".", group: str = "", quote: str = "") -
         "Ext;Load\n" + body(";", ",", "\u202f"),
         "Ext;Load;\n;;\n" + body(";", ",").replace("\n", ";\n"),
         "Ext\tLoad\n" + body("\t", ","),
+        "Ext\tLoad\n" + body("\t", ".", "\u00a0"),
+        "Ext\tLoad\n" + body("\t", ",", "\u202f"),
+        "No.\tExt\tLoad\n" + labeled(body("\t")),
+        "No.\tExt (um)\tLoad (N)\n" + labeled(body("\t", ",")),
+        '"No. 1"\tExt\tLoad\n' + labeled(body("\t", quote='"')),
+        "No.,\tExt,\tLoad\n" + labeled(body(",\t"), ",\t"),
         "Ext|Load\n" + body("|"),
         "Ext Load\n" + body(" "),
         "  Ext     Load  \n" + body("   ", ","),
+        "Ext  Load\n" + body("  ", ".", "\u00a0"),
+        "Ext Load\n" + body(" ", ",", "\u202f"),
+        "Ext (um) Load [N]\n" + body(" "),
+        "No.  Ext (um) Load\n[] (um) [N]\n"
+        + labeled(body(" ")).replace("Dome ", "").replace("\t", " "),
         '"Ext\n(um)";"Load\n(N)"\n' + body(";", ","),
         "Ext,Load\n(um),(N)\n\n" + body(","),
         "Probe 1;Dome, Nr. 3\nDatum;26.11.2026\n\nExt;Load\num;N\n" + body(";", ","),
@@ -87,10 +108,17 @@ def test_whatever_the_program_the_numbers_are_the_same(read: Read, content: str 
     [
         ("Ext;Load\n0,5;1\n1.5;2\n", '2: travel_mm: expected a number, found "0,5" (write a dec'),
         ("Ext;Load\n1,234;1\n2,345;2\n", '2: travel_mm: expected a number, found "1,234" (thous'),
+        ("Ext;Load\n950;1\n1.000;2\n", '3: travel_mm: expected a number, found "1.000" (thousands'),
+        ("Ext\tLoad\n0\t1\n1\t1.250.000\n", '3: force_N: expected a number, found "1.250.000"'),
         ("Ext;Load\n1.234,5;1\n2.5;2\n", '3: travel_mm: expected a number, found "2.5" (write a'),
         ('Ext,Load\n1,2\n3,4\n"5,5",6\n', '4: travel_mm: expected a number, found "5,5" (write'),
         ("Ext,Load\n0,5,1\n1,5,2\n", "2: row: expected 2 cells, found 3"),
         ("Ext,Load\n0,5,\n1,5\n", "2: row: expected 2 cells, found 3"),
+        ("Ext,Load,\n0,0,5,\n1,5,25,\n", "1: header: expected a title for column 3, found none"),
+        (",Ext,,Load\n0,0,5,1\n1,1,0,2\n", "1: header: expected a title for column 3, found non"),
+        ("Ext Load cell F\n1 2 3\n2 3 4\n", "1: header: expected 3 titles, as many as cells below"),
+        ("Ext,Ext, Load,F\n1,2,3\n2,3,4\n", "1: header: expected 3 titles, as many as cells below"),
+        ("Ext in um Load in N T\n1 2 3\n", "1: header: expected 3 titles, as many as cells below"),
         ("Ext,Load\n0,5,\n", "2: row: expected 2 cells, found 3"),
         ("Ext,Load,Ext,Load\n0,5,0,6\n", '1: header: expected each column once, found "Ext" again'),
         ("Ext,Load\n0,5\n1,6\nEnd of test\n", "4: row: expected 2 cells, found 1"),
@@ -126,6 +154,20 @@ def test_a_name_with_a_unit_of_its_own_is_not_contradicted(read: Read) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "1.125;1\n2.250;2\n",
+        "0.500;1\n1;2\n1.125;3\n",
+        "1.125;950\n120.0;1.000\n1;1200\n",
+        "1.0;1.125\n2;3\n",
+    ],
+)
+def test_a_point_is_a_decimal_one_unless_it_may_be_another(read: Read, rows: str) -> None:
+    found = read(f"Ext;Load\n{rows}").curve.travel.tolist()
+    assert found == [float(row.partition(";")[0]) for row in rows.splitlines()]
+
+
 def test_columns_by_place_signs_and_lines_above(read: Read) -> None:
     places = Choice({"travel_mm": "2", "force_N": "-1"}, skip=2)
     found = read("1 2\nnot,a,table\n" + "5,0.5,x\n6,1.5,y\n", places)
@@ -154,6 +196,32 @@ def test_a_column_that_no_row_has_is_none(read: Read) -> None:
     assert problems(read, "Comment\tExt\tLoad\n0.5\t5\n1.5\t6\n")[0].startswith(
         "2: row: expected 3"
     )
+
+
+def test_an_index_without_a_title_is_no_column_of_decimals(read: Read) -> None:
+    assert read(",Ext,Load\n0,0.5,5\n1,1.5,6\n").curve.travel.tolist() == [0.5, 1.5]
+    assert read("Ext;Load;\n0,5;5;1\n1,5;6;2\n").curve.travel.tolist() == [0.5, 1.5]
+
+
+@pytest.mark.parametrize("cell", [MANY + "x", MANY + "." + MANY + "x", "1,234" * LONG + "x"])
+def test_a_long_cell_is_read_as_fast_as_a_long_file(read: Read, cell: str) -> None:
+    """The time grows with its length, not with the square: that would be minutes."""
+    begin = time.process_time()
+    assert problems(read, f'Ext,Load\n0,5\n"{cell}",6\n1,2\n')
+    assert problems(read, f"Ext Load\n0 5\n1 6 {cell.replace(',', '.')}\n")
+    assert not is_number(cell)
+    assert NUMBER.fullmatch(cell) is None
+    assert parse_number(cell) is None
+    with pytest.raises(UsageError):
+        millimeters("--target-error", f"{cell}-")
+    assert time.process_time() - begin < 5.0
+
+
+def test_a_wide_header_is_read_as_fast_as_a_long_file(read: Read) -> None:
+    begin = time.process_time()
+    assert problems(read, "Ext" + ",a" * LONG + "\n1\n")
+    assert problems(read, "Ext" + "\t" * LONG + "a\n1\n")
+    assert time.process_time() - begin < 5.0
 
 
 def test_line_breaks_in_quotes_do_not_move_lines(read: Read) -> None:
@@ -188,6 +256,10 @@ def test_marks(cells: list[str], separator: str, decimal: str, grouping: str) ->
         (["a;b", "0,5;1,5"], ";"),
         (["variant,x", '"base (1 mm, 0.75 mm)",5', "fine mesh,6"], ","),
         (["x", "1", "2"], ","),
+        (["No.\tx\ty", "Dome 1\t0.1\t2"], "\t"),
+        (["Dome\tNo.\tSet\tF", "a b\tNo. 3\tc d\t1,5"], "\t"),
+        (["x,\ty", "1,\t2"], ","),
+        (['x,"a\tb"', '1,"c\td"'], ","),
         (["x y", "1 2"], " "),
     ],
 )

@@ -302,3 +302,11 @@ def test_a_mistake_in_a_table(path: Path, text: str, said: str) -> None:
     with pytest.raises(SpecError) as error:
         read_table(path)
     assert said in problems(error)[0]
+
+
+def test_grouped_thousands_are_no_texts_that_tell_hinges_apart(tmp_path: Path) -> None:
+    path = tmp_path / "h.csv"
+    path.write_text("moment_N_mm;rotation_rad\n1\u00a0133.2;0.04\n2\u00a0250.8;0.08\n")
+    found = read_moments(path)
+    assert found.moment.tolist() == [1133.2, 2250.8]
+    assert found.doubts == ()

@@ -93,6 +93,19 @@ def test_a_part_of_other_designs_is_none(tmp_path: Path) -> None:
     assert [part.start for part in store.damaged()] == [1]
 
 
+def test_a_folder_with_the_name_of_a_part_is_none_and_stays(tmp_path: Path) -> None:
+    store = PartStore(tmp_path / ".parts" / "0123")
+    store.folder.mkdir(parents=True)
+    (store.folder / f"{0:010}-{4:010}-{'0' * 16}.part").mkdir()
+    with store.part(4, 8) as file:
+        file.write(b"whole")
+    assert [part.start for part in store.parts()] == [4]
+    assert store.damaged() == []
+    assert store.missing([(0, 8)]) == [(0, 4)]
+    store.drop()
+    assert [path.is_dir() for path in store.folder.iterdir()] == [True]
+
+
 @pytest.mark.parametrize(
     "said", [{}, {"dpg.designs": "0"}, {"dpg.designs": 3}, {"dpg.designs": "3", "dpg.x": 1}, [1]]
 )

@@ -15,7 +15,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
-from dpgcli.files.table_reader import read_designs, read_record
+from dpgcli.files.table_reader import designs_in, read_designs, read_record
 
 N = 4
 COLUMNS: dict[str, Any] = {
@@ -106,6 +106,23 @@ def test_columns_that_nobody_can_use_are_left_out(tmp_path: Path) -> None:
     assert list(found) == list(COLUMNS)
 
 
+@pytest.mark.parametrize(
+    "order",
+    [
+        sorted(COLUMNS),
+        list(reversed(COLUMNS)),
+        ["status", "design", "n_stable", "calibration", "height_mm", "reason", "reach_max_mm"],
+    ],
+)
+def test_columns_may_stand_in_any_order(tmp_path: Path, order: list[str]) -> None:
+    pq.write_table(pa.table(COLUMNS).select(order), tmp_path / "t.parquet")
+    found = read_designs(tmp_path / "t.parquet")[0]
+    assert list(found)[:3] == ["design", "height_mm", "calibration"]
+    assert found.keys() == COLUMNS.keys()
+    with_notes = pa.table({**COLUMNS, "notes": ["a"] * N}).select([*reversed(order), "notes"])
+    assert list(designs_in(with_notes, "t").columns)[:3] == ["design", "height_mm", "calibration"]
+
+
 @pytest.mark.parametrize("reasons", [["", "", "", "no such finger"], [""] * N])
 @pytest.mark.parametrize("with_index", [False, True])
 def test_a_table_that_went_through_csv_is_the_same(
@@ -159,6 +176,17 @@ def test_too_little_memory_is_said(
 
     monkeypatch.setattr(pq.ParquetFile, "read", reading)
     with pytest.raises(UsageError, match="it takes more memory than there is"):
+        read(tmp_path)
+
+
+def test_what_the_system_refuses_says_nothing_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reading(*_: Any, **__: Any) -> None:
+        raise pa.ArrowException("Unknown error: Failed to launch worker thread")
+
+    monkeypatch.setattr(pq.ParquetFile, "read", reading)
+    with pytest.raises(UsageError, match=r"t\.parquet: unknown error: failed to launch worker"):
         read(tmp_path)
 
 

@@ -103,7 +103,13 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    "damage",
+    [
+        *("cut", "last bit", "longer"),
+        *(pytest.param(d, marks=pytest.mark.slow) for d in ("empty", "one bit", "zeros")),
+    ],
+)
 def test_damaged_parts_are_computed_again(
     study: Any, expected: dict[str, bytes], damage: str
 ) -> None:
@@ -196,7 +202,7 @@ def test_shards_cover_every_design_once(study: Any, count: int) -> None:
     assert [d for start, stop in ranges for d in range(start, stop)] == list(range(76))
 
 
-@pytest.mark.parametrize("count", [2, 3, 50])
+@pytest.mark.parametrize("count", [2, 3, pytest.param(50, marks=pytest.mark.slow)])
 def test_shards_join_to_the_bytes_of_one_run(
     study: Any, expected: dict[str, bytes], tmp_path: Path, count: int
 ) -> None:

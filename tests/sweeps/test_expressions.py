@@ -55,6 +55,15 @@ def python_value(text: str) -> float | bool | None:
     return None if isinstance(value, complex) else value
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["a >= 1 # and a > 99", "#a > 99\na >= 1", "(a >= 1 # and a > 99\n)", "a > 1 # type: int"],
+)
+def test_no_part_of_an_expression_is_hidden_from_it(text: str) -> None:
+    with pytest.raises(ExpressionError, match="# would hide what stands behind it"):
+        expression(text)
+
+
 @given(ARITHMETIC.filter(lambda text: len(text) <= 500))
 def test_arithmetic_is_python_s(text: str) -> None:
     expected = python_value(text)

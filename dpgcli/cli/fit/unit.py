@@ -1,4 +1,4 @@
-"""`dpg fit unit`: hinge, walls and lever of one unit from its turns under end moments."""
+"""`dpg fit unit`: hinge, walls and segment height of one unit, from its turns under end moments."""
 
 from pathlib import Path
 from typing import Annotated
@@ -42,7 +42,7 @@ def unit(
     ] = None,
     target: Annotated[
         list[Target] | None,
-        typer.Option(help="What to meet; repeatable  [default: angles, openings, pushes]"),
+        typer.Option(help="What to meet; repeatable  [default: angles, openings]"),
     ] = None,
     error: ErrorsOfTargets = None,
     geometry: GeometryValues = None,
@@ -55,7 +55,7 @@ def unit(
     plot: Plot = None,
     quiet: Quiet = False,
 ) -> None:
-    """Fit k_theta, wall compliance and lever to what end moments turn a unit by."""
+    """Fit k_theta, walls and segment height to what end moments turn a unit by."""
     from dpgcli.api.fits.unit import fit_unit
 
     check_files((curve, spec), output, plot)

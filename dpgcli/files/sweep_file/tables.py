@@ -5,7 +5,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable
-from itertools import islice
+from itertools import islice, zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dpgcli.errors import SpecError
 from dpgcli.files.csv_file import text_of
 from dpgcli.files.frames import with_index
-from dpgcli.files.layout import marks_in, rows_in, separator_of
+from dpgcli.files.layout import doubtful_point, marks_in, rows_in, separator_of
 from dpgcli.files.places import Location, shown
 from dpgcli.files.table_reader import DAMAGED, undamaged
 
@@ -120,7 +120,7 @@ def _csv(content: bytes) -> pd.DataFrame:
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
             content = _without_ends(content, separator)
-            if re.search(re.escape(mark.encode()) + rb"[ \t]*(\n|\Z)", content):
+            if re.search(re.escape(mark.encode()) + rb" *(\n|\Z)", content):
                 _check_rows(content, mark)  # pandas drops an empty cell too many
             stream = io.BytesIO(content)
             return pd.read_csv(stream, index_col=False, sep=parted, decimal=decimal)
@@ -148,8 +148,10 @@ def _decimal_mark(lines: list[str], separator: str) -> str:
     """The mark of decimals, a comma only between cells that others part. Raises NoTableError."""
     rows, _ = rows_in(lines, separator)
     marks = marks_in([cell for row in rows[1:] for cell in row.cells], separator)
-    if marks.doubtful or marks.grouping:
-        found = shown(marks.doubtful or f"thousands grouped by {marks.grouping}")
+    columns = zip_longest(*(row.cells for row in rows[1:]), fillvalue="")
+    doubtful = marks.doubtful or doubtful_point(list(columns))
+    if doubtful or marks.grouping:
+        found = shown(doubtful or f"thousands grouped by {marks.grouping}")
         raise NoTableError(found, "write decimal points, and no groups of thousands")
     return marks.decimal if separator != "," else "."
 
