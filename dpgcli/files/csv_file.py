@@ -18,7 +18,7 @@ from dpgcli.design.dimensions import LARGEST
 from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.content import content_of, decoded
 from dpgcli.files.frames import frame_of
-from dpgcli.files.headers import headed
+from dpgcli.files.headers import headed, may_be_titles
 from dpgcli.files.layout import (
     GROUPED,
     NUMBER,
@@ -75,6 +75,12 @@ class Choice:
     columns: Mapping[str, str] = field(default_factory=dict)
     skip: int | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_by_place(self) -> bool:
+        """Whether columns are chosen by their places, and nobody says where the table begins."""
+        sources = (source.removeprefix("-") for source in self.columns.values())
+        return self.skip is None and any(map(str.isdigit, sources))
 
 
 AS_IT_IS = Choice()
@@ -257,11 +263,21 @@ def read_sheet(
         tuple(_comments(lines[:line])) if is_file else (),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
+    if is_file and below and choice.is_by_place and may_be_titles(below):
+        problems.append(_asked(sheet, 0))
     if is_file and separator == ",":
         problems += _untitled(sheet, head.untitled, line)
     if problems:
         raise SpecError(in_order(problems))
     return sheet
+
+
+def _asked(sheet: Sheet, row: int) -> Problem:
+    """The question whether a row has titles or numbers."""
+    line, cells = sheet.lines[row], ", ".join(sheet.rows[row])
+    answers = f" {line} if these are titles", f" {line - 1} if not"
+    hint = Message(Field("skip"), answers[0], ", ", Field("skip"), answers[1])
+    return sheet.problem(row, "row", "numbers, not what may be titles", shown(cells), hint)
 
 
 def _comments(lines: Sequence[str]) -> Iterator[tuple[int, str]]:

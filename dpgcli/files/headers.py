@@ -43,7 +43,7 @@ def headed(
     place = 0 if is_first else header_in(rows, wanted, sources)
     line, below = rows[place].line, list(rows[place + 1 :])
     titles = list(rows[place].cells)
-    if _are_numbers(titles, sources):
+    if _are_numbers(titles, below, sources):
         below, titles = list(rows[place:]), [str(n) for n in range(1, len(titles) + 1)]
     units = below.pop(0).cells if below and is_of_units(below[0]) else []
     found = dict(_found(titles, columns))
@@ -63,10 +63,32 @@ def headed(
     )
 
 
-def _are_numbers(titles: Sequence[str], sources: Sequence[str]) -> bool:
+def _are_numbers(titles: Sequence[str], below: Sequence[Row], sources: Sequence[str]) -> bool:
     """Whether a row is no header: all its cells are numbers, or those of a place that is chosen."""
     places = (place for source in sources if (place := _place(titles, source)) is not None)
-    return all(map(is_number, titles)) or any(is_number(titles[place]) for place in places)
+    is_chosen = any(is_number(titles[place]) for place in places)
+    return all(map(is_number, titles)) or (
+        is_chosen and not _has_words_above_numbers(titles, below)
+    )
+
+
+def may_be_titles(rows: Sequence[Row]) -> bool:
+    """Whether the first of some rows looks like titles: it counts on, or has words above numbers.
+
+    >>> may_be_titles([Row(["0", "1"], 1), Row(["0.5", "9"], 2)])
+    True
+    """
+    first, *below = rows
+    numbers = list(filter(is_number, first.cells))
+    counted = ([str(begin + n) for n in range(len(numbers))] for begin in (0, 1))
+    counts_on = len(numbers) > 1 and numbers in counted
+    return counts_on or _has_words_above_numbers(first.cells, below)
+
+
+def _has_words_above_numbers(cells: Sequence[str], below: Sequence[Row]) -> bool:
+    words = [place for place, cell in enumerate(cells) if cell and not is_number(cell)]
+    columns = ([row.cells[place] for row in below if len(row.cells) > place] for place in words)
+    return any(2 * sum(map(is_number, column)) > len(column) for column in columns)
 
 
 def _found(
@@ -84,19 +106,16 @@ def _found(
 def _place(titles: Sequence[str], source: str) -> int | None:
     """The place of a title, with its unit or without; of a number that is none, the place itself.
 
-    None where there is no such title, or more than one.
+    None where there is no such title, or more than one, or a number is a title at another place.
     """
+    is_place = source.isascii() and source.isdigit() and len(source) < 7
+    place = int(source) - 1 if is_place and 1 <= int(source) <= len(titles) else None
     bare_titles = [name_and_unit(title)[0] for title in titles]
     for known in (titles, bare_titles):
         if source in known:
-            return known.index(source) if list(known).count(source) == 1 else None
-    is_place = (
-        source.isascii()
-        and source.isdigit()
-        and len(source) < 7
-        and 1 <= int(source) <= len(titles)
-    )
-    return int(source) - 1 if is_place else None
+            is_one = list(known).count(source) == 1 and place in (None, known.index(source))
+            return known.index(source) if is_one else None
+    return place
 
 
 def _named(titles: Sequence[str], found: Mapping[str, tuple[int, bool]]) -> list[str]:

@@ -367,6 +367,11 @@ def test_json_of_check_has_the_warnings(call: Call, domes: Path) -> None:
     )
     assert first["warnings"][0].startswith("--require 'min_barrier_mJ > 0': min_barrier_mJ rests")
     assert second["warnings"] == []
+    call("check", "out/designs.parquet", *rules, "--summary-file", "summary.md")
+    _, met, warning, *rest = (domes / "summary.md").read_text().split("\n\n")
+    assert met.startswith("met: min_barrier_mJ")
+    assert warning.startswith("Warning: require 'min_barrier_mJ \\> 0': min_barrier_mJ rests on")
+    assert len(rest) == 1
 
 
 def test_from_python(domes: Path, monkeypatch: pytest.MonkeyPatch) -> None:

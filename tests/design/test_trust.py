@@ -357,6 +357,13 @@ def test_of_a_grid_it_says_how(method: GridMethod, height: float, basis: Basis, 
     assert energies.known_error.endswith("% (its fit)")
 
 
+def test_of_a_grid_at_another_modulus_it_says_both() -> None:
+    design = with_files(BASE, grid(GridMethod.INTERPOLATION), fitted("a.yaml", force_linearity=0.0))
+    stiff = trusts(sized(design, dome_height_mm=6.0, elastic_modulus_MPa=30.0))[Output.ENERGIES]
+    law = "E t^2.8 h^-0.25 (finite-element scaling)"
+    assert stiff.source == f"bistable stiffness: interpolated {OVER}, grid.yaml, {law}"
+
+
 def test_a_file_that_does_not_say_where_it_holds_is_extrapolated() -> None:
     nowhere = fitted("nowhere.yaml", {}, **{"bistable_stiffness_N_per_mm": 15.0})
     found = trusts(with_files(BASE, nowhere))

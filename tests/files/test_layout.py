@@ -184,6 +184,37 @@ def test_no_row_of_numbers_is_taken_for_the_titles_that_are_places(read: Read) -
     assert named.curve.travel.tolist() == [0, 0.5, 1]
 
 
+TITLES = [
+    "0,1\n0,5\n0.5,6\n",
+    "a,1,2\n9,0,5\n9,0.5,6\n",
+    "Test,of,domes\na,1,2\n9,0,5\n9,0.5,6\n",
+    "1,2\n0,5\n0.5,6\n",
+]
+
+
+@pytest.mark.parametrize("text", TITLES)
+def test_titles_that_are_numbers_are_no_point_of_a_curve(read: Read, text: str) -> None:
+    first, second = ("2", "3") if "a" in text else ("1", "2")
+    columns = {"travel_mm": first, "force_N": second}
+    line = text.splitlines().index(next(c for c in text.splitlines() if "1" in c)) + 1
+    if text.startswith("a"):  # above numbers: the title 2 is not at place 2
+        (said,) = problems(read, text, Choice(columns))
+        assert said.startswith("header: expected a column 2, found a, 1, 2 (a title that stands")
+        assert read(text, Choice(columns, skip=1)).curve.travel.tolist() == [0.0, 0.5]
+        return
+    (said,) = problems(read, text, Choice(columns))
+    assert said.startswith(f"{line}: row: expected numbers, not what may be titles")
+    assert f"skip {line} if these are titles" in said
+    assert read(text, Choice(columns, skip=line)).curve.travel.tolist() == [0.0, 0.5]
+
+
+def test_numbers_that_count_on_are_a_point_where_it_is_said(read: Read) -> None:
+    places = Choice({"travel_mm": "1", "force_N": "2"}, skip=0)
+    assert read("0,1\n0.5,6\n", places).curve.travel.tolist() == [0.0, 0.5]
+    labels = Choice({"travel_mm": "2", "force_N": "3"})
+    assert read("a,0,5\nb,0.5,6\n", labels).curve.travel.tolist() == [0.0, 0.5]
+
+
 def test_a_title_that_begins_with_a_minus_is_itself(read: Read) -> None:
     found = read("-Load,Ext\n5,0.5\n6,1.5\n", Choice({"travel_mm": "Ext", "force_N": "-Load"}))
     assert found.curve.force is not None
