@@ -13,7 +13,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.hinge import Chambers, is_solid, on_plane
-from dpgcli.design.geometry import WALL_THICKNESS
+from dpgcli.design.geometry import WALL_THICKNESS, segment_height
 
 PATCH_RADIUS = 0.21
 """Radius of the patch over the chamber's width: 4.2 mm of a chamber 20 mm wide."""
@@ -69,7 +69,7 @@ def lever(chambers: Chambers) -> float:
     >>> lever(Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0))
     10.75
     """
-    return (chambers.width + chambers.layer_thickness) / 2
+    return segment_height(chambers.width, chambers.layer_thickness)
 
 
 @dataclass(frozen=True)
