@@ -16,7 +16,7 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PushOnly, Tabulated
 
 FEWEST_PUSHES = 2
-SMALLEST_RISE = 0.01  # of the opening: less is noise of a pusher that hardly gives way
+SMALLEST_RISE = 0.03  # of the opening: less is noise of a pusher that hardly gives way
 STIFFEST = 1e-3  # mm/N, of the pusher: what walls yield is hundreds of times as much
 _BEHIND = tuple(0.05 * step for step in range(1, 31))
 PARABOLA = (

@@ -63,13 +63,6 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         problems += error.problems
     if problems:
         raise SpecError(in_order(problems))
-    moments = _columns(sheet, [MOMENT])[0] if MOMENT in sheet.names else np.zeros(len(sheet.rows))
-    problems = [
-        sheet.problem(row, MOMENT, "a number, 0 for none", "nothing")
-        for row in np.flatnonzero(np.isnan(moments)).tolist()
-    ] or _repeated(sheet, patterns, moments)
-    if problems:
-        raise SpecError(in_order(problems))
     known = KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
         tip=_columns(sheet, TIP),
@@ -77,7 +70,7 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         openings=_columns(sheet, _by_unit("opening{}_mm", n_units)),
         pushes=_columns(sheet, _by_unit("push{}_N", n_units)),
         seconds=_columns(sheet, [SECONDS])[0],
-        moments=moments,
+        moments=_moments(sheet, patterns),
         shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
@@ -249,6 +242,21 @@ def _of_one_unit(sheet: Sheet) -> Sheet:
     if problems:
         raise SpecError(tuple(problems))
     return replace(sheet, names=names, rows=rows)
+
+
+def _moments(sheet: Sheet, patterns: Sequence[str]) -> Array:
+    """End couples, 0 without a column. Raises SpecError for empty cells, and states given twice."""
+    if MOMENT not in sheet.names:
+        moments = np.zeros(len(sheet.rows))
+    else:
+        moments = _columns(sheet, [MOMENT])[0]
+    problems = [
+        sheet.problem(row, MOMENT, "a number, 0 for none", "nothing")
+        for row in np.flatnonzero(np.isnan(moments)).tolist()
+    ] or _repeated(sheet, patterns, moments)
+    if problems:
+        raise SpecError(in_order(problems))
+    return moments
 
 
 def _repeated(sheet: Sheet, patterns: Sequence[str], moments: Array) -> list[Problem]:

@@ -84,6 +84,7 @@ def _are_bistable(units: Finger, values: Array) -> Flags:
     for row, name in enumerate(NAMES):
         arrays[name][row] = values[row]
     flat = {name: own.reshape(1, -1) for name, own in arrays.items()}
+    flat["branch"] = np.zeros((1, 1))
     wells = inverted_wells(units.with_units([0]).changed(**flat))
     return wells.exists.reshape(values.shape)
 

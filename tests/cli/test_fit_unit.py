@@ -42,6 +42,14 @@ def test_what_is_fitted_is_compared_and_used(call: Any, folder: Path) -> None:
         (HEAD + GROUND + INVERTED.replace("0.8601", "").replace("0.4778", ""), "the data have 0"),
         (HEAD + GROUND.replace("-0.08", "x"), "chamber2_angle_rad: expected a number"),
         ("pattern,tip_angle_rad\n", "file: expected"),
+        (HEAD + GROUND + INVERTED.replace("inverted,0", "inverted,"), "a number, 0 for none"),
+        (HEAD + "ground,0.0025,-0.08,0,0\n", "N m?"),
+        (HEAD + GROUND + INVERTED.replace(",-0.", ",0."), "angles that fall as the finger"),
+        (
+            HEAD + GROUND + INVERTED.replace("3.48", "-3.48").replace("3.49", "-3.49"),
+            "openings > 0",
+        ),
+        (HEAD + GROUND + INVERTED.replace("0.8601", "860.1").replace("0.4778", "477.8"), "push_N"),
     ],
 )
 def test_what_is_refused(call: Any, folder: Path, text: str, said: str) -> None:

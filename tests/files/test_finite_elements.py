@@ -44,11 +44,26 @@ def test_it_stands_in_lists() -> None:
     assert listed.law.description == alone.law.description
 
 
-def test_a_file_before_it_comes_first() -> None:
-    push = CONFIGS / "calibration" / "push_3.5mm.yaml"
-    both = finger_of(f"finger.calibration=[{push}, finite_elements]")
-    assert both.bistable_stiffness[0, 0] == pytest.approx(50.0)
-    assert both.has_walls
+def test_a_file_before_it_comes_first(tmp_path: Path) -> None:
+    rows = {"unit": ["ground"] * 2, "moment_N_mm": [2.5, -2.5], "chamber2_angle_rad": [-0.1, 0.1]}
+    dpg.fit_unit(rows, spec=STUDY).save(tmp_path / "own.yaml")
+    both = finger_of(f"finger.calibration=[{tmp_path / 'own.yaml'}, finite_elements]")
+    assert both.hinge_stiffness[0, 0] == pytest.approx(25.0)
+    assert both.wall_compliance == pytest.approx(finger_of(WORD).wall_compliance)
+
+
+def test_a_curve_before_it_rests_where_it_touches(tmp_path: Path) -> None:
+    """The stroke of another file is that of a law fitted to its curve, no place of rest."""
+    own = dpg.fit_bistable(
+        CONFIGS / "calibration" / "dome_path_h6.5_t0.75.csv",
+        travel_to_opening="stroke:3.5",
+        spec=STUDY,
+    )
+    own.save(tmp_path / "own.yaml")
+    alone = finger_of(WORD)
+    for listed in ("[{}, finite_elements]", "[finite_elements, {}]"):
+        both = finger_of(f"finger.calibration={listed.format(tmp_path / 'own.yaml')}")
+        assert both.stroke == pytest.approx(alone.stroke, rel=1e-12)
 
 
 def test_another_modulus_softens_walls_and_hinges_alike() -> None:

@@ -31,7 +31,7 @@ from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import check_loads, read_states
 from dpgcli.files.sections import Geometry
-from dpgcli.mechanics.finger import STUDY
+from dpgcli.mechanics.finger import STUDY, uniform_finger
 from dpgcli.reports.fit_figures import draw_turns
 from dpgcli.reports.fits import unit_summary, value_rows
 
@@ -74,9 +74,10 @@ def fit_unit(
     at = geometry_from(geometry, spec)
     known = read_states(curve, 1)
     lever = _lever(at)
-    base = unit_finger(known, lever or STUDY["segment_height"])
-    expected = np.array([[_hinge(at)]])
-    check_loads(curve, known, base.changed(hinge_stiffness=expected))
+    height = lever or STUDY["segment_height"]
+    expected = {**STUDY, "segment_height": height, "hinge_stiffness": _hinge(at)}
+    check_loads(curve, known, uniform_finger(1, **expected))
+    base = unit_finger(known, height)
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
     met = targets_of(known, target or _targets(known), with_walls=has_pushes)
