@@ -96,9 +96,11 @@ def test_a_sweep_without_a_design_to_solve_is_not_ok(
     assert result.exit_code == 2
     found = "sweep.yaml: space: expected a design that can be solved, found none in 2 ("
     assert result.stdout.startswith(found + said)
-    write(f"base: three_unit.yaml\nspace: [{{key: {space.replace('[', '[3, ', 1)}\n")
-    if "units" in space.partition(",")[0] and "constraints" not in space:  # one of them can be
-        assert call("validate", "sweep.yaml").stdout == "sweep.yaml: ok\n"
+
+
+def test_a_sweep_with_one_design_to_solve_is_ok(call: Call, write: Any) -> None:
+    write("base: three_unit.yaml\nspace: [{key: finger.units, values: [0, 3, 99]}]\n")
+    assert call("validate", "sweep.yaml").stdout == "sweep.yaml: ok\n"
 
 
 def test_mistakes_of_a_sweep_and_of_its_base_come_together(call: Call, write: Any) -> None:
