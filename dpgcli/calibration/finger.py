@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.calibration.choices import HINGES, WALLS, Loss, Target
+from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss, Target
 from dpgcli.calibration.comparison import Comparison, compare, frame_misfit
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
@@ -44,6 +44,8 @@ BAR_STIFFNESS_RATIOS = (
 
 
 FIRST_YIELD = 0.1  # of H²/k_θ, what a hinge yields at the dome's axis: where walls begin
+TOGETHER = (HINGES, WALLS, LEVER)  # of an opened gap: each may stand for the others
+NEARLY_ALIKE = 1e-2  # of unit columns: a smaller singular value is nearly none
 ALIKE = 0.95  # correlation: beyond it data hardly tell values apart
 TELL_APART = (
     "turns under an end moment tell hinges and walls apart: rows with moment_N_mm, of a ground "
@@ -92,32 +94,46 @@ class FingerFit:
         self._check_start()
         try:
             found = self._fit(self.observations, resamples, seed)
+            self._check_apart(found)
         except FitError as error:
             if {WALLS, HINGES} <= {*self.free} and "apart" in error.message:
                 raise FitError(f"{error.message}; {TELL_APART}") from None
             raise
         return replace(found, warnings=(*found.warnings, *self._edges(found), *_alike(found)))
 
-    def _fit(self, observed: Observations, resamples: int = 0, seed: int = 0) -> Fit:
-        def jacobian(values: Array) -> Array:
-            states = self._states(values)
-            free = [place for place, p in enumerate(self._parameters) if p.is_free]
-            steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
-            slopes = observed.jacobian(states, sensitivities(states.settled, steps))
-            whole = np.zeros((len(slopes), len(self._parameters)))
-            whole[:, free] = slopes
-            return whole
+    def _check_apart(self, found: Fit) -> None:
+        """Raise FitError where a bound hides that data do not tell these values apart."""
+        places = [i for i, p in enumerate(found.parameters) if p.is_free and p.key in TOGETHER]
+        if not found.at_bound[places].any():
+            return
+        slopes = self._slopes(self.observations, found.values)[:, places]
+        size = np.sqrt((slopes**2).sum(axis=0))
+        least = np.linalg.svd(slopes / np.where(size > 0.0, size, 1.0), compute_uv=False)[-1]
+        if least < NEARLY_ALIKE:
+            keys = " and ".join(found.parameters[place].key for place in places)
+            raise FitError(f"the data cannot tell {keys} apart: fix one of them")
 
+    def _fit(self, observed: Observations, resamples: int = 0, seed: int = 0) -> Fit:
         return fit(
             self._parameters,
             lambda values: observed.residual(self._states(values)),
-            jacobian,
+            lambda values: self._slopes(observed, values),
             observed=observed.deflections(self._straight),
             loss=self.loss,
             loss_scale=self.loss_scale,
             resamples=resamples,
             seed=seed,
         )
+
+    def _slopes(self, observed: Observations, values: Array) -> Array:
+        """Derivatives of the residuals by all values, (point, value); 0 by those that are held."""
+        states = self._states(values)
+        free = [place for place, p in enumerate(self._parameters) if p.is_free]
+        steps = [{KEYS[self._parameters[place].key]: np.ones((1, 1))} for place in free]
+        slopes = observed.jacobian(states, sensitivities(states.settled, steps))
+        whole = np.zeros((len(slopes), len(self._parameters)))
+        whole[:, free] = slopes
+        return whole
 
     @cached_property
     def observations(self) -> Observations:

@@ -16,6 +16,8 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PushOnly, Tabulated
 
 FEWEST_PUSHES = 2
+SMALLEST_RISE = 0.01  # of the opening: less is noise of a pusher that hardly gives way
+STIFFEST = 1e-3  # mm/N, of the pusher: what walls yield is hundreds of times as much
 _BEHIND = tuple(0.05 * step for step in range(1, 31))
 PARABOLA = (
     (0.0, *_BEHIND),
@@ -49,15 +51,15 @@ def _push(known: KnownStates) -> tuple[float, float]:
     if not known.patterns.any():
         return STUDY["bistable_stiffness"], STUDY["stroke"]
     opening, push = known.openings[is_known], known.pushes[is_known]
-    if len(np.unique(opening)) < FEWEST_PUSHES:
+    if len(np.unique(push)) < FEWEST_PUSHES:
         raise FitError(
             "opening_mm and push_N of an inverted unit under two moments or more say what pushes "
-            f"it: the data have {len(np.unique(opening))}"
+            f"it: the data have {len(np.unique(push))}"
         )
-    slope, start = np.polyfit(opening, push, 1)
-    if slope >= 0.0:
-        raise FitError(f"push_N rises by {slope:.3g} N/mm with opening_mm: a push falls with it")
-    return float(-slope), float(-start / slope)
+    yielding, stroke = np.polyfit(push, opening, 1)  # pushes differ more, and are known better
+    if yielding * np.ptp(push) > SMALLEST_RISE * stroke:
+        raise FitError(f"push_N rises with opening_mm, by {1 / yielding:.3g} N/mm: a push falls")
+    return 1.0 / max(-yielding, STIFFEST), float(stroke)
 
 
 def _hinge(known: KnownStates, segment_height: float) -> float:

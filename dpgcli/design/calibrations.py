@@ -63,12 +63,12 @@ class DomeCurve:
 class KnownError(NamedTuple):
     """Errors of one kind of output, as shares of it: the largest, and their root mean square.
 
-    `against` says what it was compared with, such as states that it was not fitted to.
+    `against` says what it was compared with; of states that a fit has left out it is empty.
     """
 
     largest: float
     rms: float | None = None
-    against: str = "what it was not fitted to"
+    against: str = ""
 
     @property
     def text(self) -> str:

@@ -65,8 +65,8 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
     """The law of a name, with the first curve among the calibrations."""
     if law in (None, "published"):
         return Domes()
-    curves = (c for c in calibrations if isinstance(c, Calibration) and c.curve is not None)
-    calibration = next(curves, None)
+    curves = [c for c in calibrations if isinstance(c, Calibration) and c.curve is not None]
+    calibration = curves[0] if curves else None
     if law == "push_only" and calibration is None:
         return Domes(PushOnly(PUBLISHED))
     if calibration is None or calibration.curve is None:
@@ -79,7 +79,7 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
         return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
     if law == "tabulated":
         return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
-    return _pushing(calibration, calibration.curve, stiffness.value)
+    return _pushing(curves, calibration.curve, stiffness.value)
 
 
 def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
@@ -119,7 +119,9 @@ def _tabulated(
     return Domes(Tabulated(shape), rules, calibration, NORMALS)
 
 
-def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Domes | Issue:
+def _pushing(curves: list[Calibration], curve: DomeCurve, stiffness: float) -> Domes | Issue:
+    """By the curve of the first; the strokes of all are those of laws fitted to curves."""
+    calibration = curves[0]
     travel = spline(*_points(curve, 1.0, 1.0)).rests[1]
     if not np.isfinite(travel):
         return _no_well(calibration)
@@ -131,7 +133,7 @@ def _pushing(calibration: Calibration, curve: DomeCurve, stiffness: float) -> Do
         STROKE,
         value=partial(_stroke_in_contact, domes),
         rule="travel of the inverted dome - dome height - unit separation (contact)",
-        not_from=calibration,
+        not_from=tuple(curves),
     )
     rules = (stroke if d is STROKE else d for d in DERIVATIONS if d is not FORCE_LINEARITY)
     return replace(domes, derivations=tuple(rules))

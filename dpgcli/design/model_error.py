@@ -22,6 +22,7 @@ THE_REST = (
     "pushes within about 10 %, inverted units' stiffness within 30 % (60 % if walls are fitted to "
     "shapes)"
 )
+FITTED_HEIGHT = "with a segment height fitted to them"
 OTHER_WALLS = (
     "unknown for these walls; fitted ones bring shapes within 1–6 % of the deflection, pushes "
     "within about 10 % and inverted units' stiffness within 30 % of finite elements (60 % if they "
@@ -39,6 +40,20 @@ def model_error_of(case: Case) -> ModelError:
         if own and isinstance(file, Calibration) and file.shape_error is not None:
             return _left_out(file, file.shape_error, own, case.place)
     return _of_walls(case) if case.has_walls else _of_height(case)
+
+
+def shapes_in(error: ModelError) -> str:
+    """The part of what is known that is about shapes.
+
+    >>> shapes_in(ModelError(f"{CURLED}; {CALIBRATE}")) == CURLED, shapes_in(UNKNOWN)
+    (True, 'unknown')
+    """
+    if error.text.startswith("unknown"):
+        return "unknown"
+    text = error.text
+    for rest in (CALIBRATE, THE_REST, FITTED_HEIGHT):
+        text = text.removesuffix(f"; {rest}")
+    return text
 
 
 def _of_walls(case: Case) -> ModelError:
@@ -62,14 +77,16 @@ def _of_height(case: Case) -> ModelError:
     if height.basis is not Basis.FITTED:
         return UNKNOWN
     where = case.elsewhere(SEGMENT_HEIGHT.key)
-    return ModelError(f"{WITH_HEIGHT}{where}; with a segment height fitted to them")
+    return ModelError(f"{WITH_HEIGHT}{where}; {FITTED_HEIGHT}")
 
 
 def _left_out(file: Calibration, known: KnownError, own: Sequence[Value], place: int) -> ModelError:
-    """The errors of states that a fit has not seen, as its calibration says."""
+    """The errors of states that a fit has not seen, or of others, as its calibration says."""
     rms = known.largest if known.rms is None else known.rms
     sizes = f"{100.0 * rms:.2g} % of the deflection (rms), {100.0 * known.largest:.2g} % at most"
     text = f"states that {file.file} was not fitted to are off by {sizes}"
+    if known.against:
+        text = f"shapes by {file.file} are off by {sizes}, against {known.against}"
     if any(ORIGINS[int(of_design(value.origin, place))] in MOVED for value in own):
         text += ", at the geometry of the fit, which is another"
     return ModelError(text, rms)

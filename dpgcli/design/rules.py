@@ -46,8 +46,8 @@ def all_by(numbers: Array, origin: Origin, rule: str) -> Value:
 class Derivation:
     """How geometry yields one lattice value; `origin` only where a calibration is behind it.
 
-    Calibration files may give the value instead, but for `not_from`: there the key means something
-    else.
+    Calibration files may give the value instead, but for those `not_from`: there the key means
+    something else.
     """
 
     key: str
@@ -55,7 +55,7 @@ class Derivation:
     value: Callable[..., Array]
     rule: str
     origin: Callable[..., Indices] | None = None
-    not_from: Calibration | None = None
+    not_from: tuple[Calibration, ...] = ()
     bounds: tuple[float, float] = (SMALLEST, LARGEST)
 
     def allows(self, values: Array) -> Flags:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.design.footing import Case, Footing
-from dpgcli.design.model_error import model_error_of
+from dpgcli.design.model_error import model_error_of, shapes_in
 from dpgcli.design.outputs import Basis, Output, Trust
 from dpgcli.design.rules import (
     BISTABLE_STIFFNESS,
@@ -68,8 +68,7 @@ def _shapes(case: Case) -> Trust:
     lead = case.footings[WALL_COMPLIANCE if case.has_walls else SEGMENT_HEIGHT.key]
     gravest = case.gravest(*(key for key in case.footings if key != LINEAR_STIFFNESS))
     lead = gravest if gravest.basis is Basis.EXTRAPOLATED else lead
-    error = model_error_of(case).text.partition(";")[0]
-    error = UNKNOWN if error.startswith(UNKNOWN) else error
+    error = shapes_in(model_error_of(case))
     return _checked(Trust(Output.SHAPES, lead.basis, error, str(lead)), lead)
 
 

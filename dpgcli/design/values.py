@@ -37,7 +37,9 @@ def value_of(
     for place, calibration in enumerate(group.calibrations):
         if calibration == PUBLISHED and derivation.origin is not None:
             return _derived_value(derivation, group, problems)
-        if not isinstance(calibration, Calibration) or calibration is derivation.not_from:
+        if not isinstance(calibration, Calibration):
+            continue
+        if any(calibration is other for other in derivation.not_from):
             continue
         if calibration.has(derivation.key):
             return from_file(derivation, group, calibration, place, problems)

@@ -1,7 +1,7 @@
 """Known states from tables: tips, angles, openings and pushes by pattern; shapes as points."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,9 +63,12 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         problems += error.problems
     if problems:
         raise SpecError(in_order(problems))
-    moments = _columns(sheet, [MOMENT])[0]
-    moments = np.where(np.isnan(moments), 0.0, moments)
-    if problems := _repeated(sheet, patterns, moments):
+    moments = _columns(sheet, [MOMENT])[0] if MOMENT in sheet.names else np.zeros(len(sheet.rows))
+    problems = [
+        sheet.problem(row, MOMENT, "a number, 0 for none", "nothing")
+        for row in np.flatnonzero(np.isnan(moments)).tolist()
+    ] or _repeated(sheet, patterns, moments)
+    if problems:
         raise SpecError(in_order(problems))
     known = KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
@@ -143,24 +146,48 @@ def check_loads(source: Tabular, known: KnownStates, finger: Finger) -> None:
             problems.append(located(place, MOMENT, expected, found, hint))
     pushes = known.pushes[known.patterns & np.isfinite(known.pushes)]
     usual = hinge * finger.stroke.mean() / lever**2
+    key = "push_N" if finger.n_units == 1 else "push1_N"
     if len(pushes) and hinge > 0.0:
         expected = f"pushes of domes in N, positive, about {usual:.2g}"
-        found, push = f"{np.median(pushes):.3g} in the median", float(np.median(pushes))
+        push = float(pushes[np.abs(pushes).argmax()])
+        found = f"{push:.3g}, the largest"
         if push < 0.0:
-            problems.append(located(place, "push1_N", expected, found, "is the sign the other?"))
+            problems.append(located(place, key, expected, found, "is the sign the other one?"))
         elif not usual / UNLIKELY < push < UNLIKELY * usual:
-            problems.append(located(place, "push1_N", expected, found, "is the unit another one?"))
+            problems.append(located(place, key, expected, found, "is the unit another one?"))
+    problems += _reversed(known, place, finger.n_units)
     if problems:
         raise SpecError(tuple(problems))
 
 
+def _reversed(known: KnownStates, place: Location, n_units: int) -> Iterator[Problem]:
+    """Problems of inverted units that, without a load, turn up or close where others open."""
+    free = known.moments == 0.0
+    curled = known.angles[-1, free & known.patterns.any(axis=0)]
+    opened = known.openings[:, free][known.patterns[:, free]]
+    opening = "opening_mm" if n_units == 1 else "opening1_mm"
+    for key, values, sign, expected in (
+        (TIP_ANGLE, -curled, "y", "angles that fall as the finger curls towards -y"),
+        (opening, opened, "it", "openings > 0 of inverted units"),
+    ):
+        values = values[np.isfinite(values)]
+        if len(values) and values.sum() < 0.0:
+            found = f"{abs(values.mean()):.3g} in the mean the other way"
+            yield located(place, key, expected, found, f"is the sign of {sign} the other one?")
+
+
 def _turns(known: KnownStates) -> tuple[Array, Array]:
-    """How far the end curls beyond its mean for the pattern (rad), and under which moments."""
+    """How far the end curls beyond its mean for the pattern (rad), and under which moments.
+
+    A straight finger does not turn without a moment.
+    """
     turned, under = [], []
     for pattern in np.unique(known.patterns, axis=1).T:
         same = (known.patterns == pattern[:, None]).all(axis=0) & np.isfinite(known.angles[-1])
         if same.any():
-            curl, moments = -known.angles[-1, same], known.moments[same]
+            rest = np.zeros(int(not pattern.any()))
+            curl = np.concatenate((-known.angles[-1, same], rest))
+            moments = np.concatenate((known.moments[same], rest))
             turned.append(curl - curl.mean())
             under.append(moments - moments.mean())
     together = np.concatenate([*turned, np.zeros(0)]), np.concatenate([*under, np.zeros(0)])

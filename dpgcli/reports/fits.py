@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Columns
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, rests
-from dpgcli.calibration.choices import GridMethod, Rule
+from dpgcli.calibration.choices import GridMethod, Rule, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.grid import GridLaw
@@ -145,7 +145,12 @@ def unit_summary(study: FingerFit, found: Fit) -> Iterator[str]:
         yield f"the push of the data: a spring of {spring:.4g} N/mm, {too_long:.4g} mm too long"
     else:
         yield "no inverted unit in the data: they do not say how walls yield"
-    errors = 100.0 * np.abs(study.compared(found).stiffness)
+    compared = study.compared(found)
+    if Target.PUSHES not in study.targets and np.isfinite(compared.push).any():
+        pushed = study.known.patterns.any(axis=0) & np.isfinite(compared.push)
+        off, largest = compared.push[pushed].max(initial=0.0), np.nanmax(study.known.pushes)
+        yield f"pushes, not fitted: {off:.3g} N off at worst, of up to {largest:.3g} N"
+    errors = 100.0 * np.abs(compared.stiffness)
     for name, is_in in (("ground", False), ("inverted", True)):
         of_unit = errors[(study.known.patterns[0] == is_in) & np.isfinite(errors)]
         if len(of_unit):

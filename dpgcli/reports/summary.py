@@ -14,7 +14,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
-from dpgcli.design.outputs import Output, Trust, doubts_about
+from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.design.scene import Origin
 from dpgcli.files.trust import trusts_in, warnings_in
 from dpgcli.reports.base import bar_stiffness, base_lines
@@ -243,14 +243,9 @@ def _extremes(space: DesignSpace) -> list[str | PageTable]:
 
 
 def doubts(space: DesignSpace) -> list[str]:
-    """Why designs should not be ranked by some of the metrics, in a line for each reason.
-
-    The stiffness of bars alone is not ranked: there the assumed one is no matter.
-    """
+    """Why designs should not be ranked by some of the metrics, in a line for each reason."""
     ranked = dict.fromkeys(extreme.metric for extreme in extremes(space))
     trusts = {name: space.trusts.get(name, ()) for name in ranked}
-    if STIFFEST in trusts:
-        trusts[STIFFEST] = [t for t in trusts[STIFFEST] if t.output is not Output.AXIAL]
     return [f"ranking: {why}" for why in doubts_about(trusts)]
 
 

@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, least_squares
 
 from dpgcli.api.fits.unit import fit_unit
 from dpgcli.arrays import Array
@@ -126,37 +128,55 @@ def unit() -> KnownStates:
 
 
 def test_a_units_turns_beyond_the_fitted_ones(unit: KnownStates) -> None:
-    """Without the rows of −5 N mm: their increments within 15 % (inverted) and 6 % (ground)."""
+    """Without the rows of −5 N mm: their increments within 8 % (inverted) and 3 % (ground)."""
     given = np.flatnonzero(unit.moments > -3.0)
     start = unit_finger(unit.chosen(given), 10.75)
-    study = FingerFit(start, unit.chosen(given), Frame(), (HINGES, WALLS, LEVER), tuple(ALL[1:]))
+    study = FingerFit(start, unit.chosen(given), Frame(), (HINGES, WALLS, LEVER), ALL[1:3])
     values = study.fit().by_key
     found = compare(start.with_values(values), unit, Frame())
     beyond = unit.moments == -5.0
     errors = np.abs(found.stiffness[beyond])
-    assert errors[unit.patterns[0, beyond]] < 0.15
-    assert errors[~unit.patterns[0, beyond]] < 0.06
+    assert errors[unit.patterns[0, beyond]] < 0.08
+    assert errors[~unit.patterns[0, beyond]] < 0.03
 
 
 def test_a_unit_by_its_moment_balance(unit: KnownStates) -> None:
-    """k θ = M + P H cos(θ/2) and o = 2 H sin(θ/2) + c P, by linear least squares over rows.
-
-    It weighs moments where the fit weighs turns, so that they differ by what the model is off.
-    """
-    fit = fit_unit(EXAMPLES / "unit_moment.csv")
-    rows = unit.patterns[0]
-    turn, push, opening = -unit.angles[0, rows], unit.pushes[0, rows], unit.openings[0, rows]
-    balance = np.stack((turn, -push * np.cos(turn / 2.0), 0.0 * turn), axis=1)
-    ground = np.stack(
-        (-unit.angles[0, ~rows], 0.0 * unit.moments[~rows], 0.0 * unit.moments[~rows]), 1
+    """k θ = M + P H cos(θ/2) and o = 2 H sin(θ/2) + c P, row by row, by SciPy alone."""
+    angle_error, opening_error = 0.002, 0.03
+    fit = fit_unit(
+        EXAMPLES / "unit_moment.csv",
+        error=[f"angles={angle_error}", f"openings={opening_error}"],
     )
-    opens = np.stack((0.0 * turn, 2.0 * np.sin(turn / 2.0), push), axis=1)
-    left = np.concatenate((balance, ground, 10.0 * opens))
-    right = np.concatenate((unit.moments[rows], unit.moments[~rows], 10.0 * opening))
-    hinge, lever, walls = np.linalg.lstsq(left, right, rcond=None)[0]
-    assert fit.values[HINGES] == pytest.approx(hinge, rel=0.04)
-    assert fit.values[LEVER] == pytest.approx(lever, rel=0.03)
-    assert fit.values[WALLS] == pytest.approx(walls, rel=0.1)
+    inverted = unit.patterns[0]
+    slope, start = np.polyfit(unit.openings[0, inverted], unit.pushes[0, inverted], 1)
+    spring, too_long = -slope, -start / slope
+
+    def residual(values: Array) -> Array:
+        hinge, walls, lever = values
+        found = []
+        for moment, pushed in zip(unit.moments, inverted, strict=True):
+
+            def push(turn: float, on: bool = bool(pushed)) -> float:
+                free = too_long - 2.0 * lever * np.sin(turn / 2.0)
+                return spring * free / (1.0 + walls * spring) if on else 0.0
+
+            def unbalanced(turn: float, m: float = float(moment), by: Any = push) -> float:
+                return hinge * turn - m - by(turn) * lever * np.cos(turn / 2.0)
+
+            turn = brentq(unbalanced, -1.0, 1.0, xtol=1e-14)
+            found.append((turn, 2.0 * lever * np.sin(turn / 2.0) + walls * push(turn)))
+        turns, openings = np.array(found).T
+        given = inverted | (unit.moments != 0.0)
+        return np.concatenate(
+            (
+                (turns + unit.angles[0]) / angle_error,
+                (openings - unit.openings[0])[given] / opening_error,
+            )
+        )
+
+    peer = least_squares(residual, [30.0, 0.8, 10.5], x_scale=[30.0, 0.8, 10.5], xtol=1e-12)
+    for key, value in zip((HINGES, WALLS, LEVER), peer.x, strict=True):
+        assert fit.values[key] == pytest.approx(value, rel=1e-5)
 
 
 def test_one_moment_does_not_tell_hinge_and_walls_apart(unit: KnownStates) -> None:
@@ -185,3 +205,17 @@ def test_without_inverted_rows_only_the_hinge_is_fitted() -> None:
     fit = fit_unit(rows)
     assert fit.values == {HINGES: pytest.approx(25.0)}
     assert any("no inverted unit" in line for line in fit.summary)
+
+
+def test_states_that_no_fit_has_seen() -> None:
+    """011, 101 and 111: pushes within 6 %, tips within 3.1 % of the deflection, 2.3 % in the mean.
+
+    That tips are no nearer is the lattice's: an opened gap tilts the chambers beside it, so that
+    gaps within a finger turn it further than the last one does, and opened neighbors push less.
+    """
+    finger, known = finite_elements()
+    rest = read_states(EXAMPLES / "three_gap_finger_pure_push_rest.csv", 3)
+    study = FingerFit(finger, known, FRAME, (WALLS, HINGES), targets_for(known, with_walls=True))
+    found = compare(finger.with_values(study.fit().by_key), rest, FRAME)
+    assert np.nanmax(found.relative) < 0.0315 and np.nanmean(found.relative) < 0.0235
+    assert np.nanmax(found.push) < 0.06 * rest.pushes[rest.patterns].min()

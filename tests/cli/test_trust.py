@@ -138,7 +138,7 @@ def test_a_doubt_names_the_basis_and_what_to_do(call: Call, domes: Path) -> None
 
 
 def test_a_doubt_says_of_how_many_designs(call: Call, domes: Path) -> None:
-    axis = "{key: finger.geometry.dome_height_mm, values: [6.5, 7.5, 8.5]}"
+    axis = "{key: finger.geometry.dome_height_mm, values: [2.5, 6.5, 7.5, 8.5]}"
     rules = "constraints: [dome_height_mm < 9]\n"
     (domes / "sweep.yaml").write_text(f"base: three_unit.yaml\nspace: [{axis}]\n{rules}")
     done = call("sweep", "sweep.yaml", *SERIAL, "--require", "reach_max_mm > 1")
@@ -148,6 +148,19 @@ def test_a_doubt_says_of_how_many_designs(call: Call, domes: Path) -> None:
     )
     again = call("sweep", "sweep.yaml", *SERIAL, "--require", "reach_max_mm > 1")
     assert "reach_max_mm" not in again.stderr, "what is excluded does not count"
+
+
+@pytest.mark.parametrize(("most", "share"), [(10**6, "2 of 4"), (2, "1 of 2")])
+def test_designs_are_asked_a_chunk_at_a_time(
+    call: Call, domes: Path, monkeypatch: pytest.MonkeyPatch, most: int, share: str
+) -> None:
+    """Of many, some that are spread evenly."""
+    monkeypatch.setattr("dpgcli.studies.sweep.ASKED_AT_ONCE", 1)
+    monkeypatch.setattr("dpgcli.studies.sweep.MOST_ASKED", most)
+    axis = "{key: finger.geometry.dome_height_mm, values: [6.5, 7.5, 8.5, 9.5]}"
+    (domes / "sweep.yaml").write_text(f"base: three_unit.yaml\nspace: [{axis}]\n")
+    facts = json.loads(call("explain", "sweep.yaml", "--format", "json").stdout)
+    assert facts["trust"][0]["share"] == f"{share} designs"
 
 
 def test_a_ranking_is_warned_of_and_refused(call: Call, domes: Path) -> None:
@@ -354,6 +367,11 @@ def test_json_of_check_has_the_warnings(call: Call, domes: Path) -> None:
     )
     assert first["warnings"][0].startswith("--require 'min_barrier_mJ > 0': min_barrier_mJ rests")
     assert second["warnings"] == []
+    call("check", "out/designs.parquet", *rules, "--summary-file", "summary.md")
+    _, met, warning, *rest = (domes / "summary.md").read_text().split("\n\n")
+    assert met.startswith("met: min_barrier_mJ")
+    assert warning.startswith("Warning: require 'min_barrier_mJ \\> 0': min_barrier_mJ rests on")
+    assert len(rest) == 1
 
 
 def test_from_python(domes: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,10 +18,10 @@ from dpgcli.api.fits.result import (
     warned,
 )
 from dpgcli.api.inputs import as_texts, check_resampling, chosen, files_of
-from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss
+from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.known import Frame
+from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.calibration.unit import unit_finger
 from dpgcli.design import geometry as rules
 from dpgcli.design.dimensions import without_unit
@@ -58,8 +58,9 @@ def fit_unit(
 
     `curve` has `unit` (ground or inverted), `moment_N_mm` (positive where it opens the gap),
     `chamber2_angle_rad`, and for inverted units `opening_mm` and `push_N`. Without inverted rows
-    only the hinge is fitted. `target` and `error` are those of `fit_finger`; dimensions say where
-    the values hold, and where the dome's axis is if `free` leaves the lever out.
+    only the hinge is fitted. `target` and `error` are those of `fit_finger`, by default angles and
+    openings, which the pushes are then held against; dimensions say where the values hold,
+    and where the dome's axis is if `free` leaves the lever out.
     Raises SpecError for wrong data, UsageError for wrong choices, FitError for a fit that fails.
 
     >>> ground = {"unit": ["ground"] * 2, "moment_N_mm": [2.42, -2.42]}
@@ -78,7 +79,7 @@ def fit_unit(
     check_loads(curve, known, base.changed(hinge_stiffness=expected))
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
-    met = targets_of(known, target, with_walls=has_pushes)
+    met = targets_of(known, target or _targets(known), with_walls=has_pushes)
     errors = errors_of(error, met)
     study = FingerFit(base, known, Frame(), keys, met, weighted, loss_scale, errors)
     found = study.fit(bootstrap, seed)
@@ -95,6 +96,12 @@ def fit_unit(
         partial(draw_turns, study, found, name_of(curve)),
         files=files_of(curve, spec),
     )
+
+
+def _targets(known: KnownStates) -> tuple[Target, ...]:
+    """Angles, and openings where the data have them."""
+    has_openings = np.isfinite(known.openings).any()
+    return (Target.ANGLES, Target.OPENINGS) if has_openings else (Target.ANGLES,)
 
 
 def _hinge(at: Geometry | None) -> float:

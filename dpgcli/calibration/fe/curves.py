@@ -12,7 +12,7 @@ from dpgcli.calibration.fe.decks import Pulse
 from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import strain_energy, swept_volume
 from dpgcli.calibration.fe.hinge import Chambers, chamber_turn, couple, moment
-from dpgcli.calibration.fe.pushed import Push, floor_angle, opening
+from dpgcli.calibration.fe.pushed import Push, floor_angle, lever, opening
 from dpgcli.calibration.fe.pushed_deck import Step
 from dpgcli.errors import SolverError
 
@@ -143,12 +143,20 @@ def unit_stiffness(curve: UnitCurve, lever: float) -> UnitStiffness:
     )
 
 
-def unit_finding(found: UnitStiffness) -> str:
-    """Opening, push, rotation and what follows from them, in one line."""
+def unit_finding(chambers: Chambers, curve: UnitCurve) -> str:
+    """Opening, push, rotation and what follows from them; doubts, if any; in one line."""
+    found = unit_stiffness(curve, lever(chambers))
+    closes = curve.opening_mm.min() <= -chambers.separation
+    pulls = curve.push_N.min() < 0.0
+    doubts = (
+        *(["closes the gap, where the chambers would touch"] if closes else []),
+        *(["opens the gap so far that the push becomes a pull"] if pulls else []),
+    )
+    doubt = f" A moment {' and one '.join(doubts)}: take smaller ones." if doubts else ""
     return (
         f"Inverted: opening {found.opening:.4g} mm, push {found.push:.4g} N, rotation "
         f"{found.rotation:.4g} rad; k_theta {found.by_push:.4g} N mm/rad (ground: "
-        f"{found.ground:.4g}), c_w {found.walls:.4g} mm/N."
+        f"{found.ground:.4g}), c_w {found.walls:.4g} mm/N.{doubt}"
     )
 
 

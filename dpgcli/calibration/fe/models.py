@@ -17,7 +17,6 @@ from dpgcli.calibration.fe.curves import (
     hinge_finding,
     unit_curve,
     unit_finding,
-    unit_stiffness,
 )
 from dpgcli.calibration.fe.decks import (
     dome_deck,
@@ -35,7 +34,7 @@ from dpgcli.calibration.fe.finger import (
     in_gray_order,
 )
 from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
-from dpgcli.calibration.fe.pushed import Cells, Push, lever, pushed_bricks
+from dpgcli.calibration.fe.pushed import Cells, Push, pushed_bricks
 from dpgcli.calibration.fe.pushed_deck import Step, pushed_deck, pushed_words
 from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import SolverError
@@ -154,7 +153,7 @@ def unit_model(
     def outcome(time: Array, moved: Array) -> RunOutcome:
         _check_states(len(time), len(steps))
         curve = unit_curve(chambers, mesh, push, steps, moved)
-        return RunOutcome(curve, unit_finding(unit_stiffness(curve, lever(chambers))))
+        return RunOutcome(curve, unit_finding(chambers, curve))
 
     deck = pushed_deck(chambers, mesh, push, steps, ("dpg fe unit", *words))
     return Model("unit", deck, words, len(mesh.nodes), float(len(steps)), outcome)

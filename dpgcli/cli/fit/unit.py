@@ -42,7 +42,7 @@ def unit(
     ] = None,
     target: Annotated[
         list[Target] | None,
-        typer.Option(help="What to meet; repeatable  [default: angles, openings, pushes]"),
+        typer.Option(help="What to meet; repeatable  [default: angles, openings]"),
     ] = None,
     error: ErrorsOfTargets = None,
     geometry: GeometryValues = None,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dpgcli.calibration.fe.curves import csv_text
-from dpgcli.calibration.fe.finger import finger_states, frame_words, in_gray_order
+from dpgcli.calibration.fe.finger import finger_states, frame_words, in_gray_order, with_seconds
 from dpgcli.calibration.fe.hinge import Chambers
 from dpgcli.calibration.fe.models import PUSHED_CELLS, finger_model
 from dpgcli.calibration.fe.pushed import Push, opening, pushed_bricks
@@ -61,6 +61,23 @@ def test_the_deck_pushes_one_gap_after_the_other() -> None:
     assert sum(line.startswith("*ELEMENT, TYPE=SPRINGA") for line in lines) == 3
     with pytest.raises(SolverError, match="ccx wrote 1 states of 7"):
         model.outcome(np.array([7.0]), np.zeros((1, model.n_nodes, 3)))
+
+
+def test_every_gap_has_a_spring_of_its_own() -> None:
+    model = finger_model(CHAMBERS, PUSH, "coarse", ALL)
+    lines = model.deck.splitlines()
+    starts = [i for i, line in enumerate(lines) if line.startswith("*ELEMENT, TYPE=SPRINGA")]
+    springs = [[int(word) for word in lines[i + 1].split(", ")] for i in starts]
+    nodes = [node for _, *ends in springs for node in ends]
+    assert nodes == list(range(model.n_nodes + 1, model.n_nodes + 7))
+    assert len({element for element, *_ in springs}) == 3
+    sets = [lines[i + 3] for i in starts]
+    assert sets == [f"{nodes[2 * gap]}, {nodes[2 * gap + 1]}" for gap in range(3)]
+
+
+def test_each_state_takes_its_share_of_the_time() -> None:
+    states = with_seconds({"pattern": np.array(["00", "01"])}, 9.0)
+    assert states["seconds"].tolist() == [4.5, 4.5]
 
 
 def test_the_finger_at_rest_needs_no_step() -> None:

@@ -221,6 +221,8 @@ def test_steps_of_the_deck(model: Model) -> None:
     found = cards(model.deck)
     temperatures = [lines for card, lines in found if card == "*TEMPERATURE"]
     assert temperatures == 4 * [["GAP1, 0"]] + 5 * [["GAP1, 1"]]
+    increments = [lines[0].split(",")[0] for card, lines in found if card == "*STATIC"]
+    assert increments == ["1"] * 4 + ["0.25"] + ["1"] * 4, "in small steps where the gap opens"
     loads = [lines for card, lines in found if card == "*CLOAD"]
     couples = [
         2 * sum(heights[int(node)] * float(force) for node, _, force in map(_cells, lines))
@@ -232,6 +234,12 @@ def test_steps_of_the_deck(model: Model) -> None:
 
 def _cells(line: str) -> list[str]:
     return line.split(", ")
+
+
+def test_ends_of_springs_stay_in_the_plane_of_symmetry(model: Model) -> None:
+    found = cards(model.deck)
+    held = [line for card, lines in found if card == "*BOUNDARY" for line in lines]
+    assert held == ["FIXED, 1, 3", "SYMMETRY, 3, 3", "ENDS, 3, 3"]
 
 
 def test_what_the_model_says_of_itself(model: Model) -> None:
@@ -257,6 +265,7 @@ def test_the_curve_of_a_unit_that_moves_as_told(mesh: Bricks) -> None:
     )  # fmt: skip
     assert curve.unit.tolist() == ["ground", "ground", "inverted", "inverted"]
     assert curve.moment_N_mm.tolist() == [0.0, 2.5, 0.0, -2.5]
+    assert curve.chamber1_angle_rad == pytest.approx(np.zeros(4))
     assert curve.chamber2_angle_rad == pytest.approx([0.0, -0.1, -0.3, -0.25])
     opened = opening(REFERENCE, mesh, PUSH, moved, 0)
     assert curve.opening_mm == pytest.approx([0.0, *opened])
@@ -285,7 +294,19 @@ def test_hinge_and_walls_of_a_unit_come_back() -> None:
     assert found.ground == pytest.approx(33.0)
     assert found.walls == pytest.approx(0.7)
     assert found.rotation == pytest.approx(0.26)
-    assert "k_theta 33 N mm/rad (ground: 33), c_w 0.7 mm/N" in unit_finding(found)
+    said = unit_finding(REFERENCE, table(33.0, 0.7))
+    assert said.endswith("k_theta 33 N mm/rad (ground: 33), c_w 0.7 mm/N.")
+
+
+def test_moments_that_are_too_large_are_said() -> None:
+    curve = table(33.0, 0.7)
+    narrow = replace(REFERENCE, separation=1.6)
+    assert unit_finding(narrow, curve).endswith(
+        " A moment closes the gap, where the chambers would touch: take smaller ones."
+    )
+    pulled = curve._replace(push_N=np.array([0.0, -0.1, 0.0, curve.push_N[3]]))
+    assert "the push becomes a pull" in unit_finding(REFERENCE, pulled)
+    assert "touch and one opens" in unit_finding(narrow, pulled)
 
 
 @pytest.mark.parametrize("turn", ["moment_N_mm", "chamber2_angle_rad", "push_N"])
