@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import date
 from decimal import Decimal
 from enum import StrEnum
+from fractions import Fraction
 from importlib import util
 from numbers import Integral, Real
 from pathlib import Path
@@ -75,7 +76,7 @@ class SceneInput:
         if self.document is None:
             raise UsageError(Field("calibration"), " changes a spec, not a finger's values")
         if not isinstance(calibration, Calibration):
-            path = Path(calibration)
+            path = path_of("calibration", calibration)
             calibration = read_calibration(path).model_copy(update={"file": path.name})
         return scene_of(checked(recalibrated(self.document, calibration)))
 
@@ -152,24 +153,47 @@ def setting_texts(settings: Settings, field: str = "settings") -> tuple[str, ...
 def plain(value: Any) -> Any:
     """Data as a YAML file would hold them: calibrations as sections, NumPy's numbers as Python's.
 
+    Raises UsageError for what no such file holds.
+
     >>> import numpy as np
     >>> plain({"finger": {"units": np.int64(3), "calibration": ("published",)}})
     {'finger': {'units': 3, 'calibration': ['published']}}
     """
+    try:
+        return _plain(value)
+    except RecursionError:
+        raise UsageError("a spec is nested too deeply, or holds itself") from None
+
+
+def _plain(value: Any) -> Any:
     if isinstance(value, Calibration):
         return value.model_dump(exclude_none=True)
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | range):
-        return [plain(item) for item in value]
+        return [_plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
-    if isinstance(value, Decimal):  # of a database
+    if isinstance(value, Decimal | Fraction):  # of a database
         return float(value)
     listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
     if listed is None and not isinstance(value, str | Real | date | NoneType):
         raise UsageError(f"a spec has no {type(value).__name__}: expected numbers and texts")
-    return value if listed is None else listed()
+    return value if listed is None else _plain(listed())
+
+
+def each_of(value: Any) -> tuple[Any, ...]:
+    """The items of a sequence; of what is none, such as a text, itself.
+
+    >>> each_of("abc"), each_of(["a", "b"])
+    (('abc',), ('a', 'b'))
+    """
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        return (value,)
+    try:
+        return tuple(value)
+    except TypeError:  # an array without axes
+        return (value,)
 
 
 def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
@@ -178,7 +202,7 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
     >>> as_texts("only", "abc"), as_texts("only", ["a", "b"])
     (('abc',), ('a', 'b'))
     """
-    listed = (texts,) if isinstance(texts, str) or not isinstance(texts, Iterable) else tuple(texts)
+    listed = each_of(texts)
     if not all(isinstance(text, str) for text in listed):
         raise UsageError(Field(field), f" {texts!r}: expected a text or several")
     return listed
@@ -214,7 +238,8 @@ def check_numbers(**values: float | None) -> None:
     """
     for field, value in values.items():
         is_number = isinstance(value, Real) and not isinstance(value, bool)
-        if value is not None and not is_number:
+        is_in_reach = is_number and not (isinstance(value, Integral) and abs(value) > LARGEST)
+        if value is not None and not is_in_reach:
             raise UsageError(Field(field), f" {value!r}: expected a number")
 
 
@@ -226,6 +251,26 @@ def check_whole(**values: int | None) -> None:
     for field, value in values.items():
         if value is not None and (isinstance(value, bool) or not isinstance(value, Integral)):
             raise UsageError(Field(field), f" {value!r}: expected a whole number")
+
+
+def check_texts(**values: str | None) -> None:
+    """Raise UsageError for an argument that is no text; none where it is optional.
+
+    >>> check_texts(formulation="chain", shard=None)
+    """
+    for field, value in values.items():
+        if value is not None and not isinstance(value, str):
+            raise UsageError(Field(field), f" {value!r}: expected a text")
+
+
+def check_flags(**values: bool) -> None:
+    """Raise UsageError for an argument that is neither True nor False.
+
+    >>> check_flags(restart=False)
+    """
+    for field, value in values.items():
+        if not isinstance(value, bool):
+            raise UsageError(Field(field), f" {value!r}: expected True or False")
 
 
 def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
@@ -257,7 +302,7 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     """
     try:
         x, y = map(float, place)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         x, y = float("nan"), 0.0
     if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
         raise UsageError(
@@ -307,7 +352,7 @@ def check_resampling(bootstrap: int, seed: int) -> None:
     """Raise UsageError for a number of samples, or a seed, that is none; or of too many samples."""
     check_whole(bootstrap=bootstrap, seed=seed)
     for field, value in (("bootstrap", bootstrap), ("seed", seed)):
-        if value < 0:
+        if value is None or value < 0:
             raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
     if bootstrap > MOST_RESAMPLES:
         raise UsageError(Field("bootstrap"), f" {bootstrap}: expected at most {MOST_RESAMPLES:,}")

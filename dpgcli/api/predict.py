@@ -12,6 +12,7 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_numbers,
+    check_texts,
     figure_path,
     path_of,
     scene_input,
@@ -101,6 +102,8 @@ class PredictResult:
 
     def sketch(self, width: int = 80) -> str:
         """Small pictures of the states, 64 at most, as braille in lines of `width` characters."""
+        if not (isinstance(width, int) and width > 0):
+            raise UsageError(f"width {width!r}: expected a whole number from 1 on")
         check_drawable(self.plan.n_states, "sketch")
         return sketch(self.given.scene, self.plan.request.patterns, width)
 
@@ -145,6 +148,7 @@ def request_of(
     """The request that these arguments make."""
     names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)
     check_numbers(tolerance=tolerance, target_error=target_error)
+    check_texts(formulation=formulation)
     return Request(
         patterns=as_texts("patterns", patterns),
         columns=tuple(name.strip() for name in names if name.strip()),

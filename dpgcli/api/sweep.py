@@ -1,20 +1,22 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import gettempdir
-from typing import Any
 
 from dpgcli.api.given import SweepInput, sweep_input
 from dpgcli.api.inputs import (
     Settings,
     as_texts,
+    check_flags,
     check_numbers,
+    check_texts,
     check_whole,
+    each_of,
     path_of,
     setting_texts,
 )
@@ -145,9 +147,9 @@ def sweep(
     ([4, 4], 8)
     """
     place = Place(executor, jobs, scheduler, wait)
+    check_flags(restart=restart, force=force, strict=strict)
     part = shard_of(shard)
-    if part is not None:
-        _check_part(output, require)
+    _check_part(part, output, require)
     with _folder(output) as folder:
         study = study_of(sweep, folder, settings, tolerance, target_error)
         check_not_read(study.sweep.files, [path for path, _ in outputs(folder)])
@@ -180,8 +182,12 @@ def _folder(output: str | Path | None) -> Iterator[Path]:
         yield folder / "output"  # which is locked, as the folder is
 
 
-def _check_part(output: str | Path | None, require: str | Sequence[str]) -> None:
-    """Raise UsageError for what a shard has no place or no table for."""
+def _check_part(
+    part: Shard | None, output: str | Path | None, require: str | Sequence[str]
+) -> None:
+    """Raise UsageError for what a shard, if it is one, has no place or no table for."""
+    if part is None:
+        return
     if output is None:
         raise UsageError("a ", Field("shard"), " is kept in a folder: give ", Field("output"))
     if require:
@@ -247,6 +253,7 @@ def shard_of(shard: str | Shard | None) -> Shard | None:
     """
     if shard is None or isinstance(shard, Shard):
         return shard
+    check_texts(shard=shard)
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", shard)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise UsageError(Field("shard"), f" {shard}: expected K/N with K from 1 to N, such as 3/16")
@@ -268,6 +275,7 @@ class Place:
 
     def __post_init__(self) -> None:
         check_whole(jobs=self.jobs)
+        check_texts(executor=self.executor, scheduler=self.scheduler)
         check_numbers(wait=self.wait)
         dask, scheduler = Field("executor"), Field("scheduler")
         if self.executor not in EXECUTORS:
@@ -318,8 +326,7 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
         ...
     dpgcli.errors.UsageError: nowhere: expected the output of one dpg sweep shard, found no shard
     """
-    is_many = isinstance(shards, Iterable) and not isinstance(shards, str)
-    folders: list[Any] = list(shards) if is_many else [shards]  # type: ignore[arg-type]
+    folders = each_of(shards)
     if not folders:
         raise UsageError("shards: expected one folder or more")
     paths = [path_of("shards", folder) for folder in folders]

@@ -1,14 +1,20 @@
 """`validate`: specs and sweeps looked at, and nothing solved."""
 
+from collections.abc import Iterator
+from pathlib import Path
+
 from dpgcli.api.given import scene_or_sweep
-from dpgcli.api.inputs import Settings, SpecInput
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput
 from dpgcli.errors import Problem, SpecError
+from dpgcli.files.places import Location, located
+from dpgcli.files.sweep_file import Sweep
 
 
 def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     """All problems of specs and sweeps, none where they are right; nothing is solved.
 
-    Those of a sweep come with those of its base, which `settings` change.
+    Those of a sweep come with those of its base, which `settings` change. A sweep without a design
+    that can be solved, of a million at most, has a problem, too.
 
     >>> problem, = validate({"finger": {"units": 0}})[:1]
     >>> problem.key, problem.expected
@@ -19,7 +25,22 @@ def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     problems: list[Problem] = []
     for spec in specs:
         try:
-            scene_or_sweep(spec, settings)
+            given = scene_or_sweep(spec, settings)
         except SpecError as error:
             problems += error.problems
+        else:
+            problems += _none_to_solve(given, spec)
     return tuple(problems)
+
+
+def _none_to_solve(given: SceneInput | Sweep, spec: SpecInput) -> Iterator[Problem]:
+    """The problem of a sweep whose designs are all excluded, or cannot exist."""
+    if isinstance(given, SceneInput):
+        return
+    from dpgcli.studies.plan import nothing_to_solve
+    from dpgcli.studies.sweep import Study
+
+    if why := nothing_to_solve(Study(given, Path())):
+        place = Location(str(spec) if isinstance(spec, str | Path) else "sweep")
+        found = f"none in {given.space.size:,}"
+        yield located(place, "space", "a design that can be solved", found, why)

@@ -24,7 +24,7 @@ def frame_of(source: Any) -> "pd.DataFrame":
     try:
         frame = convert() if convert is not None else pd.DataFrame(source)
         return with_index(frame)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, AttributeError) as error:
         raise UsageError(f"expected a table, columns of one length: {error}") from error
 
 

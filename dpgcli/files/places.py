@@ -54,4 +54,4 @@ def shown(value: object) -> str:
         return "a number of more than 60 digits"
     if isinstance(value, str):
         return shortened(json.dumps(value[: 2 * MAX_SHOWN], ensure_ascii=False))
-    return shortened(json.dumps(value))
+    return shortened(json.dumps(value, default=str))

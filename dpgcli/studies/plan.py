@@ -60,6 +60,20 @@ def plan_of_sweep(study: Study) -> SweepPlan:
     )
 
 
+def nothing_to_solve(study: Study) -> str:
+    """Why no design of a study can be solved; empty where one can, or where they are too many."""
+    space = study.sweep.space
+    if space.size > MOST_ASKED:
+        return ""
+    reason = ""
+    for chunk in chunked([(0, space.size)], ASKED_AT_ONCE):
+        values = space.designs(chunk.start, chunk.stop)
+        if study.evaluation.exist(values)[1].any():
+            return ""
+        reason = reason or study.evaluation.reason(values)
+    return reason or "constraints exclude all of them"
+
+
 def _counted(study: Study) -> tuple[int, int, int, int]:
     """Designs that are excluded or invalid, and of all others the states and the most units."""
     evaluation, space = study.evaluation, study.sweep.space

@@ -186,6 +186,15 @@ class Evaluation:
             right[places] = ~resolve(design).are_wrong
         return allowed, right
 
+    def reason(self, values: Mapping[str, Values]) -> str:
+        """Why the first design that constraints allow cannot exist; empty where none is wrong."""
+        first = np.flatnonzero(self.allowed(values))[:1]
+        if not len(first):
+            return ""
+        one = {key: column[first] for key, column in values.items()}
+        reasons = self._resolved(one, np.array([True]))[2]
+        return reasons.get(0, "")
+
     def kinds_of_trust(
         self, values: Mapping[str, Values]
     ) -> Iterator[tuple[tuple[Trust, ...], int]]:

@@ -28,6 +28,22 @@ DOME = {"travel_mm": [0.0, 1.0, 2.0], "energy_mJ": [0.0, 1.0, 0.5]}
 DESIGNS = {"design": [0], "calibration": ["given"], "status": ["stable"], "reason": [""]}
 
 
+GRID = {"dome_height_mm": [1.0, 2.0, 4.0], "stroke_mm": [0.5, 2.0, 8.0]}
+TIPS = {"pattern": ["00"], "tip_x_mm": [27.0], "tip_y_mm": [1.0]}
+
+
+def itself() -> dict[str, Any]:
+    """Data that hold themselves."""
+    data: dict[str, Any] = {}
+    data["finger"] = data
+    return data
+
+
+def fit(**given: Any) -> Any:
+    """A fit with a wrong argument."""
+    return dpg.fit_bistable(DOME, travel_to_opening="equal", **given)
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -60,11 +76,69 @@ DESIGNS = {"design": [0], "calibration": ["given"], "status": ["stable"], "reaso
             lambda: dpg.fit_bistable(DOME, travel_to_opening="equal", bootstrap=True),
             "bootstrap True: expected a whole number",
         ),
+        (lambda: dpg.predict(itself()), "a spec is nested too deeply, or holds itself"),
+        (lambda: dpg.predict(BASE, settings=np.array(3)), r"settings array\(3\): expected a text"),
+        (
+            lambda: dpg.predict(FINGER, formulation=["chain"]),
+            r"formulation \['chain'\]: expected",
+        ),
+        (
+            lambda: dpg.predict(FINGER, target_error=10**400),
+            "target_error 1000*: expected a",
+        ),
+        (
+            lambda: dpg.predict(FINGER).sketch(width="a"),
+            "width 'a': expected a whole number",
+        ),
+        (lambda: dpg.predict(FINGER).sketch(width=0), "width 0: expected a whole number from 1"),
+        (lambda: dpg.sweep(SWEEP, shard=(1, 2)), r"shard \(1, 2\): expected a text"),
+        (lambda: dpg.sweep(SWEEP, executor=["serial"]), r"executor \['serial'\]: expected a text"),
+        (lambda: dpg.sweep(SWEEP, restart=pd.NA), "restart <NA>: expected True or False"),
+        (lambda: dpg.sweep(SWEEP, force="no"), "force 'no': expected True or False"),
+        (lambda: dpg.merge(np.array(3), "x"), r"shards array\(3\): expected a path"),
+        (
+            lambda: dpg.compare(BASE, TIPS, calibration={"a": 1}),
+            "calibration {'a': 1}: expected",
+        ),
+        (
+            lambda: dpg.compare(BASE, TIPS, first_station=(10**400, 0)),
+            "first_station .* expected",
+        ),
+        (lambda: fit(fix=3.5), "fix 3.5: expected values by key"),
+        (lambda: fit(fix="stroke_mm=3.5"), "fix 'stroke_mm=3.5': expected values by key"),
+        (lambda: fit(fix={"stroke_mm": 10**400}), "fix stroke_mm=1000*: expected a number from"),
+        (lambda: fit(fix={1: 2}), "fix 1: no value of the law"),
+        (lambda: fit(bootstrap=None), "bootstrap None: expected a whole number from 0 on"),
+        (
+            lambda: fit(geometry=np.array([6.5, 7.5])),
+            "geometry array.*: expected a text",
+        ),
+        (
+            lambda: dpg.fit_grid(GRID, geometry=pd.Series([6.5])),
+            r"geometry 0 +6.5\n.*: expected a text",
+        ),
+        (lambda: dpg.check(memoryview(b"ab"), "a > 1"), "expected a table, columns of one length"),
     ],
 )
 def test_what_it_cannot_be_is_named(call: Callable[[], Any], said: str) -> None:
     with pytest.raises(dpg.UsageError, match=f"^{said}"):
         call()
+
+
+@pytest.mark.parametrize(
+    "value", [pd.NA, pd.NaT, pd.Timestamp("2020-01-01"), np.datetime64("2020-01-01"), "\ud800"]
+)
+@pytest.mark.parametrize("is_listed", [False, True])
+def test_what_no_spec_holds_is_a_problem_of_the_spec(value: Any, is_listed: bool) -> None:
+    value = pd.Series([value], dtype=object) if is_listed else value
+    for data in ({**BASE["finger"], "calibration": value}, value):
+        with pytest.raises(dpg.DpgError):
+            dpg.predict({"finger": data})
+    for axis in ({"paired": {"finger.units": value}}, {"key": "finger.units", "values": value}):
+        with pytest.raises(dpg.DpgError):
+            dpg.sweep({"base": BASE, "space": [axis]}, jobs=1)
+    with pytest.raises(dpg.DpgError):
+        dpg.sweep({"base": BASE, "space": value}, jobs=1)
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

@@ -80,6 +80,29 @@ def test_sweeps_and_specs_are_validated_together(call: Call, write: Any) -> None
     assert (result.exit_code, result.stdout) == (0, "three_unit.yaml: ok\nsweep.yaml: ok\n")
 
 
+@pytest.mark.parametrize(
+    ("space", "said"),
+    [
+        ("finger.overrides.9.lattice.stroke_mm, values: [1, 2]}]", "finger.overrides.9: expected"),
+        ("finger.units, values: [0, 99]}]", "finger.units: expected a whole number from 1 to 64"),
+        ("finger.units, values: [1, 2]}]\nconstraints: [units > 3]", "constraints exclude all of"),
+    ],
+)
+def test_a_sweep_without_a_design_to_solve_is_not_ok(
+    call: Call, write: Any, space: str, said: str
+) -> None:
+    write(f"base: three_unit.yaml\nspace: [{{key: {space}\n")
+    result = call("validate", "sweep.yaml")
+    assert result.exit_code == 2
+    found = "sweep.yaml: space: expected a design that can be solved, found none in 2 ("
+    assert result.stdout.startswith(found + said)
+
+
+def test_a_sweep_with_one_design_to_solve_is_ok(call: Call, write: Any) -> None:
+    write("base: three_unit.yaml\nspace: [{key: finger.units, values: [0, 3, 99]}]\n")
+    assert call("validate", "sweep.yaml").stdout == "sweep.yaml: ok\n"
+
+
 def test_mistakes_of_a_sweep_and_of_its_base_come_together(call: Call, write: Any) -> None:
     write(WRONG)
     lines = call("validate", "sweep.yaml").stdout.splitlines()

@@ -11,7 +11,7 @@ from dpgcli.calibration.opening import parse_number
 from dpgcli.cli.options import millimeters
 from dpgcli.errors import SpecError, UsageError
 from dpgcli.files.csv_file import Choice, read_sheet
-from dpgcli.files.layout import NUMBER, is_number, marks_in, separator_of
+from dpgcli.files.layout import NUMBER, doubtful_point, is_number, marks_in, rows_in, separator_of
 from dpgcli.files.measured import CURVE, Measured, read_curve
 from dpgcli.files.units import FACTORS, OWN, factor_of
 
@@ -83,6 +83,7 @@ def labeled(rows: str, separator: str = "\t") -> str:
         "Ext  Load\n" + body("  ", ".", "\u00a0"),
         "Ext Load\n" + body(" ", ",", "\u202f"),
         "Ext (um) Load [N]\n" + body(" "),
+        "Ext Load\n(um) [N]\n" + body(" "),
         "No.  Ext (um) Load\n[] (um) [N]\n"
         + labeled(body(" ")).replace("Dome ", "").replace("\t", " "),
         '"Ext\n(um)";"Load\n(N)"\n' + body(";", ","),
@@ -159,7 +160,7 @@ def test_a_name_with_a_unit_of_its_own_is_not_contradicted(read: Read) -> None:
     [
         "1.125;1\n2.250;2\n",
         "0.500;1\n1;2\n1.125;3\n",
-        "1.125;950\n120.0;1.000\n1;1200\n",
+        "1.125;95\n2.000;90\n",
         "1.0;1.125\n2;3\n",
     ],
 )
@@ -297,6 +298,16 @@ def test_marks(cells: list[str], separator: str, decimal: str, grouping: str) ->
 def test_separators(lines: list[str], separator: str) -> None:
     found = separator_of(lines)
     assert found == separator or {found, separator} <= {" ", "  "}
+
+
+def test_thousands_without_a_point_say_that_points_are_decimal_ones() -> None:
+    assert doubtful_point([["1.125", "2"], ["1", "950"]]) == "1.125"
+    assert doubtful_point([["1.125", "2"], ["1", "1200"]]) == ""
+
+
+def test_what_groups_thousands_parts_no_cells() -> None:
+    assert [row.cells for row in rows_in(["a \u00a0b  c"], "  ")[0]] == [["a \u00a0b", "c"]]
+    assert [row.cells for row in rows_in(["a\u202fb c"], " ")[0]] == [["a\u202fb", "c"]]
 
 
 def test_every_unit_is_one_of_its_own_kind() -> None:

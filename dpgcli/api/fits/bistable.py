@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,7 @@ def fit_bistable(
     """
     mapping = travel_to_opening
     opening = mapping if isinstance(mapping, Opening) else Opening.of(str(mapping))
-    held = _held(fix or {}, None if free is None else as_texts("free", free))
+    held = _held(fix, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
     measured = read_curve(curve, sizes(where), table_choice(column, skip, units))
@@ -131,18 +132,21 @@ def limits_of(key: str) -> tuple[float, float]:
     return (0.0, 1.0) if key == LINEARITY else (SMALLEST, LARGEST)
 
 
-def _held(fix: Mapping[str, float], free: Sequence[str] | None) -> dict[str, float]:
+def _held(fix: Mapping[str, float] | None, free: Sequence[str] | None) -> dict[str, float]:
     """Values that are held, by key."""
+    fix = {} if fix is None else fix
+    if not isinstance(fix, Mapping):
+        raise UsageError(Field("fix"), f" {fix!r}: expected values by key")
     for field, keys in (("fix", list(fix)), ("free", free or [])):
         for key in keys:
             if key not in LAW_KEYS:
-                nearest = get_close_matches(key, LAW_KEYS, n=1)
+                nearest = get_close_matches(str(key), LAW_KEYS, n=1)
                 hint = f"did you mean {nearest[0]}?" if nearest else f"one of {', '.join(LAW_KEYS)}"
                 raise UsageError(Field(field), f" {key}: no value of the law ({hint})")
     for key, value in fix.items():
         low, high = limits_of(key)
-        if not (isinstance(value, int | float) and low <= value <= high):
-            shown = f"{value:g}" if isinstance(value, int | float) else repr(value)
+        if not (isinstance(value, Real) and low <= value <= high):
+            shown = f"{value:g}" if isinstance(value, float) else repr(value)
             what = f" {key}={shown}: expected a number from {low:g} to {high:g}"
             raise UsageError(Field("fix"), what)
     for key in LAW_KEYS if free is not None else ():
@@ -151,7 +155,7 @@ def _held(fix: Mapping[str, float], free: Sequence[str] | None) -> dict[str, flo
             raise UsageError(f"{key} is both in ", Field("fix"), " and in ", Field("free"))
         if not is_free and key not in fix:
             raise UsageError(f"{key} is not free: give its value, ", Field("fix"), f" {key}=VALUE")
-    return dict(fix)
+    return {key: float(value) for key, value in fix.items()}
 
 
 def _quantity(record: Record, asked: str | None) -> Quantity:

@@ -63,8 +63,8 @@ def fit_grid(
 
 def _check_apart(geometry: GeometryInput, columns: Container[str]) -> None:
     """Raise UsageError for dimensions that the table has itself."""
-    given = sizes(geometry) if isinstance(geometry, Geometry) else geometry or ()
-    for text in setting_texts(given):
+    given = sizes(geometry) if isinstance(geometry, Geometry) else geometry
+    for text in () if given is None else setting_texts(given, "geometry"):
         key = text.partition("=")[0].strip()
         if key in columns:
             raise UsageError(Field("geometry"), f" {text}: the table has a column {key}")

@@ -111,7 +111,8 @@ def with_geometry(geometry: GeometryInput, base: Geometry | None) -> Geometry | 
     """A base geometry with values changed or added."""
     if isinstance(geometry, Geometry):
         geometry = sizes(geometry)
-    return geometry_of(setting_texts(geometry, "geometry"), base) if geometry else base
+    texts = () if geometry is None else setting_texts(geometry, "geometry")
+    return geometry_of(texts, base) if texts else base
 
 
 def sizes(geometry: Geometry | None) -> dict[str, float]:
