@@ -134,9 +134,20 @@ class Case:
         """What the first file behind these values knows of an output's error; empty if none."""
         for footing in (self.footings[key] for key in keys if key in self.footings):
             file = footing.calibration
-            if file is not None and (known := file.known_errors.get(output.key)) is not None:
+            if file is None or self.lacks_walls_of(file):
+                continue
+            if (known := file.known_errors.get(output.key)) is not None:
                 return f"{known.text}, against {known.against}{self.elsewhere(footing.key)}"
         return ""
+
+    def lacks_walls_of(self, file: Calibration) -> bool:
+        """Whether a file's values were fitted beside walls that this finger does not take from it.
+
+        A segment height, or a hinge, stands for something else then.
+        """
+        walls = self.footings.get(WALL_COMPLIANCE)
+        is_taken = walls is not None and walls.calibration is file
+        return file.has(WALL_COMPLIANCE) and not is_taken
 
 
 def kinds(values: Values, designs: Indices) -> list[tuple[int, int]]:

@@ -23,6 +23,9 @@ THE_REST = (
     "shapes)"
 )
 FITTED_HEIGHT = "with a segment height fitted to them"
+BESIDE_WALLS = ModelError(
+    "unknown: the segment height was fitted beside walls that give way, which this finger lacks"
+)
 OTHER_WALLS = (
     "unknown for these walls; fitted ones bring shapes within 1–6 % of the deflection, pushes "
     "within about 10 % and inverted units' stiffness within 30 % of finite elements (60 % if they "
@@ -37,7 +40,9 @@ def model_error_of(case: Case) -> ModelError:
         return ModelError(f"{100.0 * said:.3g} % of the deflection, as the spec says", said)
     for place, file in enumerate(case.design.calibrations):
         own = [v for values in case.values.values() for v in values if v.file == place]
-        if own and isinstance(file, Calibration) and file.shape_error is not None:
+        if not own or not isinstance(file, Calibration) or case.lacks_walls_of(file):
+            continue
+        if file.shape_error is not None:
             return _left_out(file, file.shape_error, own, case.place)
     return _of_walls(case) if case.has_walls else _of_height(case)
 
@@ -76,6 +81,8 @@ def _of_height(case: Case) -> ModelError:
         return ModelError(f"{CURLED}{where}; {CALIBRATE}")
     if height.basis is not Basis.FITTED:
         return UNKNOWN
+    if height.calibration is not None and case.lacks_walls_of(height.calibration):
+        return BESIDE_WALLS
     where = case.elsewhere(SEGMENT_HEIGHT.key)
     return ModelError(f"{WITH_HEIGHT}{where}; {FITTED_HEIGHT}")
 
