@@ -111,6 +111,7 @@ def carry_out(folder: Path, name: str) -> None:
     (folder / "hinge.csv").write_text(HINGE)
     shutil.copy(data / "dome_path_h6.5_t0.75.csv", folder / "dome.csv")
     shutil.copy(data / "dome_grid.csv", folder / "domes.csv")
+    shutil.copy(data / "unit_moment.csv", folder / "unit.csv")
     (folder / "sweep.yaml").write_text(
         "base: finger.yaml\n"
         "space: [{key: finger.geometry.unit_separation_mm, values: [2.5, 3.0]}]\n"

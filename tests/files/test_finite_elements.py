@@ -106,7 +106,9 @@ def test_without_the_dimensions_it_says_which() -> None:
         finger_of(WORD, "finger.geometry.limiting_layer_thickness_mm=null")
 
 
-@pytest.mark.parametrize("name", SHIPPED_FILES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "units.yaml")) for n in SHIPPED_FILES]
+)
 def test_it_is_what_its_tables_give(name: str) -> None:
     made = runpy.run_path(str(CONFIGS / "calibration" / "finite_elements.py"))
     again = made[name.removesuffix(".yaml")]().model_dump(exclude_none=True)
