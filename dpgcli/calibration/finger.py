@@ -43,7 +43,7 @@ BAR_STIFFNESS_RATIOS = (
 )  # times the stiffest bistable spring: bounds of the bars' stiffness
 
 
-FIRST_YIELD = 0.1  # of H²/k_θ, what a hinge yields at the dome's axis: where walls begin
+FIRST_YIELD = 0.1  # of H²/k_θ, what a hinge yields at the dome's axis, or 1/k_b without one
 TOGETHER = (HINGES, WALLS, LEVER)  # of an opened gap: each may stand for the others
 NEARLY_ALIKE = 1e-2  # of unit columns: a smaller singular value is nearly none
 ALIKE = 0.95  # correlation: beyond it data hardly tell values apart
@@ -215,8 +215,10 @@ class FingerFit:
 
     def _walls(self, start: float) -> Parameter:
         """Walls may turn out to be rigid; those that are rigid begin with what a hinge yields."""
-        yields = self.finger.segment_height**2 / self.finger.hinge_stiffness
-        begin = start or FIRST_YIELD * float(np.min(yields, initial=1e3, where=np.isfinite(yields)))
+        finger = self.finger
+        stiffness = finger.hinge_stiffness / finger.segment_height**2
+        holds = stiffness if stiffness.any() else finger.bistable_stiffness
+        begin = start or FIRST_YIELD / float(holds.max())
         is_free = WALLS in self.free
         return Parameter(WALLS, begin if is_free else start, 0.0, LARGEST_YIELD * begin, is_free)
 

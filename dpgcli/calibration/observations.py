@@ -16,6 +16,12 @@ from dpgcli.calibration.known import Frame, KnownStates, LatticeStates
 from dpgcli.states.sensitivities import Sensitivities
 
 SMALLEST_ERROR = 0.01  # of a quantity's size: no model is known to be better
+FIELDS = {  # of known states, and of the lattice's
+    Target.TIPS: "tip",
+    Target.ANGLES: "angles",
+    Target.OPENINGS: "openings",
+    Target.PUSHES: "pushes",
+}
 UNITS = {Target.TIPS: "mm", Target.ANGLES: "rad", Target.OPENINGS: "mm", Target.PUSHES: "N"}
 
 
@@ -33,13 +39,18 @@ class Observations:
 
     def residual(self, states: LatticeStates) -> Array:
         """Predicted less known over its error, (point,)."""
-        return self._joined([(own - known)[given] for own, known, given in self._pairs(states)])
+        return self._joined(
+            [
+                (getattr(states, FIELDS[target]) - self.of(target))[self.given(target)]
+                for target in self.targets
+            ]
+        )
 
     def jacobian(self, states: LatticeStates, found: Sensitivities) -> Array:
         """Derivatives of the residuals by each direction of `found`, (point, direction)."""
         slopes = {
             Target.ANGLES: found.strut_angles,
-            Target.OPENINGS: found.gaps,
+            Target.OPENINGS: found.openings,
             Target.PUSHES: found.pushes,
         }
         if Target.TIPS in self.targets:
@@ -59,13 +70,7 @@ class Observations:
 
     def of(self, target: Target) -> Array:
         """The known values of a quantity, (…, state)."""
-        known = self.known
-        return {
-            Target.TIPS: known.tip,
-            Target.ANGLES: known.angles,
-            Target.OPENINGS: known.openings,
-            Target.PUSHES: known.pushes,
-        }[target]
+        return np.asarray(getattr(self.known, FIELDS[target]))
 
     def given(self, target: Target) -> Flags:
         """Which of a quantity's values are known and count, (…, state)."""
@@ -83,16 +88,6 @@ class Observations:
             stop = first + int(self.given(target).sum())
             yield target, points[first:stop] * self.errors.get(target, 1.0)
             first = stop
-
-    def _pairs(self, states: LatticeStates) -> Iterator[tuple[Array, Array, Flags]]:
-        own = {
-            Target.TIPS: states.tip,
-            Target.ANGLES: states.angles,
-            Target.OPENINGS: states.openings,
-            Target.PUSHES: states.pushes,
-        }
-        for target in self.targets:
-            yield own[target], self.of(target), self.given(target)
 
     def _joined(self, parts: Sequence[Array]) -> Array:
         weighted = zip(self.targets, parts, strict=True)

@@ -29,13 +29,13 @@ class Sensitivities:
     """Derivatives by a step along each direction, arrays of shape (…, direction, batch).
 
     `pose` (3, …) of tip x, y (mm) and angle (rad), `strut_angles` (unit, …) of all stations (rad),
-    `gaps` (unit, …), the openings at the domes' axis (mm), and `pushes` (unit, …) of the domes (N),
-    each per unit of the direction.
+    `openings` (unit, …) at the domes' axis (mm), with what walls yield, and `pushes` (unit, …) of
+    the domes (N), each per unit of the direction.
     """
 
     pose: Array
     strut_angles: Array
-    gaps: Array
+    openings: Array
     pushes: Array
 
 
@@ -107,9 +107,9 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
         turns = -np.cumsum(shape.near_angle + shape.far_angle, axis=0)
         extension = moved.coordinates.springs(stepped).extension
         push = -finger.springs(extension).force
-        gaps = extension + softened * push  # the dome's, and what a rigid wall begins to yield
+        opening = extension + softened * push  # the dome's, and what a rigid wall begins to yield
     x, y = (nodes[-1].imag / COMPLEX_STEP for nodes in (stations.base_x, stations.base_y))
-    return np.stack((x, y, turns[-1])), turns, gaps.imag / COMPLEX_STEP, push.imag / COMPLEX_STEP
+    return np.stack((x, y, turns[-1])), turns, opening.imag / COMPLEX_STEP, push.imag / COMPLEX_STEP
 
 
 def _moved(settled: Settled, direction: Direction) -> tuple[Finger, Array]:

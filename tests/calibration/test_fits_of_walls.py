@@ -59,6 +59,28 @@ def test_walls_that_are_rigid_come_back_as_rigid() -> None:
     assert found.by_key[WALLS] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_where_walls_begin_knows_no_length(size: float) -> None:
+    """The same finger a thousand times as small or large, its forces as they are."""
+    start = finite_elements()[0].with_units([0, 1])
+    scaled = start.changed(
+        segment_length=start.segment_length * size,
+        segment_height=start.segment_height * size,
+        stroke=start.stroke * size,
+        dome_travel=start.dome_travel * size,
+        bistable_stiffness=start.bistable_stiffness / size,
+        linear_stiffness=start.linear_stiffness / size,
+        hinge_stiffness=start.hinge_stiffness * size,
+    )
+    truth = {HINGES: 31.0 * size, WALLS: 0.8 * size}
+    own = lattice_states(scaled.with_values(truth), PATTERNS, Frame(), MOMENTS * size)
+    known = replace(KnownStates.of_tips(PATTERNS, own.tip), moments=MOMENTS * size)
+    known = replace(known, angles=own.angles, pushes=own.pushes)
+    found = FingerFit(scaled, known, Frame(), tuple(truth), (Target.ANGLES, Target.PUSHES)).fit()
+    for key, value in truth.items():
+        assert found.by_key[key] == pytest.approx(value, rel=1e-6)
+
+
 def test_stated_errors_weigh() -> None:
     """Pushes that are 10 % too large and tips that are right: each is met if it counts alone."""
     start = finite_elements()[0].with_units([0, 1]).with_values({LEVER: TRUTH[LEVER]})

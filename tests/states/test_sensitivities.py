@@ -35,12 +35,12 @@ def outputs(finger: Finger) -> dict[str, Array]:
     batch = solved(finger)
     chain, values = batch.potential.coordinates, batch.equilibrium.coordinates
     _, near, far, *_ = internal(chain.without_walls(values), finger.is_rigid)
-    gaps = chain.springs(values).extension
+    openings = chain.springs(values).extension
     return {
         "pose": tip(batch, with_compliance=False).pose,
         "strut_angles": -np.cumsum(near + far, axis=0),
-        "gaps": gaps,
-        "pushes": -batch.finger.springs(gaps).force,
+        "openings": openings,
+        "pushes": -batch.finger.springs(openings).force,
     }
 
 
