@@ -1,6 +1,7 @@
 """What to trust is said where it is used: explain, predict, tables, requirements, rankings."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -147,7 +148,7 @@ def test_strict_is_an_error_before_the_work(
 
 
 def test_a_ranking_that_is_known_by_its_states_is_refused_after_them(
-    call: Call, domes: Path
+    call: Call, domes: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The largest stiffness shows more than the bars only where a hinge is as stiff as they are."""
     axis = "{key: finger.lattice.hinge_stiffness_N_mm_per_rad, values: [24, 1e7]}"
@@ -163,6 +164,10 @@ def test_a_ranking_that_is_known_by_its_states_is_refused_after_them(
     again = call("sweep", "sweep.yaml", *SERIAL, *DOME, *WALL, "--strict")
     assert again.exit_code == ExitCode.USAGE, "also where there is nothing left to do"
     assert call("sweep", "sweep.yaml", *SERIAL, *DOME, *WALL).exit_code == ExitCode.DONE
+    monkeypatch.chdir(domes)
+    settings = [text for text in (*DOME, *WALL) if text != "-s"]
+    with pytest.raises(dpg.UsageError, match=r"^strict allows no ranking.*\n.*stiffness_max_N"):
+        dpg.sweep("sweep.yaml", executor="serial", settings=settings, strict=True)
 
 
 def test_where_nothing_can_be_judged_nothing_is_refused(call: Call, domes: Path) -> None:
@@ -401,11 +406,15 @@ def test_a_table_that_does_not_say_it_is_taken_but_not_strictly(call: Call, dome
     rule = ("own.parquet", "--require", "min_barrier_mJ > 0")
     done = call("check", *rule)
     assert (done.exit_code, done.stderr) == (ExitCode.DONE, "")
-    strict = call("check", *rule, "--strict")
-    assert strict.exit_code == ExitCode.USAGE
-    assert strict.stderr == (
-        "dpg: --strict needs a table that says what its columns rest on, as dpg sweep writes it\n"
-    )
+    (domes / "own").mkdir()
+    shutil.copy(domes / "own.parquet", domes / "own" / "designs.parquet")
+    assert call("report", "own").exit_code == ExitCode.DONE
+    for strict in (call("check", *rule, "--strict"), call("report", "own", "--strict")):
+        assert strict.exit_code == ExitCode.USAGE
+        assert strict.stderr == (
+            "dpg: --strict needs a table that says what its columns rest on, "
+            "as dpg sweep writes it\n"
+        )
 
 
 def test_json_of_check_has_the_warnings(call: Call, domes: Path) -> None:
