@@ -21,6 +21,7 @@ __all__ = [
     "canonical",
     "canonical_json",
     "checked",
+    "folder_of",
     "json_schema",
     "read_keys",
     "read_scene",
@@ -60,8 +61,12 @@ def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
 
 def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ()) -> Document:
     """The same, of a document that was read from this path."""
-    folder = Path() if str(path) == "-" else Path(path).parent
-    return with_calibrations(with_settings(document, settings), folder)
+    return with_calibrations(with_settings(document, settings), folder_of(path))
+
+
+def folder_of(path: str | Path) -> Path:
+    """What names of calibrations in a spec are relative to; standard input has no folder."""
+    return Path() if str(path) == "-" else Path(path).parent
 
 
 def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
