@@ -311,6 +311,7 @@ OWN = {  # what a spec says itself
     "finger.lattice.hinge_stiffness_N_mm_per_rad": "20",
 }
 GIVEN = {"published": [*OWN][2:], "finite_elements": [*OWN]}  # of these, what a calibration has
+KEPT = {"finger.geometry.chamber_length_mm": "null", "finger.lattice.segment_length_mm": "13.75"}
 ALONE = {"finger.lattice.force_linearity": "0.1"}  # beside no calibration
 BEFORE = ("", "published", "lever.yaml,published", "finite_elements")
 
@@ -328,7 +329,7 @@ def test_names_that_are_built_in_are_what_a_spec_with_them_predicts(
     """The law, too, where the spec has none; lattice values that the calibration has go."""
     assert lever == "lever.yaml"
     (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n110,36,-15\n011,38,-8\n")
-    own = OWN | ({"finger.calibration": f"[{before}]"} if before else ALONE)
+    own = OWN | KEPT | ({"finger.calibration": f"[{before}]"} if before else ALONE)
     said = own | ({"finger.law": law} if law else {})
     listed = f"[{name},{before}]" if before and name != "published" else name
     given = dict.fromkeys([*GIVEN[name], *ALONE], "null")
@@ -343,6 +344,19 @@ def test_names_that_are_built_in_are_what_a_spec_with_them_predicts(
         assert row["calibrated_error_mm"] == wanted[pattern]["error_mm"] != row["error_mm"]
     words = expected.stderr.partition("errors of the model (")[2].partition(")")[0]
     assert f"(calibrated, {words})" in result.stderr
+
+
+def test_names_in_the_spec_stay_relative_to_it(
+    call: Any, folder: Path, published: tuple[str, ...], lever: str
+) -> None:
+    command, spec, *others = published
+    text = (folder / spec).read_text().replace("finger:", f"finger:\n  calibration: {lever}", 1)
+    (folder / "own").mkdir()
+    (folder / lever).rename(folder / "own" / lever)
+    (folder / "own" / spec).write_text(text)
+    (folder / "new.yaml").write_text(dome(6.5, 2.0))
+    result = call(command, f"own/{spec}", *others, "--calibration", "new.yaml")
+    assert result.exit_code == ExitCode.DONE
 
 
 def test_what_exists_by_the_calibration_alone_is_shown(call: Any, folder: Path) -> None:
