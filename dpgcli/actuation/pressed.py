@@ -17,6 +17,7 @@ from dpgcli.actuation.domes import (
     pushing,
 )
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
 from dpgcli.equilibrium.family import Family
 from dpgcli.equilibrium.newton import minimize
@@ -114,31 +115,24 @@ class Pressed:
     volumes: DomeVolumes
 
     @classmethod
-    def of(
-        cls,
-        units: UnitSolutions,
-        *,
-        area: Array | None = None,
-        snap_pressure: Array | None = None,
-        shape: Spline | None = None,
-    ) -> "Pressed":
-        """Fingers by the effective area (mm²) of their domes, or by what inverts one (MPa).
+    def of(cls, units: UnitSolutions, pressure: Pressure) -> "Pressed":
+        """Fingers of one design, or of one for each lane, under the pressure of their scene.
 
-        Areas and pressures are (1 or unit, 1 or design). A dome with a curve of its own snaps under
-        `snap_pressure` by itself; one whose travel is the opening does so with its hinge, between
-        rigid bars: A = F/p with F the largest force that the unit bears.
-        Raises ValueError for neither, or both.
+        Where the area of domes is not given, a dome with a curve of its own snaps under the snap
+        pressure by itself; one whose travel is the opening does so with its hinge, between rigid
+        bars: A = F/p with F the largest force that the unit bears.
 
         >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
-        >>> units = UnitSolutions.of(uniform_finger(1, **STUDY))
-        >>> print(Pressed.of(units, snap_pressure=np.array([[0.1495]])).volumes.area.round(2))
+        >>> units, line = UnitSolutions.of(uniform_finger(1, **STUDY)), np.zeros(1, int)
+        >>> given = Pressure(("A",), line, None, snap_pressure=np.array([[0.1495]]))
+        >>> print(Pressed.of(units, given).volumes.area.round(2))  # mm²
         [[31.61]]
         """
-        if area is None and snap_pressure is not None:
-            area = _borne(units, shape) / snap_pressure
-        elif area is None or snap_pressure is not None:
-            raise ValueError("expected one of area and snap_pressure")
-        return cls(units, DomeVolumes(area, shape))
+        area = pressure.effective_area
+        if area is None:
+            assert pressure.snap_pressure is not None, "one of the two is known"
+            area = _borne(units, pressure.shape) / pressure.snap_pressure
+        return cls(units, DomeVolumes(area, pressure.shape))
 
     @property
     def finger(self) -> Finger:
