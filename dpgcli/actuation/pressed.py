@@ -34,7 +34,7 @@ from dpgcli.states.wells import inverted_wells
 
 TIE = 1e-6  # of the pressure: thresholds as near are not told apart
 LEFT = 0.05  # of a stroke: what has moved further has left its place
-DISPLACED = 0.02  # of a stroke: from a fold to where downhill is told from level
+DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 TOLERANCE = 1e-12  # of the forces in play
 LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
 PLACES = 128  # of a dome's opening, at which its stiffness is looked at

@@ -11,7 +11,7 @@ that cells which reach their folds at the same load do no harm: at a distance of
 of the fold by ½ τ dλ/dτ, up to terms of order τ³.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
-TOLERANCE = 1e-11  # of the forces in play, and of a cell's scale
+TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
 MAX_CORRECTIONS = 8
 MAX_STEPS = 600
@@ -67,7 +67,6 @@ class _Corrected(NamedTuple):
     along_load: Array  # −H'⁻¹ ∂g/∂λ
     by_hold: Array  # H'⁻¹ ∇q
     is_fine: Flags
-    n_corrections: Indices
 
 
 @dataclass
@@ -156,7 +155,6 @@ def _begin(
     largest_step: float,
 ) -> tuple[_Walk, Flags]:
     """Walks at their first points, and which of these are stable equilibria."""
-    shape = family.measure(coordinates).value.shape
     n, nothing = len(load), np.full(len(load), -1)
     free = np.zeros(n)
     here = _corrected(family, coordinates, load, nothing, free, depth)
@@ -166,7 +164,6 @@ def _begin(
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
         margin,
     )  # fmt: skip
-    assert walk.values.shape == shape, "one value for each cell and lane"
     _turn(family, walk, here, nothing, towards)
     return walk, here.is_fine
 
@@ -174,6 +171,22 @@ def _begin(
 def _margin(family: Family[Coordinates, LoadedLaw], here: _Corrected) -> Array:
     margin = family.law.margin(here.linear.measured.value, here.load)
     return np.full(here.linear.measured.value.shape, np.inf) if margin is None else margin
+
+
+class _Trial(NamedTuple):
+    """A step that was tried: how far, by which cell (−1: by the load), and what there is.
+
+    `slope` is that of the load per step there, `margin` (cell, batch) that to events; `is_fine`
+    says which are on the same stable branch.
+    """
+
+    step: Array
+    cell: Indices
+    is_last: Flags
+    there: _Corrected
+    slope: Array
+    margin: Array
+    is_fine: Flags
 
 
 def _one_step(
@@ -193,6 +206,40 @@ def _one_step(
         _land(walk, is_fold, to_fold, towards)
         ending[is_fold] = Outcome.FOLD
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
+    trial = _tried(family, walk, step, end, towards, depth)
+    step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
+    is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
+    crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
+    is_event = trial.is_fine & ~is_beyond & (crossed < 0.0).any(axis=0)
+    accepted = trial.is_fine & ~is_beyond & ~is_event & (ending < 0)
+    first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
+    to_root = walk.slope / (walk.slope - slope)
+    shorter = np.where(is_beyond, CLOSER * to_root, np.where(is_event, first, SHRINKING)) * step
+    meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
+    is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
+    ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, Outcome.FOLD, Outcome.FAILED)
+    landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
+    longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
+    walk.step = np.where(accepted, longer, shorter)
+    if accepted.any():
+        _move(family, walk, trial, accepted, towards)
+    if landed.any():
+        event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
+        walk.cell = np.where(landed, event_cell, walk.cell)
+        ending[landed] = Outcome.EVENT
+    ending[accepted & is_last] = Outcome.ARRIVED
+    return ending
+
+
+def _tried(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    step: Array,
+    end: Array,
+    towards: Array,
+    depth: int,
+) -> _Trial:
+    """Try a step of each walk along its cell, or to the end of its load where that is nearer."""
     to_end = np.where(walk.slope > 0.0, (end - walk.load) * towards / walk.slope, 0.0)
     is_last = (walk.cell < 0) | (to_end <= step)
     step = np.where(is_last, to_end, step)
@@ -202,41 +249,33 @@ def _one_step(
     place = np.maximum(walk.cell, 0), np.arange(len(end))
     scale = np.broadcast_to(family.scale, walk.values.shape)
     target = walk.values[place] + walk.sign * step * scale[place]
-    new = _corrected(family, guess, load, cell, target, depth)
-    moved = np.abs((new.linear.measured.value - walk.values) / scale).max(axis=0)
-    fine = new.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
-    slope = _slope(family, new, cell) * walk.sign * towards
-    is_beyond = fine & ~is_last & (slope <= 0.0)
-    margin = _margin(family, new)
-    crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
-    is_event = fine & ~is_beyond & (crossed < 0.0).any(axis=0)
-    accepted = fine & ~is_beyond & ~is_event & (ending < 0)
-    meets = np.abs(margin) <= TOLERANCE
-    landed = accepted & ~is_last & (meets & (margin < walk.margin)).any(axis=0)
-    shorter = SHRINKING * step
-    shorter = np.where(is_beyond, CLOSER * step * walk.slope / (walk.slope - slope), shorter)
-    first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
-    shorter = np.where(is_event, first * step, shorter)
-    is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
-    ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, Outcome.FOLD, Outcome.FAILED)
-    landed |= is_stuck & is_event
-    walk.step = np.where(
-        accepted, np.minimum(GROWTH * np.maximum(step, walk.step), largest_step), shorter
+    there = _corrected(family, guess, load, cell, target, depth)
+    moved = np.abs((there.linear.measured.value - walk.values) / scale).max(axis=0)
+    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
+    slope = _slope(family, there, cell) * walk.sign * towards
+    return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
+
+
+def _move(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    trial: _Trial,
+    which: Flags,
+    towards: Array,
+) -> None:
+    """Go to the points that were tried, and look on from there."""
+    there, unknown = trial.there, np.where(trial.is_last, np.nan, 0.0)
+    new = replace(
+        walk,
+        coordinates=there.coordinates,
+        load=there.load,
+        values=there.linear.measured.value,
+        last=trial.step + unknown,
+        last_slope=walk.slope + unknown,
+        margin=trial.margin,
     )
-    if accepted.any():
-        next_walk = _Walk(
-            new.coordinates, new.load, new.linear.measured.value, walk.onward.copy(),
-            walk.slope.copy(), walk.cell.copy(), walk.sign.copy(), walk.step,
-            np.where(is_last, np.nan, step), np.where(is_last, np.nan, walk.slope), margin,
-        )  # fmt: skip
-        _turn(family, next_walk, new, cell, towards)
-        walk.put(np.flatnonzero(accepted), next_walk, accepted)
-    if landed.any():
-        event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
-        walk.cell = np.where(landed, event_cell, walk.cell)
-        ending[landed] = Outcome.EVENT
-    ending[accepted & is_last] = Outcome.ARRIVED
-    return ending
+    _turn(family, new, there, trial.cell, towards)
+    walk.put(np.flatnonzero(which), new, which)
 
 
 def _distance(slope: Array, last_slope: Array, last: Array) -> Array:
@@ -271,7 +310,6 @@ def _corrected(
     scale = np.where(chosen, np.broadcast_to(family.scale, shape), 0.0).sum(axis=0)
     x, n = guess, len(load)
     settled, done = np.zeros(n, bool), np.zeros(n, bool)
-    counts = np.full(n, MAX_CORRECTIONS)
     coordinates = family.coordinates
     for count in range(MAX_CORRECTIONS + 1):
         linear = family.linearized(x, load, stiffness, target, depth)
@@ -280,7 +318,6 @@ def _corrected(
         is_there = (residual <= TOLERANCE) & (
             np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
         )
-        counts = np.where(is_there & settled & ~done, count, counts)
         done |= is_there & settled
         factors = factorize(linear.hessian, family.column_depths)
         selector = spread(family.measure.rows, linear.measured, chosen.astype(float), x)
@@ -294,7 +331,7 @@ def _corrected(
         settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
         x, load = coordinates.moved(x, step), np.where(done, load, load + change)
     is_fine = done & (factors.pivots > 0.0).all(axis=0)
-    return _Corrected(x, load, linear, by_load, by_hold, is_fine, counts)
+    return _Corrected(x, load, linear, by_load, by_hold, is_fine)
 
 
 def _solved(factors: Factorization, sides: Array) -> Array:
