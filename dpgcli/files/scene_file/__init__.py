@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.errors import SpecError
+from dpgcli.files.scene_file.histories import with_history
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
 from dpgcli.files.scene_file.references import recalibrated, with_calibrations
@@ -54,14 +55,14 @@ def read_keys(path: str | Path, settings: Sequence[str] = ()) -> Spec:
 
 
 def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
-    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    """The data of a spec, as `settings` change it, with the content of the files it names."""
     return scene_in(read_document(path), path, settings)
 
 
 def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ()) -> Document:
     """The same, of a document that was read from this path."""
     folder = Path() if str(path) == "-" else Path(path).parent
-    return with_calibrations(with_settings(document, settings), folder)
+    return with_history(with_calibrations(with_settings(document, settings), folder), folder)
 
 
 def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:
