@@ -28,10 +28,10 @@ from dpgcli.files.scene_file import (
     checked,
     folder_of,
     scene_of,
+    with_files,
 )
 from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
-from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
@@ -56,7 +56,7 @@ E = TypeVar("E", bound=StrEnum)
 class SceneInput:
     """A scene, and the spec that it was read from: none for a value that was handed in.
 
-    `name` is the spec's in messages, `document` what it says, with calibrations by their names,
+    `name` is the spec's in messages, `document` what it says, with files by their names,
     which are relative to `folder`; `files` are those that were read.
     """
 
@@ -93,7 +93,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
             return spec
         return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
     if isinstance(spec, Mapping):
-        return _scene("spec", _without_calibrations(spec, settings), Path())
+        return _scene("spec", _without_files(spec, settings), Path())
     path = path_of("spec", spec)
     document = read_document(spec)
     if "space" in document.data and "finger" not in document.data:
@@ -109,7 +109,7 @@ def scene_input_in(document: Document, path: Path, settings: Settings = ()) -> S
 
 
 def _scene(name: str, said: Document, folder: Path, *own: Path) -> SceneInput:
-    whole = with_calibrations(said, folder)
+    whole = with_files(said, folder)
     spec = checked(whole)
     return SceneInput(name, scene_of(spec), spec, said, folder, files_of(*own, *whole.files))
 
@@ -117,17 +117,17 @@ def _scene(name: str, said: Document, folder: Path, *own: Path) -> SceneInput:
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
     """A spec key by key, as `files.scene_file.read_keys`: calibrations need not exist yet."""
     if isinstance(spec, Mapping):
-        return checked_keys(_without_calibrations(spec, settings))
+        return checked_keys(_without_files(spec, settings))
     path = path_of("spec", spec)
     return checked_keys(with_settings(read_document(path), setting_texts(settings)))
 
 
 def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
-    """The data of a spec, as `settings` change it, with the calibrations it names."""
-    return with_calibrations(_without_calibrations(data, settings), Path())
+    """The data of a spec, as `settings` change it, with what the files hold that it names."""
+    return with_files(_without_files(data, settings), Path())
 
 
-def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
+def _without_files(data: Mapping[str, Any], settings: Settings) -> Document:
     own = without_free_keys(plain(data))
     return with_settings(Document("spec", own, {}), setting_texts(settings))
 

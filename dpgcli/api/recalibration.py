@@ -8,8 +8,8 @@ from dpgcli.api.inputs import SceneInput, path_of
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, Message, Problem, SpecError, UsageError
 from dpgcli.files.calibration import Calibration, read_calibration
-from dpgcli.files.scene_file import checked, recalibrated, scene_of
-from dpgcli.files.scene_file.references import BUILT_IN, EXPECTED, with_calibrations
+from dpgcli.files.scene_file import checked, recalibrated, scene_of, with_files
+from dpgcli.files.scene_file.references import BUILT_IN, EXPECTED
 
 CalibrationInput: TypeAlias = str | Path | Calibration
 """A calibration, its file, or the name of one that is built in; a Path is never such a name."""
@@ -26,7 +26,7 @@ def recalibrated_scene(given: SceneInput, calibration: CalibrationInput) -> Scen
     other = _calibration(calibration)
     try:
         changed = recalibrated(given.document, other)
-        return scene_of(checked(with_calibrations(changed, given.folder)))
+        return scene_of(checked(with_files(changed, given.folder)))
     except SpecError as error:
         name = other.file if isinstance(other, Calibration) else other
         raise SpecError(tuple(_by(name, problem) for problem in error.problems)) from None

@@ -51,13 +51,18 @@ class Grid:
 class DomeCurve:
     """The dome's own energy (mJ) over its travel (mm), and the travels between which none is known.
 
-    `opening_per_travel` is the opening of a unit over the travel of its dome.
+    `opening_per_travel` is the opening of a unit over the travel of its dome. `pressure` (MPa) and
+    `volume` (mm³) that the dome has swept are by travel too, None where they were not measured;
+    `snap_pressure` (MPa) is the largest that the dome bore before it snapped.
     """
 
     travel: Sequence[float]
     energy: Sequence[float]
     opening_per_travel: float
     gaps: Sequence[Sequence[float]] = ()
+    pressure: Sequence[float | None] | None = None
+    volume: Sequence[float | None] | None = None
+    snap_pressure: float | None = None
 
 
 class KnownError(NamedTuple):

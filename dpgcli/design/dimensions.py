@@ -5,7 +5,7 @@ takes stays far from overflow; the linear stiffness, a stiff limit, may reach 1e
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -35,6 +35,7 @@ SUFFIXES = {  # units in the names of keys
     "_N_mm_per_rad": "N mm/rad",
     "_N_per_mm": "N/mm",
     "_mm_per_N": "mm/N",
+    "_mm2": "mm²",
     "_mm": "mm",
     "_MPa": "MPa",
     "_deg": "°",
@@ -72,12 +73,36 @@ class GivenValues:
 
 
 @dataclass(frozen=True)
+class GivenPressure:
+    """What a spec says of pressure: units by line, and values by key, of all units and of some.
+
+    Without lines there is one, `A`, of all units. `history` has pressures (MPa) by line, and times
+    (s) by `time_s`.
+    """
+
+    lines: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    values: Sizes = field(default_factory=dict)
+    overrides: Mapping[str, Sizes] = field(default_factory=dict)
+    history: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    def with_value(self, path: Sequence[str], column: Array) -> "GivenPressure":
+        """With values of designs at a key: its parts after `pressure`."""
+        *parents, key = path
+        if not parents:
+            return replace(self, values={**self.values, key: column})
+        units = parents[-1]
+        own = {**self.overrides.get(units, {}), key: column}
+        return replace(self, overrides={**self.overrides, units: own})
+
+
+@dataclass(frozen=True)
 class Design:
     """A batch of designs that are given by the same keys, with arrays (design,), or (1,) for all.
 
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
     `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
+    `pressure` is None where the spec says nothing of it.
     """
 
     units: int
@@ -90,6 +115,7 @@ class Design:
     n_designs: int = 1
     tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
     model_error: float | str | None = None
+    pressure: GivenPressure | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -108,6 +134,9 @@ class Design:
         *parents, key = path
         if parents == ["gripper"]:
             return replace(self, gripper={**self.gripper, key: column})
+        if parents[0] == "pressure":
+            given = self.pressure or GivenPressure()
+            return replace(self, pressure=given.with_value(path[1:], column))
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
         section = parents.pop() if key != WALL_COMPLIANCE else "lattice"
@@ -197,12 +226,14 @@ def unit_range(text: str) -> tuple[int, ...]:
     return tuple(range(first, int(match[2] or first) + 1))
 
 
-def range_issues(n_units: int, overrides: Iterable[str]) -> list[Issue]:
-    """Malformed, foreign or overlapping unit ranges of overrides."""
+def range_issues(
+    n_units: int, overrides: Iterable[str], section: KeyPath = ("finger",)
+) -> list[Issue]:
+    """Malformed, foreign or overlapping unit ranges of a section's overrides."""
     found: list[Issue] = []
     taken: dict[int, str] = {}
     for text in overrides:
-        path = ("finger", "overrides", text)
+        path = (*section, "overrides", text)
         units = unit_range(text)
         if not units or units[0] < 1 or units[-1] > n_units:
             hint = 'write "4" or "4-5"'

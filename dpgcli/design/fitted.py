@@ -37,6 +37,14 @@ def from_file(
     return replace(value, file=file)
 
 
+def beside_curve(
+    derivation: Derivation, group: UnitGroup, calibration: Calibration, number: float
+) -> Value:
+    """A number that a calibration has beside its curve, brought to the geometry."""
+    base = all_by(np.array([number]), Origin.CALIBRATED, "from")
+    return _brought(derivation, group, calibration, base, ())
+
+
 def _fitted(derivation: Derivation, calibration: Calibration) -> Value | None:
     found = calibration.values.get(derivation.key)
     if found is None:

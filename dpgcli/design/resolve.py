@@ -1,7 +1,7 @@
 """From designs to lattices: values unit by unit, their sources, and what is wrong, in one pass."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -22,8 +22,10 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.fitted import from_file
 from dpgcli.design.footing import Case, kinds
+from dpgcli.design.lines import history_of, line_issues, line_of, units_by_line
 from dpgcli.design.model_error import model_error_of
 from dpgcli.design.outputs import Trust
+from dpgcli.design.pressure import Pressure
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, WALLS, Value, all_by
 from dpgcli.design.scene import (
@@ -36,6 +38,7 @@ from dpgcli.design.scene import (
     Source,
     Uncertainty,
 )
+from dpgcli.design.snap_pressures import AREA, SNAP, answers_to_pressure
 from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
@@ -55,12 +58,16 @@ Pairs = Sequence[tuple[UnitGroup, Value]]
 
 @dataclass(frozen=True, eq=False)
 class Resolution:
-    """Lattice values by key and group of units, how domes answer, and what is wrong."""
+    """Lattice values by key and group of units, how domes answer, and what is wrong.
+
+    `answers` are effective areas or snap pressures, none where the designs have no pressure.
+    """
 
     design: Design
     domes: Domes
     values: Mapping[str, Pairs]
     problems: Problems
+    answers: Mapping[str, Pairs] = field(default_factory=dict)
 
     @cached_property
     def are_wrong(self) -> Flags:
@@ -113,6 +120,7 @@ class Resolution:
             self._chambers(),
             self.trusts,
             self.warnings,
+            batch.pressure,
         )
 
     @property
@@ -152,7 +160,8 @@ class Resolution:
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
         layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
         thickness = None if layer is None else _picked(layer, designs)
-        return Scene(finger, (), self._gripper(designs), thickness)
+        gripper, pressure = self._gripper(designs), self._pressure(designs)
+        return Scene(finger, (), gripper, thickness, pressure=pressure)
 
     def alike(self, designs: Indices) -> list[Indices]:
         """Some of the designs, none of them wrong, apart by whether bars or all walls are rigid."""
@@ -178,10 +187,26 @@ class Resolution:
         angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
         return Gripper(_picked(given["base_spacing_mm"], designs), _picked(angle, designs))
 
+    def _pressure(self, designs: Indices) -> Pressure | None:
+        given, units = self.design.pressure, self.design.units
+        if given is None:
+            return None
+        arrays = {
+            key: _picked(_by_unit(units, [(g, v.numbers) for g, v in pairs]), designs)
+            for key, pairs in self.answers.items()
+        }
+        return Pressure(
+            tuple(units_by_line(given, units)),
+            line_of(given, units),
+            arrays.get(AREA),
+            arrays.get(SNAP),
+            history=history_of(given, units),
+        )
+
     def _sources(self) -> Iterator[Source]:
         """One source for each key and each set of units that got the same value the same way."""
         everyone = tuple(range(1, self.design.units + 1))
-        for key, pairs in self.values.items():
+        for key, pairs in {**self.values, **self.answers}.items():
             same: dict[Source, tuple[int, ...]] = {}
             for group, value in pairs:
                 units = everyone if key in SHARED else group.units
@@ -236,6 +261,8 @@ def resolve(design: Design) -> Resolution:
     for issue in range_issues(design.units, design.overrides):
         problems.everywhere(issue)
     check_widths(design.finger.geometry, problems)
+    for issue in line_issues(design.pressure, design.units) if design.pressure else ():
+        problems.everywhere(issue)
     domes = domes_of(design.law, design.calibrations)
     if isinstance(domes, Issue):
         problems.everywhere(domes)
@@ -253,7 +280,10 @@ def resolve(design: Design) -> Resolution:
     walls = [(group, value) for group, value in found if value is not None]
     if any(_may_yield(value, WALL_COMPLIANCE in design.tolerances) for _, value in walls):
         values[WALL_COMPLIANCE] = walls
-    resolution = Resolution(design, domes, values, problems)
+    answers: Mapping[str, Pairs] = {}
+    if design.pressure is not None:
+        answers = answers_to_pressure(design.pressure, domes, groups, problems)
+    resolution = Resolution(design, domes, values, problems, answers)
     for issue in tolerance_issues(design, [*values]):
         problems.everywhere(issue)
     if design.model_error == LEAVE_ONE_OUT and resolution.model_error.share is None:

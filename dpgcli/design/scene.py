@@ -8,6 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.outputs import Trust
+from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
 
 
@@ -146,6 +147,7 @@ class Scene:
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
     is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
     its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
+    `pressure` is None where the spec says nothing of it.
     """
 
     finger: Finger
@@ -157,6 +159,7 @@ class Scene:
     chambers: Chambers | None = None
     trusts: tuple[Trust, ...] = ()
     warnings: tuple[str, ...] = ()
+    pressure: Pressure | None = None
 
     def take_lanes(self, index: Indices) -> "Scene":
         """Some designs of a batch, without what is said of a single one."""
@@ -164,4 +167,5 @@ class Scene:
         if gripper is not None:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
         layer = None if thickness is None else np.take(thickness, index)
-        return Scene(self.finger.take_lanes(index), (), gripper, layer)
+        pressure = self.pressure and self.pressure.take_lanes(index)
+        return Scene(self.finger.take_lanes(index), (), gripper, layer, pressure=pressure)

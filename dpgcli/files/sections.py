@@ -20,6 +20,8 @@ EXPECTED = {  # where it is not a length
     "hinge_stiffness_N_mm_per_rad": "a stiffness >= 0 in N mm/rad",
     "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",
     "elastic_modulus_MPa": "a modulus > 0 in MPa",
+    "effective_area_mm2": "an area > 0 in mm2",
+    "snap_pressure_MPa": "a pressure > 0 in MPa",
 }
 
 

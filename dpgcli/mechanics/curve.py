@@ -25,20 +25,15 @@ class Derivatives(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
-    """A cubic spline between `knots` (m,).
+class Spline:
+    """A cubic spline between `knots` (m,), twice continuously differentiable.
 
     `coefficients` (4, m + 1) have the highest power first, the pieces before and after included.
-    Beyond its ends the spline goes on with the curvature it has there. `rests` are the top and
-    the well, where the slope vanishes: the minimum that lies deepest below what is on both its
-    sides, and the highest maximum before it; NaN where there is none. `branches` are the stretches
-    between the two on which the energy falls, each from its top to its well, the last one first.
+    Beyond its ends the spline goes on with the curvature it has there.
     """
 
     knots: Array
     coefficients: Array
-    rests: tuple[float, float]
-    branches: tuple[tuple[float, float], ...]
 
     def __call__(self, travel: Array) -> Derivatives:
         """Value and derivatives at travels of any shape, complex ones too.
@@ -55,6 +50,20 @@ class Curve:
             (3.0 * cubic * from_start + 2.0 * square) * from_start + linear,
             6.0 * cubic * from_start + 2.0 * square,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Curve(Spline):
+    """A dome's energy by its travel.
+
+    `rests` are the top and the well, where the slope vanishes: the minimum that lies deepest below
+    what is on both its sides, and the highest maximum before it; NaN where there is none.
+    `branches` are the stretches between the two on which the energy falls, each from its top to its
+    well, the last one first.
+    """
+
+    rests: tuple[float, float]
+    branches: tuple[tuple[float, float], ...]
 
 
 @cache  # one curve for all designs that share a calibration
@@ -80,10 +89,14 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     rest: Any = (1, 0.0) if starts_at_rest else "not-a-knot"
     counted = np.subtract(value, value[0] if starts_at_rest else 0.0)
     cubic = CubicSpline(travel, counted, bc_type=(rest, "not-a-knot"))
-    ends = [np.array([0.5 * cubic(x, 2), cubic(x, 1), cubic(x)]) for x in (travel[0], travel[-1])]
+    return Curve(np.asarray(travel, float), spline_pieces(cubic), *_rests(cubic))
+
+
+def spline_pieces(cubic: "CubicSpline") -> Array:
+    """The coefficients of a spline's pieces, and of the parabolas before and after, (4, m + 1)."""
+    ends = [np.array([0.5 * cubic(x, 2), cubic(x, 1), cubic(x)]) for x in cubic.x[[0, -1]]]
     before, after = (np.concatenate(([0.0], end))[:, None] for end in ends)
-    coefficients = np.concatenate((before, cubic.c, after), axis=1)
-    return Curve(np.asarray(travel, float), coefficients, *_rests(cubic))
+    return np.concatenate((before, cubic.c, after), axis=1)
 
 
 def _from_rest(

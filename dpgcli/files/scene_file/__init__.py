@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.errors import SpecError
+from dpgcli.files.scene_file.histories import with_history
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
 from dpgcli.files.scene_file.references import recalibrated, with_calibrations
@@ -32,6 +33,7 @@ __all__ = [
     "scene_of",
     "spelled",
     "starter",
+    "with_files",
 ]
 
 GRIPPER = re.compile(r"^( *)# (?=gripper:|base_spacing_mm:|mounting_angle_deg:)", re.MULTILINE)
@@ -55,17 +57,25 @@ def read_keys(path: str | Path, settings: Sequence[str] = ()) -> Spec:
 
 
 def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
-    """The data of a spec, as `settings` change it, with the calibrations it names."""
+    """The data of a spec, as `settings` change it, with the content of the files it names."""
     return scene_in(read_document(path), path, settings)
 
 
 def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ()) -> Document:
     """The same, of a document that was read from this path."""
-    return with_calibrations(with_settings(document, settings), folder_of(path))
+    return with_files(with_settings(document, settings), folder_of(path))
+
+
+def with_files(document: Document, folder: Path) -> Document:
+    """The document with what the files hold that it names, calibrations and histories.
+
+    Names are relative to the spec's folder.
+    """
+    return with_history(with_calibrations(document, folder), folder)
 
 
 def folder_of(path: str | Path) -> Path:
-    """What names of calibrations in a spec are relative to; standard input has no folder."""
+    """What names of files in a spec are relative to; standard input has no folder."""
     return Path() if str(path) == "-" else Path(path).parent
 
 

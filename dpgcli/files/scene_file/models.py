@@ -16,6 +16,7 @@ from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
+from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
     BarStiffness,
@@ -118,6 +119,9 @@ class Spec(Section):
 
     finger: FingerSpec = Field(description="The finger.")
     gripper: GripperSpec | None = Field(default=None, description="The gripper, if there is one.")
+    pressure: PressureSpec | None = Field(
+        default=None, description="The pressure lines and how domes answer to pressure."
+    )
     uncertainty: Tolerances | None = Field(
         default=None, description="Standard uncertainties of values, as tolerances of the mold."
     )
@@ -149,6 +153,7 @@ class Spec(Section):
             _sizes(self.gripper),
             tolerances={} if self.uncertainty is None else self.uncertainty.by_key,
             model_error=said if (share := share_of(said)) is None else share,
+            pressure=None if self.pressure is None else self.pressure.known,
         )
 
 

@@ -22,6 +22,7 @@ from dpgcli.files.scene_file.models import (
     Spec,
     UnitOverride,
 )
+from dpgcli.files.scene_file.pressure import EXPECTED, PressureSpec, UnitPressure, expected_at
 from dpgcli.files.scene_file.scenes import early_issues
 from dpgcli.files.scene_file.tolerances import Tolerances
 from dpgcli.files.sections import (
@@ -45,6 +46,8 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("finger", "overrides", "*", "geometry"): UnitGeometry,
     ("finger", "overrides", "*", "lattice"): UnitLattice,
     ("gripper",): GripperSpec,
+    ("pressure",): PressureSpec,
+    ("pressure", "overrides", "*"): UnitPressure,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -62,6 +65,7 @@ OWN = {
     "mounting_angle_deg": "an angle from -90 to 90 in degrees",
     **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),
     "model_error": "a percentage such as 5%, or leave_one_out",
+    **EXPECTED,
 }
 
 HINTS = {
@@ -78,6 +82,7 @@ CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
 TEXTS = ("calibration", "law", "model_error")
 PAIRS = tuple(DataSpec.model_fields)
+MAPPINGS = ("overrides", *EXPECTED)
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
@@ -137,7 +142,8 @@ def _problem(document: Document, error: Any) -> Problem:
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
     found = "nothing" if error["type"] == "missing" else shown(error["input"])
-    hint = "" if path[:-1] == UNCERTAINTY else _hint(key, error)
+    is_worded = path[:-1] == UNCERTAINTY or bool(expected_at(path))
+    hint = "" if is_worded else _hint(key, error)
     return document.problem(path, _expected(path), found, hint)
 
 
@@ -153,7 +159,7 @@ def _expected(path: KeyPath) -> str:
         return f"a standard uncertainty >= 0 in {unit_of(key) or 'its unit'}, or one such as 10%"
     if _pattern(path) in SECTIONS or key == "overrides":
         return "a section of keys"
-    return OWN.get(key, expected_of(key))
+    return expected_at(path) or OWN.get(key, expected_of(key))
 
 
 def _hint(key: str, error: Any) -> str:
@@ -161,26 +167,23 @@ def _hint(key: str, error: Any) -> str:
     value = error["input"]
     if error["type"] == "model_type":
         return "keys below it, indented"
-    if isinstance(value, str) and key not in (*TEXTS, *PAIRS):
+    if isinstance(value, str) and key not in (*MAPPINGS, *TEXTS, *PAIRS):
         return "a plain number such as 6.5 or 1.0e+4: no quotes, no unit"
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if is_number and value > 0 and key not in (*BOUNDED, *TEXTS, *PAIRS):
+    if is_number and value > 0 and key not in (*BOUNDED, *MAPPINGS, *TEXTS, *PAIRS):
         return OUT_OF_RANGE
     return HINTS.get(key, "")
 
 
 def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
     """Expected, found and hint if no spec can have a number at this path."""
-    if (
-        path[:2] == ("finger", "overrides")
-        and len(path) > 2
-        and min(unit_range(str(path[2])), default=0) < 1
-    ):
+    is_of_units = path[1:2] == ("overrides",) and len(path) > 2
+    if is_of_units and min(unit_range(str(path[2])), default=0) < 1:
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     if path[:1] == UNCERTAINTY:
         return "a key that designs can differ in", dotted(path), "the tables have no uncertainties"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
-    if pattern in SECTIONS or str(path[-1]) in ("overrides", *TEXTS, *PAIRS):
+    if pattern in SECTIONS or str(path[-1]) in (*MAPPINGS, *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
     if parent not in SECTIONS:
         known = [dotted((*p, name)) for p, m in SECTIONS.items() for name in m.model_fields]
@@ -219,6 +222,6 @@ def _nearest(key: str, known: list[str]) -> str:
 
 def _pattern(path: KeyPath) -> KeyPath:
     """A key path with `*` for the units of an override."""
-    if path[:2] == ("finger", "overrides") and len(path) > 2:
-        return ("finger", "overrides", "*", *path[3:])
+    if path[1:2] == ("overrides",) and len(path) > 2:
+        return (*path[:2], "*", *path[3:])
     return path

@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -36,17 +36,21 @@ if TYPE_CHECKING:
 
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
+OPTIONAL = ("gripper", "pressure")  # sections that a base may leave out
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs, or a folder of such"
 
 
 @dataclass
 class SpaceReader:
-    """Makes axes from what a file says; what is wrong gathers in `problems`."""
+    """Makes axes from what a file says; what is wrong gathers in `problems`.
+
+    `sections` are those of the base that it may leave out, and has.
+    """
 
     document: Document
     folder: Path
-    has_gripper: bool
+    sections: Container[str]
 
     def __post_init__(self) -> None:
         self.problems: list[Problem] = []
@@ -212,8 +216,9 @@ class SpaceReader:
             if unknown := unknown_key(tuple(key.split("."))):
                 expected, found, hint = unknown
                 self.wrong(path, expected, found, INDEX if key.startswith("Unnamed: ") else hint)
-            elif key.startswith("gripper.") and not self.has_gripper:
-                self.wrong(path, "keys of a base that has them", key, "the base has no gripper")
+            elif (section := key.split(".")[0]) in OPTIONAL and section not in self.sections:
+                hint = f"the base has no {section}"
+                self.wrong(path, "keys of a base that has them", key, hint)
             if key in self.keys:
                 self.wrong(path, "each key on one axis", f"{key} again")
             self.keys.add(key)
