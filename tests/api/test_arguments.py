@@ -11,6 +11,10 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
+from dpgcli.api.given import sweep_input
+from dpgcli.api.inputs import scene_input
+from dpgcli.api.recalibration import recalibrated_scene
+from dpgcli.files.scene_file import scene_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 FINGER = uniform_finger(2, **STUDY)
@@ -197,6 +201,22 @@ def test_a_calibration_is_a_name_a_path_or_a_value() -> None:
         dpg.compare(FINGER, bent, calibration="published")
     with pytest.raises(dpg.SpecError, match=r"dome_height_mm.*; with calibration published\)"):
         dpg.compare(BASE, bent, calibration="published")
+
+
+def test_pressures_in_a_file_that_data_name_are_read(tmp_path: Path) -> None:
+    """As in a spec; also beside another calibration, and in the base of a sweep."""
+    (tmp_path / "steps.csv").write_text("A_MPa\n0\n0.15\n")
+    data = {**study("published"), "pressure": {"history": str(tmp_path / "steps.csv")}}
+    given = scene_input(data)
+    assert given.files == (tmp_path / "steps.csv",)
+    sweep = sweep_input({"base": data, "space": SWEEP["space"]})
+    for pressure in (
+        given.scene.pressure,
+        recalibrated_scene(given, "finite_elements").pressure,
+        scene_of(sweep.base).pressure,
+    ):
+        assert pressure is not None and pressure.history is not None
+        assert pressure.history.pressure.tolist() == [[0.0], [0.15]]
 
 
 def study(calibration: str) -> dict[str, Any]:
