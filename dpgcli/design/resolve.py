@@ -42,6 +42,7 @@ from dpgcli.design.snap_pressures import AREA, SNAP, answers_to_pressure
 from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
+from dpgcli.design.volumes import swept_shape
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.text import KeyPath
 
@@ -200,7 +201,8 @@ class Resolution:
             line_of(given, units),
             arrays.get(AREA),
             arrays.get(SNAP),
-            history=history_of(given, units),
+            swept_shape(self.domes) if SNAP in arrays else None,
+            history_of(given, units),
         )
 
     def _sources(self) -> Iterator[Source]:
