@@ -23,23 +23,21 @@ def snap_pressure(record: Record) -> float | None:
     """
     if record.pressure is None:
         return None
-    found = ways(in_time(record))
-    order = np.argsort(record.travel if found is None else _leading(record), kind="stable")
-    record, load = record.points(order), record.pressure[order]
+    record = in_time(record)
+    found = ways(record)
+    if found is None:
+        record = record.points(np.argsort(record.travel, kind="stable"))
+    assert record.pressure is not None, "points have what their record has"
     first, last = (0, len(record.travel) - 1) if found is None else found.runs[0]
     travel = record.travel[first : last + 1]
     if travel[-1] < travel[0] or travel[0] > LARGEST_STEP * record.largest_travel:
         return None
-    pressure = load[first : last + 1]
+    pressure = record.pressure[first : last + 1]
     stop = _end(record, travel, pressure)
     largest = float(pressure[:stop].max())
     behind = pressure[int(pressure[:stop].argmax()) : stop]
     is_known = stop < len(travel) or behind.min() < (1.0 - FALLEN) * largest
     return largest if is_known and largest > 0.0 else None
-
-
-def _leading(record: Record) -> Array:
-    return np.arange(len(record.travel), dtype=float) if record.time is None else record.time
 
 
 def _end(record: Record, travel: Array, pressure: Array) -> int:

@@ -18,6 +18,7 @@ from dpgcli.design.dimensions import (
     check_widths,
     groups_of,
     range_issues,
+    unit_text,
 )
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.fitted import from_file
@@ -141,16 +142,11 @@ class Resolution:
 
     def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
         """What outputs of some designs, none of them wrong, rest on, and how many of them."""
-        found = kinds(self._each, designs)
+        found = kinds({**_each(self.values), **_each(self.answers)}, designs)
         return [(trusts_of(self._case(place)), count) for place, count in found]
 
     def _case(self, place: int) -> Case:
-        return Case(self.design, self.domes, self._each, place)
-
-    @property
-    def _each(self) -> dict[str, list[Value]]:
-        """Values by key, one for each group of units."""
-        return {key: [value for _, value in pairs] for key, pairs in self.values.items()}
+        return Case(self.design, self.domes, _each(self.values), place, _each(self.answers))
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
@@ -215,7 +211,7 @@ class Resolution:
                 source = _source(key, value)
                 same[source] = (*same.get(source, ()), *units)
             for source, units in sorted(same.items(), key=lambda item: min(item[1])):
-                yield replace(source, units=_ranges(units))
+                yield replace(source, units=unit_text(units))
 
     def _uncertainty(self) -> Uncertainty | None:
         """What a single design's values, and the model if the spec counts it in, may be off by."""
@@ -369,6 +365,11 @@ def _picked(values: Array, designs: Indices) -> Array:
     return np.take(values, designs, axis=-1)
 
 
+def _each(values: Mapping[str, Pairs]) -> dict[str, list[Value]]:
+    """Values by key, one for each group of units."""
+    return {key: [value for _, value in pairs] for key, pairs in values.items()}
+
+
 def _error(value: Value) -> Array:
     return np.zeros(1) if value.standard_error is None else value.standard_error
 
@@ -384,14 +385,3 @@ def _source(key: str, value: Value) -> Source:
         value.rule_of(0),
         None if error is None else of_design(error, 0),
     )
-
-
-def _ranges(units: tuple[int, ...]) -> str:
-    """Units as a spec writes them: `1-3`, `5`, `1-3,5`."""
-    runs: list[list[int]] = []
-    for unit in sorted(units):
-        if runs and unit == runs[-1][-1] + 1:
-            runs[-1][1:] = [unit]
-        else:
-            runs.append([unit])
-    return ",".join("-".join(map(str, run)) for run in runs)

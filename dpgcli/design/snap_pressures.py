@@ -25,7 +25,7 @@ SNAP_PRESSURE = Derivation(
     "E t^2.5 h^1.2 (finite-element scaling)",
     geometry.dome_origin,
 )
-ASSUMED = "no area or snap pressure is given: that of finite elements"
+ASSUMED = "that of finite elements (none is given, nor an area)"
 Pairs = list[tuple[UnitGroup, Value]]
 Part = tuple[UnitGroup, Sizes]
 
