@@ -101,7 +101,10 @@ def _area(travel: Array, volume: Array, pressure: Array, fine: Array, force: Arr
         if known.sum() < FEWEST_POINTS:
             continue
         if is_volume:
-            return np.asarray(CubicSpline(travel[known], values[known])(fine, 1))
+            area = np.asarray(CubicSpline(travel[known], values[known])(fine, 1))
+            if (area > 0.0).any():
+                return area
+            continue
         push = PchipInterpolator(travel[known], values[known])(fine)
         is_large = np.abs(push) >= NEXT_TO_NOTHING * np.abs(push).max()
         return np.where(is_large, force / np.where(is_large, push, 1.0), np.nan)
