@@ -106,6 +106,6 @@ def _area(travel: Array, volume: Array, pressure: Array, fine: Array, force: Arr
                 return area
             continue
         push = PchipInterpolator(travel[known], values[known])(fine)
-        is_large = np.abs(push) >= NEXT_TO_NOTHING * np.abs(push).max()
+        is_large = np.abs(push) > NEXT_TO_NOTHING * np.abs(push).max()
         return np.where(is_large, force / np.where(is_large, push, 1.0), np.nan)
     return np.full(len(fine), np.nan)
