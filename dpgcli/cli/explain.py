@@ -195,7 +195,9 @@ def _pressure_lines(plan: "Plan") -> Iterator[str]:
 
     if plan.scene.pressure is not None:
         lines = plan.scene.pressure.units_by_line.items()
-        named = ", ".join(f"{line} (units {unit_text(units)})" for line, units in lines)
+        named = ", ".join(
+            f"{line} (unit{'s' * (len(units) > 1)} {unit_text(units)})" for line, units in lines
+        )
         yield f"  pressure lines  {named}"
 
 
