@@ -20,6 +20,7 @@ FLOORS = {
     "mechanics": 2,
     "design": 2,
     "states": 3,
+    "actuation": 4,
     "calibration": 4,
     "reference": 4,
     "benchmark": 5,

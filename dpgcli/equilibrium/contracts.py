@@ -9,13 +9,15 @@ need is no term, rather than one that is multiplied by zero.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Indices
 
 Pair = tuple[int, int]
+Values = TypeVar("Values", bound=NDArray[Any])
 
 
 class Response(NamedTuple):
@@ -153,10 +155,10 @@ class Coordinates(Protocol):
         """The coordinates after a step: their sum, or a curved update that strains bars less."""
 
 
-def take_lanes(values: Array, index: Indices) -> Array:
+def take_lanes(values: Values, index: Indices) -> Values:
     """The lanes of an array (…, batch) at `index`; an array with one lane for all stays.
 
     >>> take_lanes(np.array([[1.0, 2.0, 3.0]]), np.array([2, 0]))
     array([[3., 1.]])
     """
-    return values if values.shape[-1] == 1 else np.take(values, index, axis=-1)
+    return values if values.shape[-1] == 1 else cast("Values", np.take(values, index, axis=-1))

@@ -95,7 +95,7 @@ class Potential(Generic[System]):
             measured = term.measure(coordinates)
             response = term.law(measured.value)
             energies.append(total(response.energy))
-            _assemble(term.measure.rows, measured, response, gradient, hessian)
+            assemble(term.measure.rows, measured, response, gradient, hessian)
         return Evaluation(tuple(energies), gradient, hessian)
 
     def by_kind(self, energies: tuple[Array, ...]) -> dict[str, Array]:
@@ -106,13 +106,13 @@ class Potential(Generic[System]):
         return added
 
 
-def _assemble(
+def assemble(
     rows: tuple[Row, ...], q: Measured, response: Response, gradient: Array, hessian: Array
 ) -> None:
     """Add F ∇q to the gradient and K ∇q ∇qᵀ + F ∇²q to the band of the Hessian."""
     if not q.gradient:
-        _add(gradient, rows[0], response.force)
-        _add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
+        add(gradient, rows[0], response.force)
+        add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
         return
     force = response.force
     stiff = [response.stiffness * slope for slope in q.gradient]
@@ -122,7 +122,7 @@ def _assemble(
         turned = [tension * component for component in across]
     entry, part = np.empty_like(force), np.empty_like(force)
     for first, slope in enumerate(q.gradient):
-        _add(gradient, rows[first], np.multiply(force, slope, out=entry))
+        add(gradient, rows[first], np.multiply(force, slope, out=entry))
         for second in range(first, len(rows)):
             depth = rows[second].offset - rows[first].offset
             if depth >= len(hessian):
@@ -132,10 +132,10 @@ def _assemble(
                 entry += np.multiply(turned[first], across[second], out=part)
             if (first, second) in q.entries:
                 entry += np.multiply(force, q.entries[first, second], out=part)
-            _add(hessian[depth], rows[first], entry)
+            add(hessian[depth], rows[first], entry)
 
 
-def _add(target: Array, row: Row, values: Array) -> None:
+def add(target: Array, row: Row, values: Array) -> None:
     """Add one value per cell, (cell, batch), to a row each; a clamped cell has none."""
     clamped = 1 if row.offset < 0 else 0
     first = row.offset + clamped * row.stride

@@ -1,0 +1,1 @@
+"""From pressure to states: what happens to a finger as pressures change."""

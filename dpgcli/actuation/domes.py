@@ -1,0 +1,235 @@
+"""Domes under pressure: what they push with, where they touch their neighbors, when they snap."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import Response, take_lanes
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import Dome, PushOnly
+from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
+
+BISECTIONS = 60
+PLACES = 512  # of a dome's travel, at which its own pressure is looked at
+
+
+@dataclass(frozen=True)
+class PressedDomes:
+    """The law of domes under pressures that change by a load λ: p = p₀ + λ Δp, MPa by unit.
+
+    `pulling` is the law of a dome in touch. `touching` (unit, batch) says which domes are, None
+    where all are, whatever happens: those of laws that push and pull. `peak` (mm) is the extension
+    up to which a ground dome may push.
+    """
+
+    finger: Finger
+    volumes: DomeVolumes
+    pressure: Array
+    change: Array
+    touching: Flags | None = None
+    inverted: Flags | None = None
+    peak: Array | None = None
+
+    def at(self, load: Array) -> "DomesAt":
+        """The law at a load."""
+        work = PressureWork(self.pressures(load), self.volumes, self._domes)
+        return DomesAt(self.finger, work, self.touching)
+
+    def pressures(self, load: Array) -> Array:
+        """Pressures by unit at a load, MPa."""
+        return np.asarray(self.pressure + load * self.change)
+
+    @property
+    def _domes(self) -> Dome:
+        return self.finger.domes
+
+    def rate(self, scalar: Array, load: Array) -> Array:
+        """−A Δp of domes in touch, N per unit of λ."""
+        push = -self.change * self.volumes.swept(scalar, self._domes).area
+        return push if self.touching is None else np.where(self.touching, push, 0.0)
+
+    def margin(self, scalar: Array, load: Array) -> Array | None:
+        """Push of domes in touch, and what keeps the others from it, over the forces in play.
+
+        A dome that is apart rests where its own force is zero, before its neighbor; it is further
+        away than a ground dome can travel where the opening is beyond its `peak`.
+        """
+        if self.touching is None:
+            return None
+        assert self.inverted is not None and self.peak is not None, "given beside touching"
+        force = free_force(self.finger, self.volumes, scalar, self.pressures(load))
+        is_away = ~self.touching & ~self.inverted & (scalar > self.peak)
+        margin = np.where(self.touching, -force, force) / self.finger.force_scale
+        return np.where(is_away, np.inf, margin)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        flags = (self.touching, self.inverted)
+        touching, inverted = (None if part is None else take_lanes(part, index) for part in flags)
+        return replace(
+            self,
+            finger=self.finger.take_lanes(index),
+            volumes=self.volumes.take_lanes(index),
+            pressure=take_lanes(self.pressure, index),
+            change=take_lanes(self.change, index),
+            touching=touching,
+            inverted=inverted,
+            peak=None if self.peak is None else take_lanes(self.peak, index),
+        )
+
+
+@dataclass(frozen=True)
+class DomesAt:
+    """The law of domes under fixed pressures; only those in touch act."""
+
+    finger: Finger
+    work: PressureWork
+    touching: Flags | None = None
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy (mJ), force (N) and stiffness (N/mm) by the dome's extension."""
+        response = in_touch(self.finger, self.work, scalar)
+        if self.touching is None:
+            return response
+        return Response(*(np.where(self.touching, part, 0.0) for part in response))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        touching = None if self.touching is None else take_lanes(self.touching, index)
+        return type(self)(self.finger.take_lanes(index), self.work.take_lanes(index), touching)
+
+
+@dataclass(frozen=True)
+class PushingDomes:
+    """Domes that only push, under fixed pressures: each acts between `low` and `high`, mm.
+
+    There it touches its neighbor; at `high` it rests by itself, and below `low` it has been pushed
+    back out of its place. The energy is constant beyond both.
+    """
+
+    finger: Finger
+    work: PressureWork
+    low: Array
+    high: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy (mJ), force (N) and stiffness (N/mm) by the dome's extension."""
+        touches = self.touches(scalar)
+        energy, force, stiffness = in_touch(
+            self.finger, self.work, np.clip(scalar, self.low, self.high)
+        )
+        return Response(energy, np.where(touches, force, 0.0), np.where(touches, stiffness, 0.0))
+
+    def touches(self, scalar: Array) -> Flags:
+        """Which domes touch their neighbors."""
+        return np.asarray((scalar > self.low) & (scalar < self.high))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        low, high = take_lanes(self.low, index), take_lanes(self.high, index)
+        return type(self)(self.finger.take_lanes(index), self.work.take_lanes(index), low, high)
+
+
+def in_touch(finger: Finger, work: PressureWork, extension: Array) -> Response:
+    """Of dome and pressure together, the dome in touch with its neighbor."""
+    dome, pushed = finger.law.pulling.response(extension, finger.domes), work(extension)
+    return Response(*(one + other for one, other in zip(dome, pushed, strict=True)))
+
+
+def free_force(finger: Finger, volumes: DomeVolumes, extension: Array, pressure: Array) -> Array:
+    """E' − p A (N) of the dome alone; it pushes where that is negative."""
+    return in_touch(finger, PressureWork(pressure, volumes, finger.domes), extension).force
+
+
+class Limits(NamedTuple):
+    """Where domes by themselves lose their places, (unit, batch).
+
+    A ground dome snaps at an extension `peak` (mm) under `snap_pressure` (MPa), an inverted one
+    resets at `dip` under `reset_pressure`.
+    """
+
+    peak: Array
+    dip: Array
+    snap_pressure: Array
+    reset_pressure: Array
+
+
+def limits(finger: Finger, volumes: DomeVolumes) -> Limits:
+    """The extremes of the pressure E'/A at which a dome alone rests, between its two rests.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> dome = uniform_finger(1, **STUDY)  # E'' = 0 at u = 0.2246
+    >>> found = limits(dome, DomeVolumes(np.array([[30.0]])))
+    >>> print(found.peak.round(4), found.snap_pressure.round(4))
+    [[0.7861]] [[0.152]]
+    """
+    domes = finger.domes
+    shape = np.broadcast_shapes(*(np.shape(part) for part in domes), volumes.area.shape)
+    rests = finger.law.rests(domes)
+    start = np.broadcast_to(-domes.contact, shape)
+    top, well = (np.broadcast_to(rest, shape) for rest in rests)
+
+    def pressure(extension: Array) -> Array:
+        dome = finger.law.pulling.response(extension, domes)
+        return np.asarray(dome.force / volumes.swept(extension, domes).area)
+
+    peak = _largest(pressure, start, top)
+    dip = _largest(lambda extension: -pressure(extension), top, well)
+    return Limits(peak, dip, pressure(peak), pressure(dip))
+
+
+def _largest(function: Callable[[Array], Array], start: Array, end: Array) -> Array:
+    """Where a function is largest between two extensions: the best place, then golden sections."""
+    share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
+    values = function(start + share * (end - start))
+    best = values.argmax(axis=0) / (PLACES - 1)
+    low, high = (np.clip(best + side / (PLACES - 1), 0.0, 1.0) for side in (-1.0, 1.0))
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(BISECTIONS):
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        rises = function(start + left * (end - start)) < function(start + right * (end - start))
+        low, high = np.where(rises, left, low), np.where(rises, high, right)
+    return np.asarray(start + 0.5 * (low + high) * (end - start))
+
+
+def pushing(
+    finger: Finger, volumes: DomeVolumes, own: Limits, pressure: Array, inverted: Flags
+) -> PushingDomes:
+    """Domes that only push, each in the place that it has at these pressures, (unit, batch).
+
+    `inverted` are the domes that are, as far as the pressures let them be: see `kept_places`.
+    """
+    assert isinstance(finger.law, PushOnly), "other domes act everywhere"
+
+    def force(extension: Array) -> Array:
+        return free_force(finger, volumes, extension, pressure)
+
+    contact = np.broadcast_to(finger.domes.contact, inverted.shape)
+    far = contact + finger.domes.stroke  # the travel of the inverted dome
+    peak, dip = (np.broadcast_to(part, inverted.shape) for part in (own.peak, own.dip))
+    ground = _zero(force, -contact - far, peak)
+    well = _zero(force, dip, dip + 2.0 * far)
+    before = np.where(pressure < own.snap_pressure, _zero(force, dip, peak), -np.inf)
+    low = np.where(inverted, before, -np.inf)
+    high = np.where(inverted, well, ground)
+    return PushingDomes(finger, PressureWork(pressure, volumes, finger.domes), low, high)
+
+
+def _zero(force: Callable[[Array], Array], negative: Array, positive: Array) -> Array:
+    """Where a force changes sign between two extensions, by bisection."""
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (negative + positive)
+        is_negative = force(middle) < 0.0
+        negative = np.where(is_negative, middle, negative)
+        positive = np.where(is_negative, positive, middle)
+    return 0.5 * (negative + positive)
+
+
+def kept_places(own: Limits, pressure: Array, inverted: Flags) -> Flags:
+    """Which domes are inverted, once those have snapped or reset that these pressures make."""
+    return np.asarray(
+        (inverted | (pressure > own.snap_pressure)) & ~(pressure < own.reset_pressure)
+    )

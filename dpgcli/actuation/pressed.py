@@ -1,0 +1,353 @@
+"""Fingers under pressure: followed as it changes, and relaxed where they lose their balance."""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+
+from dpgcli.actuation.domes import (
+    DomesAt,
+    Limits,
+    PressedDomes,
+    PushingDomes,
+    free_force,
+    kept_places,
+    limits,
+    pushing,
+)
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.design.pressure import Pressure
+from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
+from dpgcli.equilibrium.family import Family
+from dpgcli.equilibrium.newton import minimize
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, Outcome, follow
+from dpgcli.equilibrium.potential import Potential
+from dpgcli.mechanics.coordinates import FingerCoordinates
+from dpgcli.mechanics.curve import Spline
+from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import PushOnly
+from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.units import UnitSolutions
+from dpgcli.states.wells import inverted_wells
+
+TIE = 1e-6  # of the pressure: thresholds as near are not told apart
+LEFT = 0.05  # of a stroke: what has moved further has left its place
+DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
+TOLERANCE = 1e-12  # of the forces in play
+LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
+PLACES = 128  # of a dome's opening, at which its stiffness is looked at
+
+
+class Halt(IntEnum):
+    """Why a finger stopped on the way from one pressure to another."""
+
+    ARRIVED = 0
+    FOLD = 1
+    ALONE = 2  # a dome that is apart has lost its place
+    CONTACT = 3
+    RELEASE = 4
+    FOLDED = 5
+    FAILED = 6
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Fingers under pressure, a lane each: coordinates (size, batch), the rest (unit, batch).
+
+    `pressure` in MPa by unit; `inverted` domes; `touching` those in touch with their neighbors,
+    None for laws under which all are.
+    """
+
+    coordinates: Array
+    pressure: Array
+    inverted: Flags
+    touching: Flags | None = None
+
+    def take_lanes(self, index: Indices) -> "Shapes":
+        """Some of them."""
+        touching = None if self.touching is None else self.touching[:, index]
+        return Shapes(
+            self.coordinates[:, index], self.pressure[:, index], self.inverted[:, index], touching
+        )
+
+    def put(self, index: Indices, others: "Shapes") -> None:
+        """Replace the lanes at `index`."""
+        self.coordinates[:, index], self.pressure[:, index] = others.coordinates, others.pressure
+        self.inverted[:, index] = others.inverted
+        if self.touching is not None and others.touching is not None:
+            self.touching[:, index] = others.touching
+
+
+@dataclass(frozen=True)
+class Halted:
+    """Where fingers stopped: `share` of the way, why (`Halt` codes) and by which unit, or −1.
+
+    `tied` (unit, batch) are other units whose thresholds are the same within `TIE`, and `start` the
+    coordinates from which it goes downhill, a little past a fold.
+    """
+
+    shapes: Shapes
+    share: Array
+    reason: Indices
+    unit: Indices
+    tied: Flags
+    start: Array
+
+    def take_lanes(self, index: Indices) -> "Halted":
+        """Some of them."""
+        return Halted(
+            self.shapes.take_lanes(index),
+            self.share[index],
+            self.reason[index],
+            self.unit[index],
+            self.tied[:, index],
+            self.start[:, index],
+        )
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """Fingers whose domes are under pressure: one design, or one for each lane."""
+
+    units: UnitSolutions
+    volumes: DomeVolumes
+
+    @classmethod
+    def of(cls, units: UnitSolutions, pressure: Pressure) -> "Pressed":
+        """Fingers of one design, or of one for each lane, under the pressure of their scene.
+
+        Where the area of domes is not given, a dome with a curve of its own snaps under the snap
+        pressure by itself; one whose travel is the opening does so with its hinge, between rigid
+        bars: A = F/p with F the largest force that the unit bears.
+
+        >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+        >>> units, line = UnitSolutions.of(uniform_finger(1, **STUDY)), np.zeros(1, int)
+        >>> given = Pressure(("A",), line, None, snap_pressure=np.array([[0.1495]]))
+        >>> print(Pressed.of(units, given).volumes.area.round(2))  # mm²
+        [[31.61]]
+        """
+        area = pressure.effective_area
+        if area is None:
+            assert pressure.snap_pressure is not None, "one of the two is known"
+            area = _borne(units, pressure.shape) / pressure.snap_pressure
+        return cls(units, DomeVolumes(area, pressure.shape))
+
+    @property
+    def finger(self) -> Finger:
+        """The fingers."""
+        return self.units.finger
+
+    @cached_property
+    def limits(self) -> Limits | None:
+        """Where domes by themselves lose their places; None for those that always act."""
+        if not isinstance(self.finger.law, PushOnly):
+            return None
+        return limits(self.finger, self.volumes)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or batch)."""
+        finger = self.finger
+        domes = finger.domes
+        start = -np.broadcast_to(domes.contact, (finger.n_units, 1))
+        way = domes.contact + 1.5 * domes.stroke
+        share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
+        bend = finger.law.pulling.response(start + share * way, domes).stiffness
+        return np.asarray(2.0 * np.abs(bend).max(axis=0))
+
+    def take_lanes(self, index: Indices) -> "Pressed":
+        """The fingers of some lanes."""
+        taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
+        if self.limits is not None:
+            taken.__dict__["limits"] = Limits(*(take_lanes(part, index) for part in self.limits))
+        taken.__dict__["stiffness"] = take_lanes(self.stiffness, index)
+        return taken
+
+    @cached_property
+    def _bare(self) -> Potential[FingerCoordinates]:
+        """The energy without domes."""
+        whole = chain_potential(self.finger)
+        others = tuple(term for term in whole.terms if term.kind != "bistable")
+        return Potential(whole.coordinates, others)
+
+    def family(self, shapes: Shapes, target: Array) -> Family[FingerCoordinates, PressedDomes]:
+        """The energies on the way from the pressures of shapes to others, (unit, batch)."""
+        law = PressedDomes(self.finger, self.volumes, shapes.pressure, target - shapes.pressure)
+        if self.limits is not None:
+            peak = np.broadcast_to(self.limits.peak, shapes.inverted.shape)
+            law = replace(law, touching=shapes.touching, inverted=shapes.inverted, peak=peak)
+        bare = self._bare
+        coordinates = bare.coordinates
+        scale = self.finger.stroke
+        return Family(coordinates, bare.terms, coordinates.dome, law, scale, self.stiffness)
+
+    def potential(self, pressure: Array, inverted: Flags) -> Potential[FingerCoordinates]:
+        """The energy less the work of fixed pressures, domes in touch or not as they come."""
+        return self._with(self.domes(pressure, inverted))
+
+    def domes(self, pressure: Array, inverted: Flags) -> DomesAt | PushingDomes:
+        """The law of the domes under fixed pressures."""
+        if self.limits is None:
+            return DomesAt(self.finger, PressureWork(pressure, self.volumes, self.finger.domes))
+        return pushing(self.finger, self.volumes, self.limits, pressure, inverted)
+
+    def _with(self, law: ScalarLaw) -> Potential[FingerCoordinates]:
+        bare = self._bare
+        dome = Term("domes", bare.coordinates.dome, law)
+        return Potential(bare.coordinates, (*bare.terms, dome))
+
+    def extensions(self, coordinates: Array) -> Array:
+        """Extensions of the domes' springs, mm, (unit, batch)."""
+        return self._bare.coordinates.dome(coordinates).value
+
+    def energy(self, shapes: Shapes) -> Array:
+        """Energy less the work of the pressures, mJ, (batch,)."""
+        return self.potential(shapes.pressure, shapes.inverted).evaluate(shapes.coordinates).energy
+
+    def relaxed(self, shapes: Shapes) -> tuple[Shapes, Flags]:
+        """Go downhill from shapes at their pressures to the next minima; which have arrived.
+
+        Domes that only push and are pushed out of their places fall back, and the others go on.
+        """
+        inverted, coordinates = shapes.inverted, shapes.coordinates
+        if self.limits is not None:
+            inverted = kept_places(self.limits, shapes.pressure, inverted)
+        for _ in range(self.finger.n_units + 1):
+            law = self.domes(shapes.pressure, inverted)
+            there = minimize(self._with(law), coordinates, TOLERANCE)
+            coordinates = there.coordinates
+            extension = self.extensions(coordinates)
+            if not isinstance(law, PushingDomes):
+                break
+            fallen = inverted & (extension <= law.low)
+            inverted = inverted & ~fallen
+            if not fallen.any():
+                break
+        is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
+        beyond = extension > self.units.wells.spring_barrier
+        if not isinstance(law, PushingDomes):
+            return replace(shapes, coordinates=coordinates, inverted=beyond), is_there
+        touching = law.touches(extension)
+        inverted = np.where(touching, beyond, inverted)
+        return replace(
+            shapes, coordinates=coordinates, inverted=inverted, touching=touching
+        ), is_there
+
+    def followed(self, shapes: Shapes, target: Array, largest_step: float = LARGEST_STEP) -> Halted:
+        """Follow shapes towards other pressures, (unit, batch), until something happens."""
+        shapes = self._about_to_touch(shapes, target)
+        family = self.family(shapes, target)
+        end, alone = self._lost_alone(shapes, target)
+        ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step)
+        pressure = shapes.pressure + ends.load * (target - shapes.pressure)
+        there = replace(shapes, coordinates=ends.coordinates, pressure=pressure)
+        is_alone = (ends.outcome == Outcome.ARRIVED) & alone.any(axis=0)
+        unit = np.where(is_alone, alone.argmax(axis=0), ends.cell)
+        start, left = self._past(family, ends, target - shapes.pressure)
+        tied = np.where(is_alone, alone, left) & (np.arange(len(left))[:, None] != unit)
+        reason = _reasons(ends, shapes.touching)
+        reason = np.where(is_alone, Halt.ALONE, reason)
+        is_folded = family.coordinates.springs(ends.coordinates).is_folded
+        reason = np.where(is_folded, Halt.FOLDED, reason)
+        return Halted(there, ends.load, reason, unit, tied, start)
+
+    def _past(
+        self, family: Family[FingerCoordinates, PressedDomes], ends: Ends, change: Array
+    ) -> tuple[Array, Flags]:
+        """Coordinates a little past folds, and units that lose their balance within `TIE` as well.
+
+        The unit that is the first is held where it is, while the pressure rises by so much; what
+        leaves its place then is tied with it.
+        """
+        start, left = ends.coordinates.copy(), np.zeros(change.shape, bool)
+        folds = np.flatnonzero(ends.outcome == Outcome.FOLD)
+        if not len(folds):
+            return start, left
+        few, cell = family.take_lanes(folds), ends.cell[folds]
+        here, lanes = start[:, folds], np.arange(len(folds))
+        values = few.measure(here).value
+        if len(values) > 1:
+            own = change[cell, folds]
+            at_fold = few.law.pressures(ends.load[folds])[cell, lanes]
+            further = TIE * np.abs(at_fold) / np.where(own != 0.0, np.abs(own), np.inf)
+            held = (np.arange(len(values))[:, None] == cell) * few.stiffness
+            potential = few.held(ends.load[folds] + further, held, values[cell, lanes])
+            here = minimize(potential, here, TOLERANCE).coordinates
+            left[:, folds] = np.abs(few.measure(here).value - values) > LEFT * few.scale
+        start[:, folds] = here + DISPLACED * ends.onward[:, folds]
+        return start, left
+
+    def after(self, halted: Halted) -> tuple[Shapes, Flags]:
+        """What becomes of shapes that halted, at their pressures; which have come to rest.
+
+        Domes that meet or leave their neighbors change nothing else.
+        """
+        shapes, n = halted.shapes, len(halted.unit)
+        is_first = np.arange(self.finger.n_units)[:, None] == halted.unit
+        meets = (halted.reason == Halt.CONTACT) | (halted.reason == Halt.RELEASE)
+        touching = shapes.touching
+        if touching is not None:
+            touching = touching ^ (is_first & meets)
+        falls = np.flatnonzero((halted.reason == Halt.FOLD) | (halted.reason == Halt.ALONE))
+        moved = replace(
+            shapes,
+            coordinates=shapes.coordinates.copy(),
+            inverted=shapes.inverted.copy(),
+            touching=touching,
+        )
+        is_fine = np.ones(n, bool)
+        if len(falls):
+            alone = (halted.reason == Halt.ALONE) & (is_first | halted.tied)
+            start = replace(moved, coordinates=halted.start, inverted=shapes.inverted ^ alone)
+            relaxed, is_fine[falls] = self.take_lanes(falls).relaxed(start.take_lanes(falls))
+            moved.put(falls, relaxed)
+        return moved, is_fine
+
+    def _about_to_touch(self, shapes: Shapes, target: Array) -> Shapes:
+        """The shapes; domes that are just in touch remain so if pressure will push them there."""
+        if shapes.touching is None:
+            return shapes
+        extension = self.extensions(shapes.coordinates)
+        force = free_force(self.finger, self.volumes, extension, shapes.pressure)
+        is_level = np.abs(force) <= LARGEST_RESIDUAL * self.finger.force_scale
+        change = target - shapes.pressure
+        touching = np.where(is_level & (change != 0.0), change > 0.0, shapes.touching)
+        return replace(shapes, touching=touching)
+
+    def _lost_alone(self, shapes: Shapes, target: Array) -> tuple[Array, Flags]:
+        """The share of the way at which the first dome that is apart loses its place, at most 1.
+
+        And which those are, the first and what is tied with it.
+        """
+        n = shapes.inverted.shape[1]
+        if self.limits is None or shapes.touching is None:
+            return np.ones(n), np.zeros_like(shapes.inverted)
+        change = target - shapes.pressure
+        snap, reset = self.limits.snap_pressure, self.limits.reset_pressure
+        limit = np.where(shapes.inverted, reset, snap)
+        is_towards = ~shapes.touching & np.where(shapes.inverted, change < 0.0, change > 0.0)
+        way = np.where(is_towards, change, 1.0)
+        share = np.where(is_towards, np.maximum((limit - shapes.pressure) / way, 0.0), np.inf)
+        first = np.minimum(share.min(axis=0), 1.0)
+        near = np.abs((share - first) * way) <= TIE * np.abs(limit)
+        return first, np.asarray(is_towards & (share <= 1.0) & near)
+
+
+def _borne(units: UnitSolutions, shape: Spline | None) -> Array:
+    """The force (N) over which a snap pressure gives the effective area, (unit, design)."""
+    finger = units.finger
+    if finger.law.curve is not None:
+        return limits(finger, DomeVolumes(np.ones((1, 1)), shape)).snap_pressure
+    return inverted_wells(replace(finger, law=finger.law.pulling)).snap_force
+
+
+def _reasons(ends: Ends, touching: Flags | None) -> Indices:
+    """`Halt` codes of the ends of paths."""
+    lanes = np.arange(len(ends.load))
+    reasons = np.array([Halt.ARRIVED, Halt.FOLD, Halt.CONTACT, Halt.FAILED])[ends.outcome]
+    if touching is not None:
+        releases = touching[np.maximum(ends.cell, 0), lanes] & (reasons == Halt.CONTACT)
+        reasons = np.where(releases, Halt.RELEASE, reasons)
+    return np.asarray(reasons)

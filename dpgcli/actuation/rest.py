@@ -1,0 +1,30 @@
+"""Fingers at rest, before any pressure: the stable states that ways begin at and end in."""
+
+import numpy as np
+
+from dpgcli.actuation.pressed import Pressed, Shapes
+from dpgcli.arrays import Flags
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
+from dpgcli.states.certify import Settled
+from dpgcli.states.settle import settle
+
+
+def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
+    """Shapes of patterns, (unit, batch), without pressure, and what certifies them.
+
+    Only those whose status is stable are states; others begin no way.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.pressure import DomeVolumes
+    >>> from dpgcli.states.units import UnitSolutions
+    >>> units = UnitSolutions.of(uniform_finger(2, **STUDY))
+    >>> pressed = Pressed(units, DomeVolumes(np.array([[31.61]])))
+    >>> shapes, settled = at_rest(pressed, np.array([[True], [False]]))
+    >>> shapes.pressure.tolist(), settled.status.tolist()
+    ([[0.0], [0.0]], [0])
+    """
+    settled = settle(pressed.units, chain_potential, inverted, DEFAULT_TOLERANCE)
+    touching = None if pressed.limits is None else inverted.copy()
+    coordinates = settled.equilibrium.coordinates
+    return Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching), settled

@@ -1,0 +1,155 @@
+"""Potentials that change with a load: fixed terms, and one law on a measure that knows the load.
+
+What a path of equilibria needs beside gradient and Hessian is ∂g/∂λ, and scalars by which it can be
+followed where the load turns back: those of the measure that is loaded.
+"""
+
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, Protocol, Self, TypeVar
+
+import numpy as np
+
+from dpgcli.arrays import Array, Indices, total
+from dpgcli.equilibrium.contracts import (
+    Coordinates,
+    Measure,
+    Measured,
+    Response,
+    Row,
+    ScalarLaw,
+    Term,
+    take_lanes,
+)
+from dpgcli.equilibrium.potential import Potential, add, assemble
+
+System = TypeVar("System", bound=Coordinates, covariant=True)
+Law = TypeVar("Law", bound="LoadedLaw", covariant=True)
+
+
+class LoadedLaw(Protocol):
+    """The energy of a scalar under a load λ, (batch,): arrays (cell, batch)."""
+
+    def at(self, load: Array) -> ScalarLaw:
+        """The law under a load."""
+
+    def rate(self, scalar: Array, load: Array) -> Array:
+        """∂F/∂λ."""
+
+    def margin(self, scalar: Array, load: Array) -> Array | None:
+        """How far each cell is from where another law begins, at least 0; None if none does."""
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+
+
+@dataclass(frozen=True)
+class Holding:
+    """A law, and a spring of stiffness k towards a target on the same scalar.
+
+    `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,).
+    """
+
+    law: ScalarLaw
+    stiffness: Array
+    target: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness of both."""
+        energy, force, stiffness = self.law(scalar)
+        away = scalar - self.target
+        pull = self.stiffness * away
+        return Response(energy + 0.5 * pull * away, force + pull, stiffness + self.stiffness)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same for some lanes of the batch."""
+        parts = take_lanes(self.stiffness, index), take_lanes(self.target, index)
+        return type(self)(self.law.take_lanes(index), *parts)
+
+
+class Linearized(NamedTuple):
+    """Gradient, band of the Hessian, ∂g/∂λ and the loaded measure at some coordinates."""
+
+    gradient: Array
+    hessian: Array
+    rate: Array
+    measured: Measured
+
+
+@dataclass(frozen=True)
+class Family(Generic[System, Law]):
+    """Potentials by a load: `terms` that do not feel it, and a `measure` under a loaded `law`.
+
+    `scale` (cell, 1 or batch) is the measure of a large change of each scalar, `stiffness` (same
+    shape) that of a spring which keeps a cell where it is, however its own law softens.
+    """
+
+    coordinates: System
+    terms: tuple[Term, ...]
+    measure: Measure
+    law: Law
+    scale: Array
+    stiffness: Array
+
+    def take_lanes(self, index: Indices) -> "Family[System, Law]":
+        """The same family for some lanes of the batch."""
+        return Family(
+            self.coordinates.take_lanes(index),
+            tuple(term.take_lanes(index) for term in self.terms),
+            self.measure.take_lanes(index),
+            self.law.take_lanes(index),
+            take_lanes(self.scale, index),
+            take_lanes(self.stiffness, index),
+        )
+
+    def at(self, load: Array) -> Potential[System]:
+        """The potential under a load, (batch,)."""
+        return self._with(self.law.at(load))
+
+    def held(self, load: Array, stiffness: Array, target: Array) -> Potential[System]:
+        """The same, with springs of some stiffness (cell, batch) towards a target (batch,)."""
+        return self._with(Holding(self.law.at(load), stiffness, target))
+
+    def _with(self, law: ScalarLaw) -> Potential[System]:
+        return Potential(self.coordinates, (*self.terms, Term("loaded", self.measure, law)))
+
+    @property
+    def column_depths(self) -> tuple[int, ...]:
+        """The depth to which each column of the Hessian may be nonzero."""
+        return self.at(np.zeros(1)).column_depths
+
+    def linearized(
+        self, coordinates: Array, load: Array, stiffness: Array, target: Array, depth: int
+    ) -> Linearized:
+        """Derivatives at coordinates, (size, batch), with cells held as in `held`."""
+        gradient = np.zeros_like(coordinates)
+        hessian = np.zeros((depth + 1, *coordinates.shape))
+        for term in self.terms:
+            measured = term.measure(coordinates)
+            response = term.law(measured.value)
+            assemble(term.measure.rows, measured, response, gradient, hessian)
+        measured = self.measure(coordinates)
+        law = Holding(self.law.at(load), stiffness, target)
+        assemble(self.measure.rows, measured, law(measured.value), gradient, hessian)
+        rate = spread(self.measure.rows, measured, self.law.rate(measured.value, load), gradient)
+        return Linearized(gradient, hessian, rate, measured)
+
+
+def spread(rows: tuple[Row, ...], measured: Measured, weights: Array, like: Array) -> Array:
+    """Σ w ∇q over cells, (size, batch), for weights (cell, batch)."""
+    result = np.zeros_like(like)
+    for row, slope in zip(rows, measured.gradient, strict=True):
+        add(result, row, weights * slope)
+    return result
+
+
+def along(rows: tuple[Row, ...], measured: Measured, direction: Array) -> Array:
+    """∇q · v of every cell, (cell, batch), for a direction v, (size, batch)."""
+    parts = []
+    for row, slope in zip(rows, measured.gradient, strict=True):
+        clamped = 1 if row.offset < 0 else 0
+        taken = direction[row.offset + clamped * row.stride :: row.stride]
+        part = np.zeros(measured.value.shape)
+        n_cells = len(part) - clamped
+        part[clamped:] = (slope * np.ones_like(part))[clamped:] * taken[:n_cells]
+        parts.append(part)
+    return total(np.stack(parts))

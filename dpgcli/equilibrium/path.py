@@ -1,0 +1,398 @@
+"""Paths of equilibria as a load changes, each lane on its own: to a load, to a fold or to an event.
+
+A path is followed by one of the family's scalars q, the one that moves most, or by the load where
+that is near its end: g(x, λ) = 0 with q = q* is solved by Newton's method on the bordered system.
+The cell that is followed is held by a spring of stiffness k, which adds k ∇q (∇q · δx − δq) = 0 to
+the first equation, so that the matrix stays positive definite through a fold (Rheinboldt,
+Numerical Analysis of Parametrized Nonlinear Equations, 1986, chapter 5; the spring is ours).
+
+Along the path dλ/dq falls to zero at a fold. It is approached from before, by secants on dλ/dq, so
+that cells which reach their folds at the same load do no harm: at a distance of τ scales λ is short
+of the fold by ½ τ dλ/dτ, up to terms of order τ³.
+"""
+
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
+from dpgcli.equilibrium.contracts import Coordinates
+from dpgcli.equilibrium.family import Family, Linearized, LoadedLaw, along, spread
+
+LARGEST_STEP = 0.1  # of a cell's scale
+GROWTH, SHRINKING = 1.6, 0.35
+FURTHEST = 2.5  # steps: what else moves further may have left its branch
+FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
+CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
+SMALLEST_STEP = 1e-9  # of the scale
+TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
+SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
+MAX_CORRECTIONS = 8
+MAX_STEPS = 600
+
+
+class Outcome(IntEnum):
+    """How a path ended."""
+
+    ARRIVED = 0
+    FOLD = 1
+    EVENT = 2
+    FAILED = 3
+
+
+@dataclass(frozen=True)
+class Ends:
+    """The ends of some paths: coordinates (size, batch), loads (batch,) and outcomes.
+
+    At folds and events `cell` is the one that gave rise to it, −1 elsewhere, and `onward` the
+    motion of the coordinates per step of one scale, along the path.
+    """
+
+    coordinates: Array
+    load: Array
+    outcome: Indices
+    cell: Indices
+    onward: Array
+
+
+class _Corrected(NamedTuple):
+    """Points on paths, with derivatives there; `is_fine` says which belong to a stable path."""
+
+    coordinates: Array
+    load: Array
+    linear: Linearized
+    along_load: Array  # −H'⁻¹ ∂g/∂λ
+    by_hold: Array  # H'⁻¹ ∇q
+    is_fine: Flags
+
+
+@dataclass
+class _Walk:
+    """Paths under way: the present point of each, and what is known of the way on.
+
+    `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
+    `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
+    one before and `last_slope` the slope there, NaN if another cell was followed.
+    """
+
+    coordinates: Array
+    load: Array
+    values: Array
+    onward: Array
+    slope: Array
+    cell: Indices
+    sign: Array
+    step: Array
+    last: Array
+    last_slope: Array
+    margin: Array
+
+    def put(self, lanes: Indices, other: "_Walk", taken: Flags) -> None:
+        """Replace some lanes by those of another walk."""
+        for field in fields(self):
+            getattr(self, field.name)[..., lanes] = getattr(other, field.name)[..., taken]
+
+    def only(self, lanes: Indices) -> "_Walk":
+        """Some lanes."""
+        return _Walk(*(np.take(getattr(self, f.name), lanes, axis=-1) for f in fields(self)))
+
+
+@in_lanes
+def follow(
+    family: Family[Coordinates, LoadedLaw],
+    coordinates: Array,
+    load: Array,
+    end: Array,
+    largest_step: float = LARGEST_STEP,
+) -> Ends:
+    """Follow stable equilibria from loads to others, (batch,), as far as they go.
+
+    The paths begin at equilibria, (size, batch), and end at a fold, where the Hessian is singular,
+    at an event, where a margin of the law falls to zero, or at the load asked for.
+    """
+    n = len(load)
+    depth = max(family.column_depths)
+    towards = np.sign(end - load)
+    ends = Ends(
+        coordinates.copy(), load.copy(), np.full(n, -1), np.full(n, -1), np.zeros_like(coordinates)
+    )
+    walk, fine = _begin(family, coordinates, load, towards, depth, largest_step)
+    ends.outcome[~fine] = Outcome.FAILED
+    ends.outcome[fine & (towards == 0.0)] = Outcome.ARRIVED
+    active, own = np.flatnonzero(ends.outcome < 0), family
+    walk, own = walk.only(active), family.take_lanes(active)
+    for _ in range(MAX_STEPS):
+        if not len(active):
+            break
+        ending = _one_step(own, walk, end[active], towards[active], depth, largest_step)
+        finished = np.flatnonzero(ending >= 0)
+        if len(finished):
+            _write(ends, active[finished], walk.only(finished), ending[finished])
+            keep = np.flatnonzero(ending < 0)
+            active, walk, own = active[keep], walk.only(keep), own.take_lanes(keep)
+    if len(active):
+        _write(ends, active, walk, np.full(len(active), Outcome.FAILED))
+    return ends
+
+
+def _write(ends: Ends, lanes: Indices, walk: _Walk, outcome: Indices) -> None:
+    is_special = (outcome == Outcome.FOLD) | (outcome == Outcome.EVENT)
+    ends.coordinates[:, lanes], ends.load[lanes] = walk.coordinates, walk.load
+    ends.outcome[lanes] = outcome
+    ends.cell[lanes] = np.where(is_special, walk.cell, -1)
+    ends.onward[:, lanes] = walk.onward
+
+
+def _begin(
+    family: Family[Coordinates, LoadedLaw],
+    coordinates: Array,
+    load: Array,
+    towards: Array,
+    depth: int,
+    largest_step: float,
+) -> tuple[_Walk, Flags]:
+    """Walks at their first points, and which of these are stable equilibria."""
+    n, nothing = len(load), np.full(len(load), -1)
+    free = np.zeros(n)
+    here = _corrected(family, coordinates, load, nothing, free, depth)
+    margin = _margin(family, here)
+    walk = _Walk(
+        here.coordinates, here.load, here.linear.measured.value, np.zeros_like(coordinates),
+        free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
+        margin,
+    )  # fmt: skip
+    _turn(family, walk, here, nothing, towards)
+    return walk, here.is_fine
+
+
+def _margin(family: Family[Coordinates, LoadedLaw], here: _Corrected) -> Array:
+    margin = family.law.margin(here.linear.measured.value, here.load)
+    return np.full(here.linear.measured.value.shape, np.inf) if margin is None else margin
+
+
+class _Trial(NamedTuple):
+    """A step that was tried: how far, by which cell (−1: by the load), and what there is.
+
+    `slope` is that of the load per step there, `margin` (cell, batch) that to events; `is_fine`
+    says which are on the same stable branch.
+    """
+
+    step: Array
+    cell: Indices
+    is_last: Flags
+    there: _Corrected
+    slope: Array
+    margin: Array
+    is_fine: Flags
+
+
+def _one_step(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    end: Array,
+    towards: Array,
+    depth: int,
+    largest_step: float,
+) -> Indices:
+    """Move each walk on by one step, or shorten its step; outcomes of those that end, else −1."""
+    ending = np.full(len(end), -1)
+    to_fold = _distance(walk.slope, walk.last_slope, walk.last)
+    is_before = (end - walk.load) * towards > 0.0  # a step by a cell may have led beyond
+    is_fold = (walk.cell >= 0) & (to_fold <= FOLD_DISTANCE) & is_before
+    if is_fold.any():
+        _land(walk, is_fold, to_fold, towards)
+        ending[is_fold] = Outcome.FOLD
+    step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
+    trial = _tried(family, walk, step, end, towards, depth)
+    step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
+    is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
+    crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
+    is_event = trial.is_fine & ~is_beyond & (crossed < 0.0).any(axis=0)
+    accepted = trial.is_fine & ~is_beyond & ~is_event & (ending < 0)
+    first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
+    to_root = walk.slope / (walk.slope - slope)
+    shorter = np.where(is_beyond, CLOSER * to_root, np.where(is_event, first, SHRINKING)) * step
+    meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
+    is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
+    ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, Outcome.FOLD, Outcome.FAILED)
+    landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
+    longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
+    walk.step = np.where(accepted, longer, shorter)
+    if accepted.any():
+        _move(family, walk, trial, accepted, towards)
+    if landed.any():
+        event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
+        walk.cell = np.where(landed, event_cell, walk.cell)
+        ending[landed] = Outcome.EVENT
+    ending[accepted & is_last] = Outcome.ARRIVED
+    return ending
+
+
+def _tried(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    step: Array,
+    end: Array,
+    towards: Array,
+    depth: int,
+) -> _Trial:
+    """Try a step of each walk along its cell, or to the end of its load where that is nearer."""
+    to_end = np.where(walk.slope > 0.0, (end - walk.load) * towards / walk.slope, 0.0)
+    is_last = (walk.cell < 0) | (to_end <= step)
+    step = np.where(is_last, to_end, step)
+    cell = np.where(is_last, -1, walk.cell)
+    guess = family.coordinates.moved(walk.coordinates, walk.onward * step)
+    load = np.where(is_last, end, walk.load + towards * walk.slope * step)
+    place = np.maximum(walk.cell, 0), np.arange(len(end))
+    scale = np.broadcast_to(family.scale, walk.values.shape)
+    target = walk.values[place] + walk.sign * step * scale[place]
+    there = _corrected(family, guess, load, cell, target, depth)
+    moved = np.abs((there.linear.measured.value - walk.values) / scale).max(axis=0)
+    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
+    slope = _slope(family, there, cell) * walk.sign * towards
+    return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
+
+
+def _move(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    trial: _Trial,
+    which: Flags,
+    towards: Array,
+) -> None:
+    """Go to the points that were tried, and look on from there."""
+    there, unknown = trial.there, np.where(trial.is_last, np.nan, 0.0)
+    new = replace(
+        walk,
+        coordinates=there.coordinates,
+        load=there.load,
+        values=there.linear.measured.value,
+        last=trial.step + unknown,
+        last_slope=walk.slope + unknown,
+        margin=trial.margin,
+    )
+    _turn(family, new, there, trial.cell, towards)
+    walk.put(np.flatnonzero(which), new, which)
+
+
+def _distance(slope: Array, last_slope: Array, last: Array) -> Array:
+    """Steps to where the slope vanishes, by the secant through the last point and this one."""
+    falls = last_slope > slope
+    distance = slope * last / np.where(falls, last_slope - slope, 1.0)
+    return np.where(falls, distance, np.inf)
+
+
+def _land(walk: _Walk, which: Flags, distance: Array, towards: Array) -> None:
+    """Go the rest of the way to folds: λ there is ½ τ dλ/dτ further."""
+    rest = np.where(which, distance, 0.0)
+    walk.coordinates = walk.coordinates + walk.onward * rest
+    walk.load = walk.load + towards * 0.5 * walk.slope * rest
+
+
+@in_lanes
+def _corrected(
+    family: Family[Coordinates, LoadedLaw],
+    guess: Array,
+    load: Array,
+    cell: Indices,
+    target: Array,
+    depth: int,
+) -> _Corrected:
+    """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1."""
+    shape = family.measure(guess).value.shape
+    chosen = np.arange(shape[0])[:, None] == cell
+    is_held = cell >= 0
+    stiffness = np.where(chosen, np.broadcast_to(family.stiffness, shape), 0.0)
+    target = np.where(is_held, target, 0.0)
+    scale = np.where(chosen, np.broadcast_to(family.scale, shape), 0.0).sum(axis=0)
+    x, n = guess, len(load)
+    settled, done = np.zeros(n, bool), np.zeros(n, bool)
+    coordinates = family.coordinates
+    for count in range(MAX_CORRECTIONS + 1):
+        linear = family.linearized(x, load, stiffness, target, depth)
+        residual = np.abs(linear.gradient / coordinates.gradient_scale).max(axis=0)
+        away = np.where(chosen, linear.measured.value - target, 0.0).sum(axis=0)
+        is_there = (residual <= TOLERANCE) & (
+            np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
+        )
+        done |= is_there & settled
+        factors = factorize(linear.hessian, family.column_depths)
+        selector = spread(family.measure.rows, linear.measured, chosen.astype(float), x)
+        sides = np.stack((-linear.gradient, -linear.rate, selector), axis=1)
+        by_residual, by_load, by_hold = np.moveaxis(_solved(factors, sides), 1, 0)
+        if done.all() or count == MAX_CORRECTIONS:
+            break
+        change = (-away - total(selector * by_residual)) / total(selector * by_load)
+        change = np.where(is_held, change, 0.0)
+        step = np.where(done, 0.0, by_residual + change * by_load)
+        settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
+        x, load = coordinates.moved(x, step), np.where(done, load, load + change)
+    is_fine = done & (factors.pivots > 0.0).all(axis=0)
+    return _Corrected(x, load, linear, by_load, by_hold, is_fine)
+
+
+def _solved(factors: Factorization, sides: Array) -> Array:
+    """A⁻¹ b for right-hand sides (size, number, batch)."""
+    y = forward(factors, sides)
+    y /= factors.pivots[:, None]
+    return backward(factors, y)
+
+
+def _slope(family: Family[Coordinates, LoadedLaw], here: _Corrected, cell: Indices) -> Array:
+    """dλ per step of one scale of the cell; NaN where none is followed.
+
+    With H' = H + k ∇q∇qᵀ the motion per q is k H'⁻¹∇q + λ' z, z = −H'⁻¹ ∂g/∂λ, and ∇q · of it is 1.
+    """
+    stiffness, scale, chosen = _of_cell(family, here, cell)
+    rows, measured = family.measure.rows, here.linear.measured
+    by_hold = (chosen * along(rows, measured, here.by_hold)).sum(axis=0)
+    by_load = (chosen * along(rows, measured, here.along_load)).sum(axis=0)
+    return np.where(cell >= 0, (1.0 - stiffness * by_hold) / by_load * scale, np.nan)
+
+
+def _of_cell(
+    family: Family[Coordinates, LoadedLaw], here: _Corrected, cell: Indices
+) -> tuple[Array, Array, Array]:
+    """Stiffness and scale of a cell of each lane, (batch,), and where it is, (cell, batch)."""
+    shape = here.linear.measured.value.shape
+    chosen = (np.arange(shape[0])[:, None] == cell).astype(float)
+    stiffness = (chosen * family.stiffness).sum(axis=0)
+    return stiffness, (chosen * family.scale).sum(axis=0), chosen
+
+
+def _turn(
+    family: Family[Coordinates, LoadedLaw],
+    walk: _Walk,
+    here: _Corrected,
+    cell: Indices,
+    towards: Array,
+) -> None:
+    """Decide which cell to follow from these points on, and how coordinates and load move.
+
+    The cell that moves most; the one so far, unless another moves half as much again.
+    """
+    stiffness, scale, _ = _of_cell(family, here, cell)
+    slope = _slope(family, here, cell) / scale  # dλ/dq of the cell so far
+    is_held = cell >= 0
+    motion = np.where(is_held, stiffness * here.by_hold + slope * here.along_load, here.along_load)
+    by = np.where(is_held, slope, 1.0)  # dλ along that motion
+    rows, measured = family.measure.rows, here.linear.measured
+    rates = along(rows, measured, motion) / family.scale
+    size = np.abs(rates)
+    chosen = size.argmax(axis=0)
+    lanes = np.arange(len(cell))
+    keeps = is_held & (size[chosen, lanes] <= 1.5 * size[np.maximum(cell, 0), lanes])
+    chosen = np.where(keeps, cell, chosen)
+    rate = rates[chosen, lanes]
+    moves = rate != 0.0
+    forwards = np.sign(by) * towards
+    walk.cell = np.where(moves, chosen, -1)
+    walk.sign = np.sign(rate) * forwards
+    per_step = np.where(moves, forwards / np.abs(np.where(moves, rate, 1.0)), 0.0)
+    walk.onward = motion * per_step
+    walk.slope = np.where(moves, np.abs(by * per_step), 0.0)
+    is_other = walk.cell != cell
+    walk.last_slope = np.where(is_other, np.nan, walk.last_slope)
