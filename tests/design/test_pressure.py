@@ -251,7 +251,7 @@ def test_pressures_that_were_not_measured_everywhere() -> None:
 
 
 def test_an_area_is_no_noise_over_noise() -> None:
-    """A gauge that shows 0.1 % of its range too much says nothing of the area where there is hardly pressure."""
+    """A gauge that shows 0.1 % of its range too much says nothing of areas near rest."""
     shown = FORCE / AREAS + 1e-3 * np.max(FORCE / AREAS)
     design = of(dome(GAP, snap_pressure=0.12, pressure=shown))
     shape = pressure(design).shape
