@@ -161,6 +161,7 @@ def test_what_says_the_same_is_the_same() -> None:
         ("lines: {A: 1-6}", "lines.A: expected units within 1-5, found 6"),
         ("lines: {A: 0-5}", "lines.A: expected units within 1-5, found 0"),
         ("lines: {A: 5-1}", 'lines.A: expected units such as 1-3, 4 or 1,3, found "5-1"'),
+        ("lines: {A: 1-9999}", 'lines.A: expected units such as 1-3, 4 or 1,3, found "1-9999"'),
         ("lines: {A: true}", "lines.A: expected units such as"),
         ("lines: {A: 1.5}", "lines.A: expected units such as"),
         ("lines: {A: []}", "lines.A: expected units such as"),
