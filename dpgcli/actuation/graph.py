@@ -42,8 +42,8 @@ class Graph:
     """States that pulses reach, by code of their patterns, and all pulses that start from them.
 
     `design` and `code` (state,) are in the order in which they are found, those of fewest pulses
-    first; `n_pulses` says how many each needs. `n_lost` ranges of peaks led to no certified state, or
-    were not reached, as the finger folds onto itself before.
+    first; `n_pulses` says how many each needs. `n_lost` ranges of peaks led to no certified state,
+    or were not looked at, as the finger folds onto itself before.
     """
 
     design: Indices
@@ -93,6 +93,41 @@ def reachable(
     n_pulses = np.repeat(np.arange(len(states)), [len(code) for _, code in states])
     designs, codes = (np.concatenate(part) for part in zip(*states, strict=True))
     return Graph(designs, codes, n_pulses, Pulses.joined(parts), n_lost)
+
+
+def reached_from_rest(
+    pressed: Pressed,
+    line_of: Indices,
+    reach: Array,
+    is_stable: Flags,
+    known: tuple[Codes, Codes],
+) -> Flags:
+    """Which states of one finger pulses of any height lead to from rest, by code of the pattern.
+
+    `known` are sources and targets of pulses that need not be found; others are looked for as long
+    as there are stable states that are not reached.
+    """
+    source, target = known
+    is_reached, is_done = np.zeros_like(is_stable), np.zeros_like(is_stable)
+    is_reached[0] = is_stable[0]
+    while True:
+        _close(is_reached, source, target)
+        code = np.flatnonzero(is_reached & ~is_done).astype(np.uint64)
+        if not len(code) or (is_reached == is_stable).all():
+            return is_reached
+        is_done |= is_reached
+        directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
+        for part in directions.chunks(pressed.finger.n_units):
+            found, _ = _pulses(pressed, line_of, reach, part)
+            source, target = np.append(source, found.source), np.append(target, found.target)
+
+
+def _close(is_reached: Flags, source: Codes, target: Codes) -> None:
+    """Add what is reached from what is reached."""
+    n_reached = 0
+    while is_reached.sum() > n_reached:
+        n_reached = is_reached.sum()
+        is_reached[target[is_reached[source]]] = True
 
 
 def _no_pulses() -> Pulses:
