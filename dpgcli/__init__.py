@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from dpgcli.api.actuate import actuate
     from dpgcli.api.bench import bench
     from dpgcli.api.check import check
     from dpgcli.api.compare import compare
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from dpgcli.api.sweep import merge, sweep
     from dpgcli.api.validate import validate
     from dpgcli.errors import (
+        ActuationError,
         DpgError,
         FitError,
         NothingSelectedError,
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     from dpgcli.mechanics.finger import uniform_finger
 
 __all__ = [
+    "ActuationError",
     "DpgError",
     "FitError",
     "NothingSelectedError",
@@ -51,6 +54,7 @@ __all__ = [
     "SpecError",
     "UsageError",
     "__version__",
+    "actuate",
     "bench",
     "check",
     "compare",
@@ -71,6 +75,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "actuate": "api.actuate",
     "bench": "api.bench",
     "check": "api.check",
     "compare": "api.compare",

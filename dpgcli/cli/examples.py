@@ -38,6 +38,11 @@ EXAMPLES = {
         "dpg stress finger.yaml",
         "dpg stress --only crossed --format csv > cases.csv",
     ),
+    "actuate": (
+        "dpg actuate finger.yaml --pressure 0:0.15:0",
+        "dpg actuate finger.yaml --pressure 0:0.2:-0.1:0 --output path.parquet --plot path.svg",
+        "dpg actuate finger.yaml --from 11000 --pressure 0:0.2:0 --cycles 100 --format csv",
+    ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",
         "dpg validate finger.yaml --format github",

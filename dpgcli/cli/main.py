@@ -18,7 +18,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
     *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
-    *("stress", "validate", "init", "schema", "fit", "fe", "help"),
+    *("stress", "actuate", "validate", "init", "schema", "fit", "fe", "help"),
 )
 
 

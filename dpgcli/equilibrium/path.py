@@ -11,6 +11,7 @@ that cells which reach their folds at the same load do no harm: at a distance of
 of the fold by ½ τ dλ/dτ, up to terms of order τ³.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import NamedTuple
@@ -32,6 +33,9 @@ TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
 MAX_CORRECTIONS = 8
 MAX_STEPS = 600
+
+Watch = Callable[[Indices, Array, Array], None]
+"""Told lanes, their coordinates (size, lane) and loads (lane,) after each step."""
 
 
 class Outcome(IntEnum):
@@ -107,11 +111,13 @@ def follow(
     load: Array,
     end: Array,
     largest_step: float = LARGEST_STEP,
+    watch: Watch | None = None,
 ) -> Ends:
     """Follow stable equilibria from loads to others, (batch,), as far as they go.
 
     The paths begin at equilibria, (size, batch), and end at a fold, where the Hessian is singular,
-    at an event, where a margin of the law falls to zero, or at the load asked for.
+    at an event, where a margin of the law falls to zero, or at the load asked for. `watch` is told
+    where they are after each step; one that failed is told as no step.
     """
     n = len(load)
     depth = max(family.column_depths)
@@ -128,6 +134,8 @@ def follow(
         if not len(active):
             break
         ending = _one_step(own, walk, end[active], towards[active], depth, largest_step)
+        if watch is not None:
+            watch(active, walk.coordinates.copy(), walk.load.copy())
         finished = np.flatnonzero(ending >= 0)
         if len(finished):
             _write(ends, active[finished], walk.only(finished), ending[finished])
