@@ -33,12 +33,12 @@ class Outcome(IntEnum):
         >>> Outcome.STAYS.text(0.299)
         'no unit leaves up to 0.299 MPa'
         """
-        return _TEXTS[self].format(pressure)
+        return _TEXTS[self].format(pressure, "down" if pressure < 0.0 else "up")
 
 
 _TEXTS = {
     Outcome.LEAVES: "",
-    Outcome.STAYS: "no unit leaves up to {:.4g} MPa",
+    Outcome.STAYS: "no unit leaves {1} to {0:.4g} MPa",
     Outcome.FOLDS: "folds onto itself at {:.4g} MPa",
     Outcome.LOST: "no equilibrium beyond {:.4g} MPa",
     Outcome.ASTRAY: "released from {:.4g} MPa it is in no certified state",
@@ -51,7 +51,8 @@ class Transitions(Rows):
 
     `pressure` (MPa) is where units flip, or else how far the state was followed, and `outcome` says
     which. `unit` is the first to leave, −1 where none does; `flipped` and `tied` are codes of all
-    units that flip and of those whose threshold is the same within `pressed.TIE`. `reached` is
+    units that flip and of others whose threshold is that of `unit` within `pressed.TIE`: the model
+    does not say which of these goes first, and `unit` is the one next to the base. `reached` is
     the code of the pattern at that pressure, `after` that of the pattern left at rest; both are
     the state's own where nothing happens, and what is left `ASTRAY` is no state.
     """
@@ -162,8 +163,10 @@ def _put(
     is_rest = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
     found.pressure[lanes] = on_line(halted.shapes, line_of, directions.line[lanes])
     found.outcome[lanes] = np.where(is_rest, Outcome.LEAVES, Outcome.ASTRAY)
-    found.unit[lanes] = halted.unit
+    units = np.arange(own.finger.n_units)[:, None]
+    together = (units == halted.unit) | halted.tied
+    found.unit[lanes] = together.argmax(axis=0)
     found.flipped[lanes] = codes_of(events.flipped)
-    found.tied[lanes] = codes_of(halted.tied)
+    found.tied[lanes] = codes_of(together & (units != found.unit[lanes]))
     found.reached[lanes] = codes_of(events.after.inverted)
     found.after[lanes] = codes_of(stair.rest.inverted)
