@@ -15,9 +15,9 @@ LAYER, PLACE = 2.2, 0.62  # inches between layers, and between states of a layer
 WIDENING = 0.1  # inches between layers more for each state of the largest
 BENDS = {"+": 0.10, "-": 0.16}  # of an edge, to its left: so that both directions are seen
 STYLES = {"+": "-", "-": "--"}
-LABEL = {"+": 0.36, "-": 0.30}  # of the way along an edge, and further for some of several
+LABEL = {"+": 0.36, "-": 0.30}  # of a layer along an edge, and further for some of several
 FURTHER = (0.0, 0.08, 0.16)
-FEW_PIXELS = 15  # points: between an edge's end and the middle of its state's name
+MARGIN = 15  # points between an edge's end and the middle of its state's name
 
 
 def draw_transitions(states: Columns, transitions: Columns, path: Path) -> None:
@@ -85,7 +85,8 @@ def _draw_edges(
             color = colors[line] if is_reached[source] else OTHER
             ends = np.array([places[source], places[target]])
             text = f"{pressure:.4g}" + (" tie" if tie else "")
-            share = LABEL[direction] + FURTHER[k % len(FURTHER)]
+            n_layers = max(1.0, abs(ends[1, 0] - ends[0, 0]))
+            share = (LABEL[direction] + FURTHER[k % len(FURTHER)]) / n_layers
             place = _along(ends * inches, BENDS[direction], share) / inches
             _draw_edge(axes, ends, direction, color)
             _draw_label(axes, place, color, text)
@@ -99,15 +100,29 @@ def _draw_edge(axes: Any, ends: Array, direction: str, color: str) -> None:
         ends[0],
         arrowprops={
             "arrowstyle": "->", "color": color, "ls": STYLES[direction], "lw": 0.9,
-            "connectionstyle": f"arc3,rad={BENDS[direction]}", "shrinkA": FEW_PIXELS, "shrinkB": FEW_PIXELS,
+            "connectionstyle": f"arc3,rad={BENDS[direction]}", "shrinkA": MARGIN, "shrinkB": MARGIN,
         },
-        zorder=1,
+        zorder=_height(color),
     )  # fmt: skip
 
 
 def _draw_label(axes: Any, place: Array, color: str, text: str) -> None:
     white = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85}
-    axes.text(*place, text, color=color, fontsize=6.5, ha="center", va="center", bbox=white)
+    axes.text(
+        *place,
+        text,
+        color=color,
+        fontsize=6.5,
+        ha="center",
+        va="center",
+        bbox=white,
+        zorder=_height(color),
+    )
+
+
+def _height(color: str) -> float:
+    """What is gray lies below."""
+    return 1.0 if color == OTHER else 2.0
 
 
 def _along(ends: Array, bend: float, share: float) -> Array:
