@@ -1,6 +1,5 @@
 """Transitions: what first happens to each stable state as the pressure of a line rises or falls."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -8,14 +7,12 @@ import numpy as np
 
 from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions, Rows, on_line, raised
-from dpgcli.actuation.graph import reached_from_rest
+from dpgcli.actuation.graph import reached_from_rest, stable_states
 from dpgcli.actuation.pressed import Halt, Pressed
-from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.rest import is_certified
 from dpgcli.actuation.staircase import Stair, Way
 from dpgcli.arrays import Array, Codes, Flags, Indices
-from dpgcli.states.certify import Status
-from dpgcli.states.patterns import chunks, codes_of, inverted_units
-from dpgcli.states.settle import lanes_at_once
+from dpgcli.states.patterns import codes_of
 
 
 class Outcome(IntEnum):
@@ -101,28 +98,21 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     """
     n_units = pressed.finger.n_units
     reach = thresholds_alone(pressed).reach
-    is_stable = np.concatenate([*_stable(pressed)])
-    code = np.flatnonzero(is_stable).astype(np.uint64)
+    is_stable = stable_states(pressed, 1)
+    code = np.flatnonzero(is_stable[0]).astype(np.uint64)
     directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
     parts = [_first(pressed, line_of, reach, part) for part in directions.chunks(n_units)]
     transitions = Transitions.joined([_none(), *parts])
     leads = transitions.take(np.flatnonzero(transitions.outcome == Outcome.LEAVES))
-    known = leads.code, leads.after
+    known = leads.code.astype(np.int64), leads.after.astype(np.int64)
     is_reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
-    return StateGraph(transitions, is_stable, is_reached, float(reach[0]))
+    return StateGraph(transitions, is_stable[0], is_reached[0], float(reach[0]))
 
 
 def _none() -> Transitions:
     places, codes = np.zeros(0, np.int64), np.zeros(0, np.uint64)
     which = codes, places, places, np.zeros(0)
     return Transitions(*which, places, places, codes, codes, codes, codes)
-
-
-def _stable(pressed: Pressed) -> Iterator[Flags]:
-    n_units = pressed.finger.n_units
-    for code in chunks(2**n_units, lanes_at_once(n_units)):
-        _, settled = at_rest(pressed, inverted_units(code, n_units))
-        yield np.asarray(settled.status == Status.STABLE)
 
 
 def _first(pressed: Pressed, line_of: Indices, reach: Array, directions: Directions) -> Transitions:
