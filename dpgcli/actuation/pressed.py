@@ -151,7 +151,7 @@ class Pressed:
         """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or batch)."""
         finger = self.finger
         domes = finger.domes
-        start = -np.broadcast_to(domes.contact, (finger.n_units, 1))
+        start = -np.broadcast_to(domes.contact, (finger.n_units, domes.contact.shape[1]))
         way = domes.contact + 1.5 * domes.stroke
         share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
         bend = finger.law.pulling.response(start + share * way, domes).stiffness
