@@ -43,7 +43,7 @@ from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.mechanics.finger import KEYS, Finger
-from dpgcli.text import KeyPath
+from dpgcli.text import KeyPath, ranges
 
 SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
 NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
@@ -213,7 +213,7 @@ class Resolution:
                 source = _source(key, value)
                 same[source] = (*same.get(source, ()), *units)
             for source, units in sorted(same.items(), key=lambda item: min(item[1])):
-                yield replace(source, units=_ranges(units))
+                yield replace(source, units=ranges(units))
 
     def _uncertainty(self) -> Uncertainty | None:
         """What a single design's values, and the model if the spec counts it in, may be off by."""
@@ -382,14 +382,3 @@ def _source(key: str, value: Value) -> Source:
         value.rule_of(0),
         None if error is None else of_design(error, 0),
     )
-
-
-def _ranges(units: tuple[int, ...]) -> str:
-    """Units as a spec writes them: `1-3`, `5`, `1-3,5`."""
-    runs: list[list[int]] = []
-    for unit in sorted(units):
-        if runs and unit == runs[-1][-1] + 1:
-            runs[-1][1:] = [unit]
-        else:
-            runs.append([unit])
-    return ",".join("-".join(map(str, run)) for run in runs)
