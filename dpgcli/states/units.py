@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.crossing import fewest_in_loop
 from dpgcli.states.guess import FirstOrder, first_order
@@ -50,7 +51,7 @@ class UnitSolutions:
         """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or design)."""
         finger = self.finger
         domes = finger.domes
-        start = -np.broadcast_to(domes.contact, (finger.n_units, 1))
+        start = np.zeros((finger.n_units, 1)) - domes.contact
         way = domes.contact + 1.5 * domes.stroke
         share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
         bend = finger.law.pulling.response(start + share * way, domes).stiffness
@@ -93,8 +94,12 @@ class UnitSolutions:
 
     def take_lanes(self, index: Indices) -> "UnitSolutions":
         """One design for each lane, by index, so that designs and patterns share a batch."""
-        return UnitSolutions(
+        taken = UnitSolutions(
             self.finger.take_lanes(index),
             self.wells.take_lanes(index),
             self.first_order.take_lanes(index),
         )
+        known = self.__dict__.get("holding_stiffness")
+        if known is not None:
+            taken.__dict__["holding_stiffness"] = take_lanes(known, index)
+        return taken
