@@ -1,7 +1,7 @@
 """Text from outside made fit to print: nothing in it moves a cursor or ends a line."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 KeyPath = tuple[str | int, ...]
 
@@ -78,18 +78,3 @@ def counted(number: int, what: str) -> str:
     ('1 design', '2,500 designs')
     """
     return f"{number:,} {what}{'s' * (number != 1)}"
-
-
-def ranges(units: Iterable[int]) -> str:
-    """Units as a spec writes them.
-
-    >>> ranges([1, 2, 3, 5])
-    '1-3,5'
-    """
-    runs: list[list[int]] = []
-    for unit in sorted(units):
-        if runs and unit == runs[-1][-1] + 1:
-            runs[-1][1:] = [unit]
-        else:
-            runs.append([unit])
-    return ",".join("-".join(map(str, run)) for run in runs)

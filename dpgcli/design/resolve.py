@@ -35,17 +35,17 @@ from dpgcli.design.scene import (
     ModelError,
     Origin,
     Scene,
-    Source,
     Uncertainty,
 )
 from dpgcli.design.snap_pressures import AREA, SNAP, answers_to_pressure
+from dpgcli.design.sources import sources_of
 from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
+from dpgcli.design.volumes import swept_shape
 from dpgcli.mechanics.finger import KEYS, Finger
-from dpgcli.text import KeyPath, ranges
+from dpgcli.text import KeyPath
 
-SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
 NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
 NO_LEAVE_ONE_OUT = Issue(
     ("model_error",),
@@ -112,7 +112,7 @@ class Resolution:
         gripper, layer = batch.gripper, batch.layer_thickness
         return Scene(
             batch.finger,
-            tuple(self._sources()),
+            tuple(sources_of({**self.values, **self.answers}, self.design.units)),
             gripper and Gripper(*(np.asarray(value).item() for value in vars(gripper).values())),
             None if layer is None else np.asarray(layer).item(),
             self._uncertainty(),
@@ -140,16 +140,11 @@ class Resolution:
 
     def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
         """What outputs of some designs, none of them wrong, rest on, and how many of them."""
-        found = kinds(self._each, designs)
+        found = kinds({**_each(self.values), **_each(self.answers)}, designs)
         return [(trusts_of(self._case(place)), count) for place, count in found]
 
     def _case(self, place: int) -> Case:
-        return Case(self.design, self.domes, self._each, place)
-
-    @property
-    def _each(self) -> dict[str, list[Value]]:
-        """Values by key, one for each group of units."""
-        return {key: [value for _, value in pairs] for key, pairs in self.values.items()}
+        return Case(self.design, self.domes, _each(self.values), place, _each(self.answers))
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.
@@ -200,20 +195,9 @@ class Resolution:
             line_of(given, units),
             arrays.get(AREA),
             arrays.get(SNAP),
-            history=history_of(given, units),
+            swept_shape(self.domes) if SNAP in arrays else None,
+            history_of(given, units),
         )
-
-    def _sources(self) -> Iterator[Source]:
-        """One source for each key and each set of units that got the same value the same way."""
-        everyone = tuple(range(1, self.design.units + 1))
-        for key, pairs in {**self.values, **self.answers}.items():
-            same: dict[Source, tuple[int, ...]] = {}
-            for group, value in pairs:
-                units = everyone if key in SHARED else group.units
-                source = _source(key, value)
-                same[source] = (*same.get(source, ()), *units)
-            for source, units in sorted(same.items(), key=lambda item: min(item[1])):
-                yield replace(source, units=ranges(units))
 
     def _uncertainty(self) -> Uncertainty | None:
         """What a single design's values, and the model if the spec counts it in, may be off by."""
@@ -367,18 +351,10 @@ def _picked(values: Array, designs: Indices) -> Array:
     return np.take(values, designs, axis=-1)
 
 
+def _each(values: Mapping[str, Pairs]) -> dict[str, list[Value]]:
+    """Values by key, one for each group of units."""
+    return {key: [value for _, value in pairs] for key, pairs in values.items()}
+
+
 def _error(value: Value) -> Array:
     return np.zeros(1) if value.standard_error is None else value.standard_error
-
-
-def _source(key: str, value: Value) -> Source:
-    """How the value of the first design came about, the units left out."""
-    error = value.standard_error
-    return Source(
-        key,
-        "",
-        of_design(value.numbers, 0),
-        ORIGINS[int(of_design(value.origin, 0))],
-        value.rule_of(0),
-        None if error is None else of_design(error, 0),
-    )

@@ -12,7 +12,6 @@ from dpgcli.states.certify import Settled
 from dpgcli.states.patterns import codes_of, inverted_units
 from dpgcli.states.saddles import Flips, SaddleStatus, is_state, saddles
 from dpgcli.states.units import UnitSolutions
-from dpgcli.text import ranges
 
 TIE = 1e-6  # of a barrier: those as near are not told apart
 
@@ -43,7 +42,7 @@ class Barriers:
     def least_robust(self) -> NDArray[np.str_]:
         """The unit of the smallest barrier of each state, as text; all of them if they tie."""
         ties = self.energy <= (1.0 + TIE) * self.least
-        return np.array([ranges(np.flatnonzero(own) + 1) for own in ties.T], str)
+        return np.array([",".join(map(str, np.flatnonzero(own) + 1)) for own in ties.T], str)
 
 
 def barriers(
