@@ -39,7 +39,7 @@ UNIT = ("unit", "moment_N_mm", "chamber2_angle_rad", "opening_mm", "push_N")
 
 
 def domes() -> Calibration:
-    """The curve of the study's dome; how far its scaling is off the other domes of the grid."""
+    """The curve of the study's dome; how far its scalings are off the other domes of the grid."""
     curve = HERE / "dome_path_h6.5_t0.75.csv"
     fit = dpg.fit_bistable(curve, travel_to_opening="stroke:3.5", spec=SPEC)
     grid = pd.read_csv(HERE / "dome_grid.csv", comment="#")
@@ -47,8 +47,14 @@ def domes() -> Calibration:
     own = (grid.dome_height_mm == 6.5) & (grid.dome_thickness_mm == 0.75)
     scaled = grid.inverted_energy_mJ[own].item() * thickness**2.8 * height**1.75
     errors = (scaled / grid.inverted_energy_mJ - 1.0)[~own]
-    against = "inverted energies of 8 other domes, heights 4.5-7.5 mm, thicknesses 0.5-1 mm"
-    return with_known(fit.calibration, energies_and_barriers=(errors, against))
+    pressures = grid.limit_pressure_MPa[own].item() * thickness**2.5 * height**1.2
+    off = (pressures / grid.limit_pressure_MPa - 1.0)[~own]
+    others = "of 8 other domes, heights 4.5-7.5 mm, thicknesses 0.5-1 mm"
+    return with_known(
+        fit.calibration,
+        energies_and_barriers=(errors, f"inverted energies {others}"),
+        pressures=(off, f"snap pressures {others}"),
+    )
 
 
 def units() -> Calibration:

@@ -5,7 +5,7 @@ are compared as they are, forces as f F(x), since dE/du = f dE/dx.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -36,6 +36,7 @@ from dpgcli.calibration.record import (
     unsampled,
     work,
 )
+from dpgcli.calibration.snap import snap_pressure
 from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.curve import FEWEST_POINTS
@@ -81,7 +82,8 @@ class BistableFit:
 
     `factor` is x/u; `well` the travel of the data's inverted well, None if not sampled; `gaps`
     stretches without data; `curve` travel and energy by travel, None where the energy is not known;
-    `warnings` those of the fit and of the data.
+    `beside` pressure (MPa) and swept volume (mm³) at its travels, as far as they were recorded;
+    `snap_pressure` (MPa) that at which the dome snapped; `warnings` those of the fit and the data.
     """
 
     fit: Fit
@@ -92,6 +94,8 @@ class BistableFit:
     gaps: list[tuple[float, float]]
     curve: tuple[Array, Array] | None
     warnings: tuple[str, ...]
+    beside: Mapping[str, Array] = field(default_factory=dict)
+    snap_pressure: float | None = None
 
 
 def law(opening: Array, values: Array, quantity: Quantity) -> Array:
@@ -141,6 +145,7 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
 
     Raises FitError if the record lacks what is asked for, or the fit fails.
     """
+    snapped_at = snap_pressure(record)
     if choice.branches in (Branches.LOADING, Branches.UNLOADING):
         record = branch_of(record, choice.branches)
     ordered, said = in_order(_by_travel(record))
@@ -168,7 +173,18 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     except FitError as error:
         warnings.append(f"no curve written: {error}")
     gaps = unsampled(curve.travel)
-    result = BistableFit(found, curve.travel, observed, factor, well, gaps, energies, ())
+    result = BistableFit(
+        found,
+        curve.travel,
+        observed,
+        factor,
+        well,
+        gaps,
+        energies,
+        (),
+        _beside(curve),
+        snapped_at,
+    )
     return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result)))
 
 
@@ -279,6 +295,16 @@ def _energies(record: Record, observed: Array, choice: BistableOptions) -> tuple
     if len(travel) < FEWEST_POINTS:
         raise FitError(f"expected {FEWEST_POINTS} points or more, found {len(travel)}")
     return travel, energy
+
+
+def _beside(record: Record) -> dict[str, Array]:
+    """Pressure and volume at the travels of the dome's energies."""
+    columns = {"pressure": record.pressure, "volume": record.volume}
+    return {
+        name: cleaned(record.travel, values)[1]
+        for name, values in columns.items()
+        if values is not None
+    }
 
 
 def _judgments(found: BistableFit) -> Iterator[str]:

@@ -93,6 +93,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "method": plan.method.value,
         "formulation": plan.request.formulation,
         "terms": list(plan.terms),
+        "pressure_lines": plan.scene.pressure and plan.scene.pressure.units_by_line,
         "unknowns_per_solve": plan.unknowns,
         "n_unit_solves": plan.n_unit_solves,
         "n_finger_solves": plan.n_finger_solves,
@@ -158,6 +159,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         "",
         "Kept",
         f"  energy terms    {', '.join(plan.terms)} ({plan.scene.finger.law.description})",
+        *_pressure_lines(plan),
         f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
         f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
         f"  solves          {counted(plan.n_unit_solves, 'unit well')}, "
@@ -185,6 +187,18 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  {_bound(plan)}",
         f"  {expected(plan)}",
     ]
+
+
+def _pressure_lines(plan: "Plan") -> Iterator[str]:
+    """The pressure lines, if the spec has pressure."""
+    from dpgcli.design.dimensions import unit_text
+
+    if plan.scene.pressure is not None:
+        lines = plan.scene.pressure.units_by_line.items()
+        named = ", ".join(
+            f"{line} (unit{'s' * (len(units) > 1)} {unit_text(units)})" for line, units in lines
+        )
+        yield f"  pressure lines  {named}"
 
 
 def expected(plan: "Plan") -> str:

@@ -226,6 +226,21 @@ def unit_range(text: str) -> tuple[int, ...]:
     return tuple(range(first, int(match[2] or first) + 1))
 
 
+def unit_text(units: Iterable[int]) -> str:
+    """Units as a spec writes them.
+
+    >>> unit_text([1, 2, 3]), unit_text([5]), unit_text([5, 1, 2, 3])
+    ('1-3', '5', '1-3,5')
+    """
+    runs: list[list[int]] = []
+    for unit in sorted(units):
+        if runs and unit == runs[-1][-1] + 1:
+            runs[-1][1:] = [unit]
+        else:
+            runs.append([unit])
+    return ",".join("-".join(map(str, run)) for run in runs)
+
+
 def range_issues(
     n_units: int, overrides: Iterable[str], section: KeyPath = ("finger",)
 ) -> list[Issue]:

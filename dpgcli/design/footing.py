@@ -1,7 +1,7 @@
 """What the lattice values of a design rest on, key by key, and which designs differ in that."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -47,12 +47,16 @@ class Footing:
 
 @dataclass(frozen=True)
 class Case:
-    """One design, the `place`-th of a batch: its law and its values."""
+    """One design, the `place`-th of a batch: its law and its values.
+
+    `answers` are those of its domes to pressure, none where it has no pressure.
+    """
 
     design: Design
     domes: Domes
     values: Values
     place: int = 0
+    answers: Values = field(default_factory=dict)
 
     @cached_property
     def footings(self) -> dict[str, Footing]:
@@ -64,6 +68,12 @@ class Case:
         if not self.has_walls:
             found.pop(WALL_COMPLIANCE, None)
         return found
+
+    @property
+    def answer(self) -> Footing | None:
+        """The least trusted footing of areas or snap pressures, None where there are none."""
+        each = (self._footing(key, value) for key, found in self.answers.items() for value in found)
+        return max(each, key=_gravity, default=None)
 
     def _footing(self, key: str, value: Value) -> Footing:
         number = of_design(value.numbers, self.place)
@@ -132,13 +142,17 @@ class Case:
 
     def known_error(self, output: Output, *keys: str) -> str:
         """What the first file behind these values knows of an output's error; empty if none."""
-        for footing in (self.footings[key] for key in keys if key in self.footings):
-            file = footing.calibration
-            if file is None or self.lacks_walls_of(file):
-                continue
-            if (known := file.known_errors.get(output.key)) is not None:
-                return f"{known.text}, against {known.against}{self.elsewhere(footing.key)}"
-        return ""
+        footings = (self.footings[key] for key in keys if key in self.footings)
+        return next(filter(None, (self.known_by(output, footing) for footing in footings)), "")
+
+    def known_by(self, output: Output, footing: Footing) -> str:
+        """What the file behind one value knows of an output's error; empty if nothing."""
+        file = footing.calibration
+        if file is None or self.lacks_walls_of(file) or output.key not in file.known_errors:
+            return ""
+        known = file.known_errors[output.key]
+        elsewhere = ELSEWHERE if footing.origin in MOVED else ""
+        return f"{known.text}, against {known.against}{elsewhere}"
 
     def lacks_walls_of(self, file: Calibration) -> bool:
         """Whether a file's values were fitted beside walls that this finger does not take from it.
@@ -179,7 +193,7 @@ def _parts(key: str, value: Value) -> Iterator[Indices]:
 
 def _are_study_s(key: str, numbers: Array) -> Flags:
     """Whether values are those of the study's finger."""
-    return agree(numbers, np.array([STUDY.get(KEYS[key], np.nan)]))
+    return agree(numbers, np.array([STUDY.get(KEYS.get(key, key), np.nan)]))
 
 
 def _basis(key: str, number: float, origin: Origin, *, is_of_file: bool) -> Basis:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.curve import Spline
@@ -35,6 +37,14 @@ class Pressure:
     snap_pressure: Array | None
     shape: Spline | None = None
     history: History | None = None
+
+    @property
+    def units_by_line(self) -> dict[str, list[int]]:
+        """Units of each line, counted from 1."""
+        return {
+            line: [1 + int(unit) for unit in np.flatnonzero(self.line_of == place)]
+            for place, line in enumerate(self.lines)
+        }
 
     def take_lanes(self, index: Indices) -> "Pressure":
         """The same of some designs."""

@@ -14,6 +14,7 @@ from dpgcli.design.lines import PRESSURE
 from dpgcli.design.problems import Issue, Problems
 from dpgcli.design.rules import Derivation, Value, all_by, check_possible
 from dpgcli.design.scene import ORIGINS, Origin
+from dpgcli.design.volumes import area_rule
 from dpgcli.text import KeyPath
 
 AREA, SNAP = "effective_area_mm2", "snap_pressure_MPa"
@@ -24,7 +25,7 @@ SNAP_PRESSURE = Derivation(
     "E t^2.5 h^1.2 (finite-element scaling)",
     geometry.dome_origin,
 )
-ASSUMED = "no area or snap pressure is given: that of finite elements"
+ASSUMED = "that of finite elements (none is given, nor an area)"
 Pairs = list[tuple[UnitGroup, Value]]
 Part = tuple[UnitGroup, Sizes]
 
@@ -76,9 +77,12 @@ def _paths(given: GivenPressure, key: str) -> Iterator[KeyPath]:
 def _snap(group: UnitGroup, own: Sizes, domes: Domes, problems: Problems) -> Value:
     """The snap pressure: given, of the dome that was sampled, or assumed."""
     if SNAP in own:
-        return all_by(own[SNAP], Origin.GIVEN, "as given")
-    value = _sampled(group, domes) or _assumed(group)
-    check_possible(SNAP_PRESSURE, group, value, problems)
+        value = all_by(own[SNAP], Origin.GIVEN, "as given")
+    else:
+        value = _sampled(group, domes) or _assumed(group)
+        check_possible(SNAP_PRESSURE, group, value, problems)
+    if shape := area_rule(domes):
+        return replace(value, rules=tuple(f"{rule}; {shape}" for rule in value.rules))
     return value
 
 

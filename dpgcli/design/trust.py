@@ -32,6 +32,8 @@ ASSUMED_BARS = "the stiffest way of a straight finger is that of its bars, k_L/n
 ASSUMED_AREA = (
     "a dome's area is assumed: the published snap force over finite elements' snap pressure"
 )
+ASSUMED_SNAP = "the snap pressure is assumed: that of finite elements of the study's dome"
+SAY_SNAP = "say pressure.snap_pressure_MPa, or effective_area_mm2, as measured"
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
 WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
@@ -168,6 +170,19 @@ def _axial(case: Case) -> Trust:
 
 
 def _pressures(case: Case) -> Trust:
+    answer = case.answer
+    if answer is None:
+        return _unasked_pressures(case)
+    if answer.basis is Basis.ASSUMED:
+        doubt = ASSUMED_AREA if case.domes.calibration is None else ASSUMED_SNAP
+        found = Trust(Output.PRESSURES, Basis.ASSUMED, UNKNOWN, str(answer))
+        return replace(found, doubt=doubt, instead=SAY_SNAP)
+    known = case.known_by(Output.PRESSURES, answer) or UNKNOWN
+    return _checked(Trust(Output.PRESSURES, answer.basis, known, str(answer)), answer)
+
+
+def _unasked_pressures(case: Case) -> Trust:
+    """What pressures would rest on if the spec had any."""
     spring, curve = case.footings[BISTABLE_STIFFNESS.key], case.domes.calibration
     if curve is None:
         found = Trust(Output.PRESSURES, Basis.ASSUMED, UNKNOWN, ASSUMED_AREA)

@@ -102,6 +102,8 @@ def bistable_summary(found: BistableFit, choice: BistableOptions) -> Iterator[st
     yield f"opening = {found.factor:.5g} travel, {how} (assumed, not fitted)"
     if wells:
         yield f"travel at the inverted well: {', '.join(wells)}"
+    if found.snap_pressure is not None:
+        yield f"snap pressure: {found.snap_pressure:.4g} MPa, the largest before the dome snapped"
     if choice.opening.rule is Rule.STROKE and not math.isnan(well):
         linearity, stroke = found.fit.values[1:]
         yield (

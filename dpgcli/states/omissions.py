@@ -23,7 +23,10 @@ def omissions(
     """Omitted terms, unknowns and solves of a scene."""
     finger = units.finger
     n = finger.n_units
-    left_out = [Omission("loads, pressure and contact", "the spec has none")]
+    what = "loads, pressure and contact" if scene.pressure is None else "loads and contact"
+    left_out = [Omission(what, "the spec has none")]
+    if scene.pressure is not None:
+        left_out.append(Omission("pressure", "states are those at 0 MPa"))
     if not finger.has_walls:
         left_out.append(Omission(f"walls and {n} unknowns of them", "the walls are rigid"))
     if finger.is_rigid:

@@ -45,6 +45,42 @@ def test_a_dome_as_by_its_command(printed: Rows, folder: Path) -> None:
     assert any(line.startswith("opening = 0.25533 travel") for line in fit.summary)
 
 
+def test_a_dome_s_pressures_are_kept(folder: Path) -> None:
+    fit = dpg.fit_bistable(DOME, travel_to_opening="stroke:3.5", geometry=SIZES)
+    curve, data = fit.calibration.curve, pd.read_csv(DOME, comment="#")
+    np.testing.assert_allclose(curve.pressure_MPa, data.pressure_MPa, rtol=1e-12)
+    assert curve.volume_mm3 is None
+    assert curve.snap_pressure_MPa == data.pressure_MPa[:40].max()
+    assert "snap pressure: 0.1495 MPa, the largest before the dome snapped" in fit.summary
+    without = data.drop(columns="pressure_MPa")
+    plain = dpg.fit_bistable(without, travel_to_opening="stroke:3.5", geometry=SIZES)
+    plain.save(folder / "plain.yaml")
+    assert "MPa:" not in (folder / "plain.yaml").read_text().replace("elastic_modulus_MPa:", "")
+
+
+def test_a_dynamic_dome_s_pressures_and_volumes_are_kept() -> None:
+    data = pd.read_csv(DYNAMIC, comment="#")
+    data["volume_mm3"] = 90.0 * data.pole_travel_mm
+    options = {"travel_to_opening": "stroke:3.5", "branches": "quasi-static"}
+    curve = dpg.fit_bistable(data, **options).calibration.curve
+    lengths = {len(v) for v in (curve.travel_mm, curve.pressure_MPa, curve.volume_mm3)}
+    assert len(lengths) == 1
+    np.testing.assert_allclose(curve.volume_mm3, 90.0 * np.array(curve.travel_mm), rtol=1e-9)
+    assert curve.snap_pressure_MPa == pytest.approx(0.151, rel=0.012)
+
+
+def test_one_branch_keeps_the_snap_pressure_of_the_whole() -> None:
+    """Its curve may be that of the way back; the dome has snapped on the way there."""
+    travel = np.concatenate((np.linspace(0.0, 14.0, 57), np.linspace(14.0, 0.0, 57)[1:]))
+    pressure = 0.15 * travel * (travel - 13.0) * (travel - 7.0) / 110.0
+    energy = 0.02 * travel**2 * (travel - 13.0) ** 2 + 0.1 * travel**2
+    data = {"travel_mm": travel, "energy_mJ": energy, "pressure_MPa": pressure}
+    for branch in ("loading", "unloading"):
+        fit = dpg.fit_bistable(data, travel_to_opening="equal", branches=branch)
+        snap = fit.calibration.curve.snap_pressure_MPa
+        assert snap == pytest.approx(pressure[travel < 7.0].max(), rel=1e-9)
+
+
 def test_a_calibration_that_is_not_saved_serves_a_spec(study: dict[str, Any]) -> None:
     fit = dpg.fit_bistable(DOME, travel_to_opening="stroke:3.5", geometry=SIZES)
     lattice = {k: v for k, v in study["finger"]["lattice"].items() if k not in fit.values}

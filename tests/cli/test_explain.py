@@ -57,6 +57,21 @@ def test_the_text_says_the_same(call: Call, arguments: tuple[str, ...]) -> None:
     assert all(source["key"] in text for source in plan["sources"])
 
 
+def test_pressure_is_left_out_of_states(call: Call) -> None:
+    """Lines, and what their pressures rest on, are said all the same."""
+    left_out = facts(call, "three_unit.yaml")["left_out"]
+    assert "loads, pressure and contact" in [part["what"] for part in left_out]
+    setting = ("-s", "pressure={lines: {A: 1-2, B: 3}, snap_pressure_MPa: 0.16}")
+    plan = facts(call, "three_unit.yaml", *setting)
+    assert [part["what"] for part in plan["left_out"]][:2] == ["loads and contact", "pressure"]
+    assert plan["pressure_lines"] == {"A": [1, 2], "B": [3]}
+    (snap,) = (source for source in plan["sources"] if source["key"] == "snap_pressure_MPa")
+    assert (snap["value"], snap["units"], snap["origin"]) == (0.16, "1-3", "given")
+    text = call("explain", "three_unit.yaml", *setting).stdout
+    assert "  pressure lines  A (units 1-2), B (unit 3)\n" in text
+    assert facts(call, "three_unit.yaml")["pressure_lines"] is None
+
+
 def test_rigid_bars_are_left_out_by_name(call: Call) -> None:
     plan = facts(call, "three_unit.yaml", *RIGID)
     assert plan["terms"] == ["bistable", "hinge"]

@@ -281,6 +281,60 @@ def test_gaps_and_points_of_a_curve_fit_together(
     assert f"curve.{said}" in problem
 
 
+MEASURED = """\
+  pressure_MPa: [0, 0.15, null]
+  volume_mm3: [null, 30.5, 400]
+  snap_pressure_MPa: 0.15
+"""
+
+
+def with_measured(text: str) -> str:
+    return WHOLE.replace("  unsampled_mm: [[1, 14]]\n", f"  unsampled_mm: [[1, 14]]\n{text}")
+
+
+def test_a_curve_keeps_what_was_measured_beside_it(path: Path) -> None:
+    found = read(path, with_measured(MEASURED))
+    again = path.with_name("again.yaml")
+    write_calibration(again, found)
+    assert read_calibration(again) == found
+    curve = found.known.curve
+    assert curve is not None
+    assert (curve.pressure, curve.volume) == ([0.0, 0.15, None], [None, 30.5, 400.0])
+    assert curve.snap_pressure == 0.15
+
+
+def test_a_curve_without_is_written_as_before(path: Path) -> None:
+    found = read(path, WHOLE)
+    write_calibration(path, found)
+    written = path.read_text(encoding="utf-8")
+    assert not any(key in written for key in ("pressure_MPa", "volume_mm3"))
+    assert found.known.curve is not None
+    assert found.known.curve.snap_pressure is None
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("[0, 0.15, null]", "[0, 0.15]", "curve.pressure_MPa: expected 3 numbers, as travels, fou"),
+        ("[null, 30.5, 400]", "[30.5, 400]", "curve.volume_mm3: expected 3 numbers, as travels"),
+        ("[0, 0.15, null]", "[0, .nan, 1]", "curve.pressure_MPa.1: expected numbers in MPa, one"),
+        ("[0, 0.15, null]", "[0, x, 1]", "curve.pressure_MPa.1: expected numbers in MPa, one"),
+        ("[0, 0.15, null]", "0.15", "curve.pressure_MPa: expected numbers in MPa, one for each"),
+        (
+            "pressure_MPa: 0.15",
+            "pressure_MPa: 0",
+            "curve.snap_pressure_MPa: expected a pressure > 0",
+        ),
+        ("pressure_MPa: 0.15", "pressure_MPa:", "curve.snap_pressure_MPa: expected a pressure > 0"),
+        ("volume_mm3", "volume_mm", "curve.volume_mm: expected a known key"),
+    ],
+)
+def test_mistakes_beside_a_curve(path: Path, before: str, after: str, said: str) -> None:
+    assert before in MEASURED
+    (problem,) = problems(path, with_measured(MEASURED.replace(before, after)))
+    assert said in problem
+
+
 def test_a_correlation_needs_the_order_of_its_values(path: Path) -> None:
     (first,) = (f"{line}\n" for line in WHOLE.splitlines() if line.startswith("  bistable"))
     turned = WHOLE.replace(first, "").replace("  stroke_mm: {value: 3.5}\n", first)

@@ -71,6 +71,7 @@ NO_SEAL = (
     "none",
     "cut off or edited: make it again; an edited one does not say in made_by that it has the line",
 )
+MEASURED = ("pressure_MPa", "volume_mm3")  # of a curve, each null where it was not
 SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
 
@@ -132,7 +133,8 @@ def calibration_in(document: Document) -> Calibration:
         problems = [_problem(document, e) for e in error.errors(include_url=False)]
         raise SpecError(in_order([*document.problems, *problems])) from None
     problems = [document.problem(*i) for i in (*_issues(found), *_order_issues(found, document))]
-    problems += [document.problem(path, _expected(path), "nothing") for path in document.empty()]
+    empty = (path for path in document.empty() if path[:1] != ("curve",) or path[1] not in MEASURED)
+    problems += [document.problem(path, _expected(path), "nothing") for path in empty]
     if problems or document.problems:
         raise SpecError(in_order([*document.problems, *problems]))
     return found
@@ -251,6 +253,11 @@ def _curve_issues(curve: Curve) -> Iterator[Issue]:
     path: KeyPath = ("curve", "travel_mm")
     if len(curve.travel_mm) != len(curve.energy_mJ):
         yield path, f"{len(curve.energy_mJ)} numbers, as energies", str(len(curve.travel_mm))
+    for key in MEASURED:
+        measured = getattr(curve, key)
+        if measured is not None and len(measured) != len(curve.travel_mm):
+            expected = f"{len(curve.travel_mm)} numbers, as travels"
+            yield ("curve", key), expected, str(len(measured))
     travels = np.array(curve.travel_mm)
     least = SMALLEST_STEP * np.ptp(travels)
     for index in np.flatnonzero(np.diff(travels) <= least)[:1].tolist():

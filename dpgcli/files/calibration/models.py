@@ -69,6 +69,7 @@ class Values(Section):
     wall_compliance_mm_per_N: FittedNotNegative | None = None
 
 
+Measurements = Annotated[list[Bounded | None], Field(min_length=2)]
 Stretch = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -87,12 +88,29 @@ class Curve(Section):
     unsampled_mm: list[Stretch] = Field(
         default_factory=list, description="pairs of travels in mm between which nothing is known"
     )
+    pressure_MPa: Measurements | None = Field(
+        default=None, description="numbers in MPa, one for each travel, null where none is known"
+    )
+    volume_mm3: Measurements | None = Field(
+        default=None,
+        description="numbers in mm3 that the dome has swept, one for each travel, null where none "
+        "is known",
+    )
+    snap_pressure_MPa: Positive | None = Field(
+        default=None, description="a pressure > 0 in MPa: the largest before the dome snapped"
+    )
 
     @property
     def known(self) -> calibrations.DomeCurve:
         """The value that designs are resolved with."""
         return calibrations.DomeCurve(
-            self.travel_mm, self.energy_mJ, self.opening_per_travel, self.unsampled_mm
+            self.travel_mm,
+            self.energy_mJ,
+            self.opening_per_travel,
+            self.unsampled_mm,
+            self.pressure_MPa,
+            self.volume_mm3,
+            self.snap_pressure_MPa,
         )
 
 

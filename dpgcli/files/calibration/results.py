@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import BistableFit, BistableOptions
 from dpgcli.calibration.choices import Branches, GridMethod, Quantity
 from dpgcli.calibration.finger import FingerFit
@@ -146,7 +147,14 @@ def curve_of(found: BistableFit) -> Curve | None:
         energy_mJ=energy.tolist(),
         opening_per_travel=found.factor,
         unsampled_mm=[list(gap) for gap in found.gaps],
+        pressure_MPa=_listed(found.beside.get("pressure")),
+        volume_mm3=_listed(found.beside.get("volume")),
+        snap_pressure_MPa=found.snap_pressure,
     )
+
+
+def _listed(values: Array | None) -> list[float | None] | None:
+    return None if values is None else [*values.tolist()]
 
 
 def grid_of(law: GridLaw) -> Grid:

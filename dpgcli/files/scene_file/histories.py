@@ -15,6 +15,7 @@ from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.units import OWN, factor_of, listed, name_and_unit
 from dpgcli.files.yaml_file import MAX_NODES, Document
+from dpgcli.text import dotted
 
 MOST_NUMBERS = MAX_NODES * 9 // 10  # as many as a spec holds beside the rest of it
 FEWEST_ROWS = 2
@@ -45,7 +46,7 @@ def with_history(document: Document, folder: Path) -> Document:
             problems = (*problems, wrong)
     except SpecError as error:
         problems = (*problems, *error.problems)
-    embedded = changed(document, {".".join(HISTORY): said})
+    embedded = changed(document, {dotted(HISTORY): said})
     return replace(embedded, problems=problems, files=(*document.files, path))
 
 

@@ -51,7 +51,7 @@ def _units(said: object) -> object:
     if not all(isinstance(part, int | str) and not isinstance(part, bool) for part in parts):
         raise ValueError("no units")
     texts = [text.strip() for part in parts for text in str(part).split(",")]
-    if not all(map(unit_range, texts)):
+    if not texts or not all(map(unit_range, texts)):
         raise ValueError("no units")
     return ",".join(text.replace(" ", "") for text in texts)
 
@@ -65,33 +65,31 @@ def _history(said: object) -> object:
     return None if isinstance(said, str) else said
 
 
-UnitList = Annotated[
-    str,
-    BeforeValidator(_units),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "string", "pattern": f"^{UNIT_LIST}$"},
-                {"type": "integer", "minimum": 1},
-                {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1},
-            ]
-        }
-    ),
+UNITS_SCHEMA = {
+    "anyOf": [
+        {"type": "string", "pattern": f"^{UNIT_LIST}$"},
+        {"type": "integer", "minimum": 1},
+        {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1},
+    ]
+}
+RAMP_SCHEMA = {
+    "anyOf": [
+        {"type": "string"},
+        {"type": "array", "items": {"type": "number"}, "minItems": 2},
+    ]
+}
+HISTORY_SCHEMA = {
+    "anyOf": [
+        {"type": "object", "additionalProperties": RAMP_SCHEMA},
+        {"type": "string"},
+        {"type": "null"},
+    ]
+}
+UnitList = Annotated[str, BeforeValidator(_units), WithJsonSchema(UNITS_SCHEMA)]
+Ramp = Annotated[list[Bounded], Field(min_length=2), BeforeValidator(_pressures)]
+Pressures = Annotated[
+    dict[str, Ramp] | None, BeforeValidator(_history), WithJsonSchema(HISTORY_SCHEMA)
 ]
-Ramp = Annotated[
-    list[Bounded],
-    Field(min_length=2),
-    BeforeValidator(_pressures),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "string"},
-                {"type": "array", "items": {"type": "number"}, "minItems": 2},
-            ]
-        }
-    ),
-]
-Pressures = Annotated[dict[str, Ramp] | None, BeforeValidator(_history)]
 
 
 class UnitPressure(Section):

@@ -1,13 +1,19 @@
 """From a spec to a scene, and what is wrong between the keys of its data."""
 
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
+from pydantic import ValidationError
+
 from dpgcli.design.dimensions import MAX_UNITS, range_issues
+from dpgcli.design.lines import line_issues
 from dpgcli.design.problems import Issue
 from dpgcli.design.scene import Scene
 from dpgcli.errors import SpecError
 from dpgcli.files.places import Location, located
 from dpgcli.files.scene_file.models import Spec
+from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.text import dotted
 
 
@@ -26,8 +32,19 @@ def early_issues(data: Any) -> list[Issue]:
     if not isinstance(finger, dict):
         return []
     overrides, units = finger.get("overrides"), finger.get("units")
-    if not isinstance(overrides, dict):
-        return []
-    if not isinstance(units, int) or isinstance(units, bool) or not 1 <= units <= MAX_UNITS:
-        units = MAX_UNITS  # the largest allowed one as long as it is not known
-    return range_issues(units, map(str, overrides))
+    known: int | None = None
+    if isinstance(units, int) and not isinstance(units, bool) and 1 <= units <= MAX_UNITS:
+        known = units
+    largest = known or MAX_UNITS  # the largest allowed one as long as it is not known
+    found = range_issues(largest, map(str, overrides)) if isinstance(overrides, dict) else []
+    return [*found, *(_line_issues(data.get("pressure"), known) if known else ())]
+
+
+def _line_issues(pressure: Any, n_units: int) -> Iterator[Issue]:
+    """What is wrong between lines and history, as far as they are right by themselves."""
+    said = pressure if isinstance(pressure, dict) else {}
+    parts = {key: said.get(key) for key in ("lines", "history")}
+    for kept in (parts, {**parts, "history": None}):
+        with suppress(ValidationError):
+            yield from line_issues(PressureSpec.model_validate(kept).known, n_units)
+            return

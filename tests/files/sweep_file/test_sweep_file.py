@@ -187,6 +187,27 @@ def test_gripper_keys_need_a_gripper(read: Read) -> None:
     assert "gripper" in found[0]
 
 
+PRESSURES = ("effective_area_mm2", "snap_pressure_MPa", "overrides.2.snap_pressure_MPa")
+
+
+@pytest.mark.parametrize("key", PRESSURES)
+def test_pressure_keys_need_pressure(read: Read, tmp_path: Path, key: str) -> None:
+    axis = f"{{key: pressure.{key}, values: [1, 2]}}"
+    (problem,) = problems(read, axis)
+    assert problem.endswith("(the base has no pressure)")
+    with (tmp_path / "base.yaml").open("a", encoding="utf-8") as base:
+        base.write("pressure: {}\n")
+    assert designs(read(axis)) == {f"pressure.{key}": [1, 2]}
+
+
+@pytest.mark.parametrize("key", ["lines", "lines.A", "history", "history.A", "overrides.2"])
+def test_lines_and_histories_are_no_numbers(read: Read, tmp_path: Path, key: str) -> None:
+    with (tmp_path / "base.yaml").open("a", encoding="utf-8") as base:
+        base.write("pressure: {lines: {A: 1-3}, history: {A: 0:1}}\n")
+    (problem,) = problems(read, f"{{key: pressure.{key}, values: [1, 2]}}")
+    assert problem.startswith("3:6: space.0.key: expected ")
+
+
 ZERO_LOG = "{from: 0, to: 1, scale: log}"
 WRONG_AXES = [
     (f"{{key: {HEIGHT}}}", "3:5: space.0: expected exactly one of values, linear, log, paired"),
