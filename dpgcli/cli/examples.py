@@ -9,6 +9,7 @@ EXAMPLES = {
         "dpg predict finger.yaml --pattern '1*' --set finger.geometry.unit_separation_mm=2.5",
         "dpg predict finger.yaml --output states.parquet --plot states.svg",
         "dpg predict finger.yaml --format csv > states.csv",
+        "dpg predict finger.yaml --columns barriers",
     ),
     "explain": (
         "dpg explain finger.yaml",
@@ -37,6 +38,10 @@ EXAMPLES = {
     "stress": (
         "dpg stress finger.yaml",
         "dpg stress --only crossed --format csv > cases.csv",
+    ),
+    "landscape": (
+        "dpg landscape finger.yaml --from 000 --to 111",
+        "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",

@@ -17,7 +17,7 @@ for _library in ("OPENBLAS", "MKL", "OMP"):
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
-    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
+    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare", "landscape"),
     *("stress", "validate", "init", "schema", "fit", "fe", "help"),
 )
 

@@ -44,6 +44,12 @@ class Equilibrium:
     curvature: Array
     iterations: Indices
 
+    @property
+    def energy(self) -> Array:
+        """All kinds of energy together."""
+        first, *rest = self.energies.values()
+        return sum(rest, start=first)
+
     def with_lanes(self, lanes: Indices, others: "Equilibrium", taken: Indices) -> "Equilibrium":
         """The equilibria with `lanes` replaced by those at `taken` of others of this potential."""
 

@@ -69,9 +69,7 @@ def barriers(
         units.take_lanes(states), formulate, settled.inverted[:, states], tolerance
     )
     at = saddles(flips)
-    first, *rest = settled.equilibrium.energies.values()
-    energy = sum(rest, start=first)[states]
-    found.energy[:, states] = at.energy[places] - energy
+    found.energy[:, states] = at.energy[places] - settled.equilibrium.energy[states]
     found.status[:, states] = at.status[places]
     return found
 

@@ -91,6 +91,11 @@ class Flips:
         """Of the spring of the dome that flips, mm, (lane,)."""
         return self.of_unit(self.potential.coordinates.springs(coordinates).extension)
 
+    def own_energy(self, extension: Array) -> Array:
+        """Of the dome that flips, by the extension of its spring, attached to nothing: mJ."""
+        finger = self.units.finger
+        return self.of_unit(finger.law.pulling.response(extension, finger.domes).energy)
+
     def take(self, index: Indices) -> "Flips":
         """Some of them; one may repeat."""
         units = self.units.take_lanes(index)
@@ -178,14 +183,13 @@ def _alone(flips: Flips) -> tuple[Saddles, Indices]:
     """Domes that only push and are apart from their neighbors at their tops; which those are."""
     ground = flips.settled(flips.lower)
     finger = flips.units.finger
-    top = finger.law.rests(finger.domes).top
-    own = flips.of_unit(finger.law.pulling.response(top, finger.domes).energy)
-    lanes = np.flatnonzero(flips.extension(ground.equilibrium.coordinates) > flips.of_unit(top))
+    top = flips.of_unit(finger.law.rests(finger.domes).top)
+    lanes = np.flatnonzero(flips.extension(ground.equilibrium.coordinates) > top)
     start = ground.equilibrium.coordinates[:, lanes]
     if not len(lanes):
         return Saddles.none(len(start), 0), lanes
     few = flips.take(lanes)
-    energy = _energy(ground.equilibrium) + own
+    energy = ground.equilibrium.energy + flips.own_energy(top)
     is_fine = is_state(ground)[lanes] & is_state(few.settled_from(few.upper, start))
     return _judged(energy[lanes], start, is_fine, is_apart=True), lanes
 
@@ -194,11 +198,6 @@ def _judged(energy: Array, coordinates: Array, is_fine: Flags, *, is_apart: bool
     status = np.where(is_fine, SaddleStatus.CERTIFIED, SaddleStatus.NOT_FOUND).astype(np.uint8)
     where = np.where(is_fine, coordinates, np.nan)
     return Saddles(np.where(is_fine, energy, np.nan), where, status, np.full(len(status), is_apart))
-
-
-def _energy(equilibrium: Equilibrium) -> Array:
-    first, *rest = equilibrium.energies.values()
-    return sum(rest, start=first)
 
 
 def _at_barrier(flips: Flips) -> Array:
@@ -242,7 +241,7 @@ def _certified(flips: Flips, start: Array) -> Saddles:
     is_saddle &= ~flips.potential.coordinates.springs(there.coordinates).is_folded
     lanes = np.flatnonzero(is_saddle)
     is_saddle[lanes] = _parts(flips.take(lanes), there, lanes)
-    return _judged(_energy(there), there.coordinates, is_saddle, is_apart=False)
+    return _judged(there.energy, there.coordinates, is_saddle, is_apart=False)
 
 
 def _parts(flips: Flips, there: Equilibrium, lanes: Indices) -> Flags:
@@ -298,16 +297,21 @@ class HeldPath:
 
 
 def held_path(flips: Flips, first: Array, last: Array, shares: Array) -> HeldPath:
-    """The least energies with the dome held at shares, (place,), of the way between two shapes."""
+    """The least energies with the dome held at shares, (place,), of the way between two shapes.
+
+    A dome that only pushes is in touch all the way to its own well, and stays in that.
+    """
     n = len(flips.unit)
     many = flips.take(np.tile(np.arange(n), len(shares)))
     share = np.repeat(shares, n)
     start, end = (np.tile(coordinates, len(shares)) for coordinates in (first, last))
     target = (1.0 - share) * many.extension(start) + share * many.extension(end)
     there = held(many, (1.0 - share) * start + share * end, target)
+    extension, energy = many.extension(there), many.potential.evaluate(there).energy
+    finger = many.units.finger
+    if not pulls(finger):
+        acting = finger.law.response(extension, finger.domes).energy
+        extension = np.minimum(extension, many.of_unit(finger.law.touching(finger.domes).highest))
+        energy = energy - many.of_unit(acting) + many.own_energy(extension)
     shape = (len(shares), n)
-    return HeldPath(
-        many.extension(there).reshape(shape),
-        many.potential.evaluate(there).energy.reshape(shape),
-        there.reshape(-1, *shape),
-    )
+    return HeldPath(extension.reshape(shape), energy.reshape(shape), there.reshape(-1, *shape))

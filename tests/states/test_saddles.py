@@ -282,7 +282,11 @@ def test_a_pattern_that_is_no_state_has_no_barriers() -> None:
 
 
 def test_equal_units_tie_and_a_weaker_one_does_not(all_patterns: Callable[[int], Flags]) -> None:
-    for stroke, expected in ((3.5, "1,2,3"), (3.5 * (1.0 + 1e-4), "1,3"), (3.5 * (1.0 - 1e-4), "2")):
+    for stroke, expected in (
+        (3.5, "1,2,3"),
+        (3.5 * (1.0 + 1e-4), "1,3"),
+        (3.5 * (1.0 - 1e-4), "2"),
+    ):
         finger = uniform_finger(3, **STUDY, linear_stiffness=1e4)
         finger = finger.changed(stroke=np.array([[3.5], [stroke], [3.5]]))
         units = UnitSolutions.of(finger)
