@@ -28,10 +28,12 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
+    from dpgcli.api.landscape import landscape
     from dpgcli.api.predict import predict
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.transitions import transitions
     from dpgcli.api.validate import validate
     from dpgcli.errors import (
         ActuationError,
@@ -64,12 +66,14 @@ __all__ = [
     "fit_grid",
     "fit_hinge",
     "fit_unit",
+    "landscape",
     "merge",
     "predict",
     "read_calibration",
     "report",
     "stress",
     "sweep",
+    "transitions",
     "uniform_finger",
     "validate",
 ]
@@ -85,12 +89,14 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
+    "landscape": "api.landscape",
     "merge": "api.sweep",
     "predict": "api.predict",
     "read_calibration": "files.calibration",
     "report": "api.report",
     "stress": "api.stress",
     "sweep": "api.sweep",
+    "transitions": "api.transitions",
     "uniform_finger": "mechanics.finger",
     "validate": "api.validate",
 }
