@@ -130,7 +130,7 @@ class ActuateResult:
             f"final pattern {self.pattern} at {self._pressures(self.way.final.pressure[:, 0])}, "
             f"{found.text} (residual {found.residual:.1e} N)"
         )
-        yield f"{counted(len(events), 'event')}, {lost:.5g} mJ lost in them"
+        yield counted(len(events), "event") + (f", {lost:.5g} mJ lost in them" if events else "")
         if n_tied := sum(bool(event.tied) for event in events):
             which = f"{n_tied:,} of {counted(len(events), 'event')}"
             yield f"ties in {which}: the model does not say which of the units goes first"
