@@ -8,7 +8,7 @@ from dpgcli.actuation.pressed import Pressed
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.design.pressure import Pressure
 from dpgcli.errors import UsageError
-from dpgcli.files.scene_file import checked, scene_of
+from dpgcli.files.scene_file import checked, scene_of, with_files
 from dpgcli.files.scene_file.settings import changed
 from dpgcli.states.units import UnitSolutions
 
@@ -34,7 +34,7 @@ def pressed_input(spec: SpecInput, settings: Settings = ()) -> PressedInput:
     given = scene_input(spec, settings)
     if given.scene.pressure is None and given.document is not None:
         document = changed(given.document, ONE_LINE)  # read once: it may be standard input
-        known = checked(document)
+        known = checked(with_files(document, given.folder))
         given = replace(given, scene=scene_of(known), spec=known, document=document)
     pressure = given.scene.pressure
     if pressure is None:
