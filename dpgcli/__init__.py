@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from dpgcli.api.actuate import actuate
     from dpgcli.api.bench import bench
     from dpgcli.api.check import check
     from dpgcli.api.compare import compare
@@ -32,8 +33,10 @@ if TYPE_CHECKING:
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.transitions import transitions
     from dpgcli.api.validate import validate
     from dpgcli.errors import (
+        ActuationError,
         DpgError,
         FitError,
         NothingSelectedError,
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     from dpgcli.mechanics.finger import uniform_finger
 
 __all__ = [
+    "ActuationError",
     "DpgError",
     "FitError",
     "NothingSelectedError",
@@ -52,6 +56,7 @@ __all__ = [
     "SpecError",
     "UsageError",
     "__version__",
+    "actuate",
     "bench",
     "check",
     "compare",
@@ -68,11 +73,13 @@ __all__ = [
     "report",
     "stress",
     "sweep",
+    "transitions",
     "uniform_finger",
     "validate",
 ]
 
 _HOMES = {
+    "actuate": "api.actuate",
     "bench": "api.bench",
     "check": "api.check",
     "compare": "api.compare",
@@ -89,6 +96,7 @@ _HOMES = {
     "report": "api.report",
     "stress": "api.stress",
     "sweep": "api.sweep",
+    "transitions": "api.transitions",
     "uniform_finger": "mechanics.finger",
     "validate": "api.validate",
 }

@@ -17,8 +17,9 @@ for _library in ("OPENBLAS", "MKL", "OMP"):
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
-    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare", "landscape"),
-    *("stress", "validate", "init", "schema", "fit", "fe", "help"),
+    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
+    *("stress", "actuate", "transitions", "landscape", "validate", "init", "schema", "fit"),
+    *("fe", "help"),
 )
 
 

@@ -114,6 +114,19 @@ def minimize(
     return _equilibrium(potential, final, potential.evaluate(final), iterations)
 
 
+def looked_at(potential: Potential[Coordinates], coordinates: Array) -> Equilibrium:
+    """What there is at coordinates, (size, batch), wherever they are: no step is taken.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> bent = looked_at(chain_potential(uniform_finger(1, **STUDY)), np.array([[0.2], [0.0]]))
+    >>> bool(bent.residual[0] > 1.0), bent.iterations.tolist()
+    (True, [0])
+    """
+    evaluation = potential.evaluate(coordinates)
+    return _equilibrium(potential, coordinates, evaluation, np.zeros(coordinates.shape[1], int))
+
+
 @in_lanes
 def stationary(
     potential: Potential[Coordinates], guess: Array, tolerance: float, max_iterations: int = 40

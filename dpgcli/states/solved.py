@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
-from dpgcli.mechanics.coordinates import Stations
+from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
 from dpgcli.states.barriers import Barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
@@ -57,6 +57,15 @@ class Surroundings:
 
 
 ALONE = Surroundings()
+
+
+def all_nodes(system: FingerCoordinates, coordinates: Array) -> Stations:
+    """Positions of all nodes, the clamped ones first, mm, each (unit + 1, batch)."""
+    stations = system.stations(coordinates)
+    origin = np.zeros_like(stations.base_x[:1])
+    clamped = (origin, origin, origin, origin + system.finger.segment_height)
+    pairs = zip(clamped, stations, strict=True)
+    return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
 
 
 @dataclass(frozen=True)
@@ -116,11 +125,7 @@ class SolvedFingers(SolvedStates):
     def nodes(self) -> Stations:
         """Positions of all nodes, the clamped ones first, mm, each (unit + 1, state)."""
         coordinates = self.settled.potential.coordinates
-        stations = coordinates.stations(self.settled.equilibrium.coordinates)
-        origin = np.zeros_like(stations.base_x[:1])
-        clamped = (origin, origin, origin, origin + coordinates.finger.segment_height)
-        pairs = zip(clamped, stations, strict=True)
-        return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
+        return all_nodes(coordinates, self.settled.equilibrium.coordinates)
 
     @cached_property
     def in_gripper(self) -> GripperPose:
