@@ -59,7 +59,8 @@ class Curve(Spline):
     `rests` are the top and the well, where the slope vanishes: the minimum that lies deepest below
     what is on both its sides, and the highest maximum before it; NaN where there is none.
     `branches` are the stretches between the two on which the energy falls, each from its top to its
-    well, the last one first.
+    well, the last one first. A curve that ends while it rises beyond its well goes on rising, at
+    least as stiffly as it did from there on average: the curvature of its end may be noise.
     """
 
     rests: tuple[float, float]
@@ -89,7 +90,12 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     rest: Any = (1, 0.0) if starts_at_rest else "not-a-knot"
     counted = np.subtract(value, value[0] if starts_at_rest else 0.0)
     cubic = CubicSpline(travel, counted, bc_type=(rest, "not-a-knot"))
-    return Curve(np.asarray(travel, float), spline_pieces(cubic), *_rests(cubic))
+    rests, branches = _rests(cubic)
+    pieces = spline_pieces(cubic)
+    end, slope = cubic.x[-1], float(cubic(cubic.x[-1], 1))
+    if slope > 0.0 and rests[1] < end:
+        pieces[1, -1] = max(pieces[1, -1], 0.5 * slope / (end - rests[1]))
+    return Curve(np.asarray(travel, float), pieces, rests, branches)
 
 
 def spline_pieces(cubic: "CubicSpline") -> Array:

@@ -97,3 +97,22 @@ def test_a_curve_from_before_rest_is_counted_from_rest(
 def test_too_few_points_from_rest_on() -> None:
     with pytest.raises(ValueError, match="4 or more increasing"):
         spline((-2.0, -1.0, 0.0, 1.0, 2.0), (4.0, 1.0, 0.0, 1.0, 4.0))
+
+
+def test_a_curve_that_ends_while_it_rises_goes_on_as_stiffly_as_from_its_well() -> None:
+    """Noise in the last points bends the end down; pressure pushes an inverted dome beyond it."""
+    travel = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.2, 5.4, 5.6, 5.7)
+    value = (0.0, 2.0, 4.0, 3.0, 1.5, 1.0, 1.04, 1.16, 1.36, 1.46)
+    curve = spline(travel, value)
+    well, (slope, bend) = curve.rests[1], curve(np.array(5.7))[1:]
+    assert slope > 0.0
+    average = slope / (5.7 - well)
+    assert bend == pytest.approx(average, rel=1e-12)
+    assert curve(np.array(8.0)).slope == pytest.approx(slope + average * 2.3, rel=1e-12)
+    assert curve(np.array(5.7 - 1e-9)).bend < 0.0
+
+
+def test_a_curve_that_ends_stiffer_than_it_rose_goes_on_with_its_own_curvature() -> None:
+    travel = tuple(np.linspace(0.0, 6.0, 13))
+    curve = spline(travel, tuple(np.array(travel) ** 2 * (np.array(travel) - 5.0) ** 2))
+    assert curve(np.array(9.0)).bend == pytest.approx(curve(np.array(6.0 - 1e-9)).bend, rel=1e-6)
