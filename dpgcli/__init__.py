@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
     from dpgcli.api.predict import predict
+    from dpgcli.api.pulses import lookup, pulses
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
@@ -64,8 +65,10 @@ __all__ = [
     "fit_grid",
     "fit_hinge",
     "fit_unit",
+    "lookup",
     "merge",
     "predict",
+    "pulses",
     "read_calibration",
     "report",
     "stress",
@@ -85,8 +88,10 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
+    "lookup": "api.pulses",
     "merge": "api.sweep",
     "predict": "api.predict",
+    "pulses": "api.pulses",
     "read_calibration": "files.calibration",
     "report": "api.report",
     "stress": "api.stress",

@@ -18,7 +18,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
     *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
-    *("stress", "actuate", "validate", "init", "schema", "fit", "fe", "help"),
+    *("stress", "actuate", "pulses", "validate", "init", "schema", "fit", "fe", "help"),
 )
 
 

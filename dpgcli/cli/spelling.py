@@ -5,7 +5,13 @@ from dataclasses import replace
 from dpgcli.errors import Problem, respelled
 
 # where it is not the field's own name
-OPTIONS = {"settings": "--set", "setting": "-s", "patterns": "--pattern", "start": "--from"}
+OPTIONS = {
+    "settings": "--set",
+    "setting": "-s",
+    "patterns": "--pattern",
+    "start": "--from",
+    "target": "--to",
+}
 
 
 def option_of(field: str) -> str:
