@@ -273,7 +273,8 @@ class Pressed:
         is_alone = (ends.outcome == Outcome.ARRIVED) & alone.any(axis=0)
         unit = np.where(is_alone, alone.argmax(axis=0), ends.cell)
         start, left = self._past(family, ends, target - shapes.pressure)
-        tied = np.where(is_alone, alone, left) & (np.arange(len(left))[:, None] != unit)
+        tied = np.where(is_alone, alone, left) | self._meeting(family, ends)
+        tied &= np.arange(len(left))[:, None] != unit
         reason = _reasons(ends, shapes.touching)
         reason = np.where(is_alone, Halt.ALONE, reason)
         is_folded = family.coordinates.springs(ends.coordinates).is_folded
@@ -305,6 +306,17 @@ class Pressed:
             left[:, folds] = np.abs(few.measure(here).value - values) > LEFT * few.scale
         start[:, folds] = here + DISPLACED * ends.onward[:, folds]
         return start, left
+
+    def _meeting(self, family: Family[FingerCoordinates, PressedDomes], ends: Ends) -> Flags:
+        """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
+        law, values = family.law, family.measure(ends.coordinates).value
+        margin = law.margin(values, ends.load)
+        if margin is None or law.touching is None:
+            return np.zeros(values.shape, bool)
+        push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
+        is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
+        near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL
+        return np.asarray(near & is_alike & (ends.outcome == Outcome.EVENT))
 
     def after(self, halted: Halted) -> tuple[Shapes, Flags]:
         """What becomes of shapes that halted, at their pressures; which have come to rest.

@@ -21,6 +21,9 @@ TIP = (
 APERTURE = Column(
     "aperture_mm", "mm", "gap of the inner faces at the tips; < 0: crossed", outputs=SHAPES
 )
+OVERLAP = Column(
+    "fingers_overlap", "", "the fingers overlap: nothing keeps them apart", kind=Kind.FLAG
+)
 HEAD = (
     Column("event", "", "number of the event", kind=Kind.COUNT),
     Column("line", "", "pressure line of the unit that gives rise to it", kind=Kind.TEXT),
@@ -120,7 +123,7 @@ def path_columns(
             for unit in units
         ),
         *TIP,
-        *((APERTURE,) if is_gripper else ()),
+        *((APERTURE, OVERLAP) if is_gripper else ()),
         Column("energy_mJ", "mJ", "energy of the finger", outputs=(Output.ENERGIES,)),
         Column("potential_energy_mJ", "mJ", "the same less p V", outputs=(Output.ENERGIES,)),
         Column("smallest_pivot", "", "of the Hessian, scaled; 0 at a fold", outputs=STIFFNESS),
@@ -144,6 +147,8 @@ def path_rows(way: Travel, readings: Readings, pressure: Pressure, history: Hist
         zip(readings.openings, readings.travels, strict=True), start=1
     ):
         rows |= {f"opening_{unit}_mm": opening, f"travel_{unit}_mm": travelled}
+    if readings.in_gripper is not None:
+        rows["fingers_overlap"] = readings.in_gripper.overlaps
     return (
         rows
         | _tip(readings)

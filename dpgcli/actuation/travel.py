@@ -96,6 +96,9 @@ def travel(
 ) -> Travel:
     """Follow a finger from its shape at rest through pressures, (step, unit), so many times.
 
+    Once a cycle begins in the very shape, to the last bit, in which another one began, the rest is
+    known: it is what has been before.
+
     >>> from dpgcli.actuation.rest import at_rest
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
@@ -108,12 +111,23 @@ def travel(
     [('snap', (0,)), ('reset', (0,))]
     """
     traveler = _Traveler(pressed, start, largest_step)
+    begun: dict[bytes, int] = {}
     for cycle in range(1, n_cycles + 1):
+        traveler.begin()
+        period = cycle - begun.setdefault(_bits(traveler.here), cycle)
+        if period:
+            traveler.repeat(cycle, period)
+            continue
         for step, target in enumerate(history, start=1):
             traveler.go(cycle, step, target[:, None])
             if traveler.reason is not Halt.ARRIVED:
                 return traveler.travel
     return traveler.travel
+
+
+def _bits(shapes: Shapes) -> bytes:
+    parts = shapes.coordinates, shapes.pressure, shapes.inverted, shapes.touching
+    return b"".join(part.tobytes() for part in parts if part is not None)
 
 
 def folded(pressed: Pressed, coordinates: Array) -> Flags:
@@ -140,6 +154,7 @@ class _Traveler:
         self.n_points = 0
         self.events: list[Event] = []
         self.holds: list[int] = []
+        self.marks: list[tuple[int, int, int, int]] = []  # what lay behind as cycles began
         self._pass(start, np.zeros(1))
 
     @property
@@ -147,6 +162,27 @@ class _Traveler:
         """What lies behind."""
         points = _joined(self.behind)
         return Travel(points, tuple(self.events), tuple(self.holds), self.reason, self.pressure)
+
+    def begin(self) -> None:
+        """Begin a cycle."""
+        lists = self.behind, self.events, self.holds
+        self.marks.append((self.n_points, *(len(part) for part in lists)))
+
+    def repeat(self, cycle: int, period: int) -> None:
+        """Do what was done so many cycles ago; that ended where that one did."""
+        points, *starts = self.marks[cycle - 1 - period]
+        _, *stops = self.marks[cycle - period]
+        shift = self.n_points - points
+        behind, events, holds = (slice(*ends) for ends in zip(starts, stops, strict=True))
+        again = [replace(part, cycle=0 * part.cycle + cycle) for part in self.behind[behind]]
+        self.events += [
+            replace(event, before=event.before + shift, after=event.after + shift)
+            for event in self.events[events]
+        ]
+        self.holds += [hold + shift for hold in self.holds[holds]]
+        self.behind += again
+        self.n_points += sum(map(len, again))
+        self.here = again[-1].shapes.take_lanes(np.array([len(again[-1]) - 1]))
 
     def go(self, cycle: int, step: int, target: Array) -> None:
         """Go to pressures, (unit, 1), through all that happens, or as far as that is possible."""
@@ -216,6 +252,8 @@ class _Traveler:
 
         Whether it does not.
         """
+        if not len(share):
+            return True
         is_folded = folded(self.pressed, shapes.coordinates)
         n = int(is_folded.argmax()) if is_folded.any() else len(share)
         cycle, step = (np.full(len(share), count) for count in self.place)

@@ -15,7 +15,15 @@ from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.tables import event_columns, event_rows, path_columns, path_rows
 from dpgcli.actuation.travel import Travel, travel
 from dpgcli.api.histories import GivenHistory, PressureInput, history_input
-from dpgcli.api.inputs import Settings, SpecInput, check_texts, check_whole, path_of, table_path
+from dpgcli.api.inputs import (
+    Settings,
+    SpecInput,
+    check_texts,
+    check_whole,
+    figure_path,
+    path_of,
+    table_path,
+)
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Array, Columns
@@ -28,6 +36,7 @@ from dpgcli.states.solved import Surroundings
 from dpgcli.text import counted, enumerated
 
 MOST_CYCLES = 100_000
+LARGEST_STEP = 0.05  # of a stroke: points near enough for a figure
 LARGE = 10.0  # MPa: what is larger may be kPa
 WHY = {
     Halt.FOLDED: "the finger folds onto itself",
@@ -111,11 +120,15 @@ class ActuateResult:
             f"{found.text} (residual {found.residual:.1e} N)"
         )
         yield f"{counted(len(events), 'event')}, {lost:.5g} mJ lost in them"
-        if tied := [str(k) for k, event in enumerate(events, start=1) if event.tied]:
-            which = f"event{'s' * (len(tied) > 1)} {enumerated(tied)}"
-            yield f"ties in {which}: the model does not say which of these units goes first"
+        if n_tied := sum(bool(event.tied) for event in events):
+            which = f"{n_tied:,} of {counted(len(events), 'event')}"
+            yield f"ties in {which}: the model does not say which of the units goes first"
         if (n_cycles := int(self.way.points.cycle[-1])) > 1:
             yield from self._repeated(n_cycles)
+        gripper = self.readings.in_gripper
+        if gripper is not None and (n_over := int(gripper.overlaps.sum())):
+            of = f"{n_over:,} of {len(gripper.overlaps):,} points"
+            yield f"the fingers overlap at {of}: nothing keeps them apart in the model"
         scene = self.given.given.scene
         for trust in scene.trusts:
             if trust.output is Output.PRESSURES:
@@ -168,6 +181,14 @@ class ActuateResult:
         events = self.columns, self.rows
         write_path(table_path(table), given.scene, given.json, self._path, events)
 
+    def draw(self, path: str | Path) -> None:
+        """Draw pressure against the tip, with shapes at the holds, to a .svg or .png file."""
+        from dpgcli.reports.actuation import Drawing
+
+        given = self.given
+        drawing = Drawing(self.way, self.readings, given.pressure, given.given.scene)
+        drawing.draw(figure_path(path))
+
 
 def actuate(
     spec: SpecInput,
@@ -205,7 +226,7 @@ def followed(
     if not 1 <= cycles <= MOST_CYCLES:
         raise UsageError(Field("cycles"), f" {cycles}: expected 1 to {MOST_CYCLES:,}")
     by_unit = history.history.pressure[:, given.pressure.line_of]
-    way = travel(given.pressed, _start(given, start), by_unit, cycles)
+    way = travel(given.pressed, _start(given, start), by_unit, cycles, LARGEST_STEP)
     result = ActuateResult(given, history, way)
     if result.problem:
         is_large = np.abs(by_unit).max() > LARGE

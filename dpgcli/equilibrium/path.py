@@ -79,7 +79,8 @@ class _Walk:
 
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
-    one before and `last_slope` the slope there, NaN if another cell was followed.
+    one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
+    moves `cell` is −1, and steps are of the load itself.
     """
 
     coordinates: Array
@@ -249,7 +250,7 @@ def _tried(
 ) -> _Trial:
     """Try a step of each walk along its cell, or to the end of its load where that is nearer."""
     to_end = np.where(walk.slope > 0.0, (end - walk.load) * towards / walk.slope, 0.0)
-    is_last = (walk.cell < 0) | (to_end <= step)
+    is_last = to_end <= step
     step = np.where(is_last, to_end, step)
     cell = np.where(is_last, -1, walk.cell)
     guess = family.coordinates.moved(walk.coordinates, walk.onward * step)
@@ -401,6 +402,7 @@ def _turn(
     walk.sign = np.sign(rate) * forwards
     per_step = np.where(moves, forwards / np.abs(np.where(moves, rate, 1.0)), 0.0)
     walk.onward = motion * per_step
-    walk.slope = np.where(moves, np.abs(by * per_step), 0.0)
+    walk.slope = np.where(moves, np.abs(by * per_step), 1.0)
+    walk.step = np.where(moves, walk.step, np.inf)  # to the end, or to an event
     is_other = walk.cell != cell
     walk.last_slope = np.where(is_other, np.nan, walk.last_slope)
