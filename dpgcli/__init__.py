@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.transitions import transitions
     from dpgcli.api.validate import validate
     from dpgcli.errors import (
         ActuationError,
@@ -73,6 +74,7 @@ __all__ = [
     "report",
     "stress",
     "sweep",
+    "transitions",
     "uniform_finger",
     "validate",
 ]
@@ -96,6 +98,7 @@ _HOMES = {
     "report": "api.report",
     "stress": "api.stress",
     "sweep": "api.sweep",
+    "transitions": "api.transitions",
     "uniform_finger": "mechanics.finger",
     "validate": "api.validate",
 }

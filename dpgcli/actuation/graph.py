@@ -14,7 +14,8 @@ from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
 from dpgcli.arrays import Array, Codes, Flags, Indices, distinct
 from dpgcli.states.certify import Status
-from dpgcli.states.patterns import codes_of, inverted_units
+from dpgcli.states.patterns import chunks, codes_of, inverted_units
+from dpgcli.states.settle import lanes_at_once
 
 
 @dataclass(frozen=True)
@@ -89,10 +90,20 @@ def reachable(
         targets = [_keys(pulses.design, pulses.target, n_units) for pulses, _ in found]
         new = distinct(np.concatenate(targets))
         new = new[~is_known[new]]
-        states.append((new >> n_units, (new & (2**n_units - 1)).astype(np.uint64)))
+        states.append(_of_keys(new, n_units))
     n_pulses = np.repeat(np.arange(len(states)), [len(code) for _, code in states])
     designs, codes = (np.concatenate(part) for part in zip(*states, strict=True))
     return Graph(designs, codes, n_pulses, Pulses.joined(parts), n_lost)
+
+
+def stable_states(pressed: Pressed, n_designs: int) -> Flags:
+    """Which patterns are certified stable states without pressure, (design, pattern by code)."""
+    n_units = pressed.finger.n_units
+    found = []
+    for key in chunks(n_designs << n_units, lanes_at_once(n_units)):
+        design, code = _of_keys(key.astype(np.int64), n_units)
+        found.append(_is_state(pressed, design, code))
+    return np.concatenate(found).reshape(n_designs, -1)
 
 
 def reached_from_rest(
@@ -100,29 +111,35 @@ def reached_from_rest(
     line_of: Indices,
     reach: Array,
     is_stable: Flags,
-    known: tuple[Codes, Codes],
+    known: tuple[Indices, Indices] | None = None,
 ) -> Flags:
-    """Which states of one finger pulses of any height lead to from rest, by code of the pattern.
+    """Which states pulses of any height lead to from rest, (design, pattern by code).
 
-    `known` are sources and targets of pulses that need not be found; others are looked for as long
-    as there are stable states that are not reached.
+    `known` are sources and targets of the first transition of every state, if they have been found,
+    as codes of one finger. Whole staircases are climbed only where these do not lead to all states.
     """
-    source, target = known
-    is_reached, is_done = np.zeros_like(is_stable), np.zeros_like(is_stable)
-    is_reached[0] = is_stable[0]
-    while True:
-        _close(is_reached, source, target)
-        code = np.flatnonzero(is_reached & ~is_done).astype(np.uint64)
-        if not len(code) or (is_reached == is_stable).all():
-            return is_reached
-        is_done |= is_reached
-        directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
-        for part in directions.chunks(pressed.finger.n_units):
-            found, _ = _pulses(pressed, line_of, reach, part)
-            source, target = np.append(source, found.source), np.append(target, found.target)
+    n_units = pressed.finger.n_units
+    source, target = known or (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    is_reached = np.zeros_like(is_stable)
+    is_reached[:, 0] = is_stable[:, 0]
+    for n_stairs in (1, None) if known is None else (None,):
+        is_done = np.zeros_like(is_stable)
+        while True:
+            _close(is_reached.ravel(), source, target)
+            is_open = (is_reached != is_stable).any(axis=1)
+            key = np.flatnonzero(is_reached & ~is_done & is_open[:, None])
+            if not len(key):
+                break
+            is_done |= is_reached
+            directions = Directions.of(*_of_keys(key, n_units), int(line_of.max()) + 1)
+            for part in directions.chunks(n_units):
+                found, _ = _pulses(pressed, line_of, reach, part, n_stairs)
+                source = np.append(source, _keys(found.design, found.source, n_units))
+                target = np.append(target, _keys(found.design, found.target, n_units))
+    return is_reached
 
 
-def _close(is_reached: Flags, source: Codes, target: Codes) -> None:
+def _close(is_reached: Flags, source: Indices, target: Indices) -> None:
     """Add what is reached from what is reached."""
     n_reached = 0
     while is_reached.sum() > n_reached:
@@ -147,11 +164,23 @@ def _keys(design: Indices, code: Codes, n_units: int) -> Indices:
     return np.asarray((design << n_units) | code.astype(np.int64))
 
 
+def _of_keys(key: Indices, n_units: int) -> tuple[Indices, Codes]:
+    """The designs and codes of keys."""
+    return key >> n_units, (key & (2**n_units - 1)).astype(np.uint64)
+
+
 def _pulses(
-    pressed: Pressed, line_of: Indices, reach: Array, directions: Directions
+    pressed: Pressed,
+    line_of: Indices,
+    reach: Array,
+    directions: Directions,
+    n_stairs: int | None = None,
 ) -> tuple[Pulses, int]:
-    """The pulses in these directions, and how many ranges of peaks lead to no certified state."""
-    own, stairs, way = raised(pressed, line_of, reach, directions)
+    """The pulses in these directions, and how many ranges of peaks lead to no certified state.
+
+    Those of the first `n_stairs` flips, if that is given.
+    """
+    own, stairs, way = raised(pressed, line_of, reach, directions, n_stairs)
     n, ends = len(directions), on_line(way.shapes, line_of, directions.line)
     begin = _Ranges(
         np.arange(n), np.zeros(n), directions.code, ~np.zeros(n, bool), np.zeros(n, bool)

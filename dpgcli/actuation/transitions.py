@@ -1,6 +1,5 @@
 """Transitions: what first happens to each stable state as the pressure of a line rises or falls."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -8,14 +7,12 @@ import numpy as np
 
 from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions, Rows, on_line, raised
-from dpgcli.actuation.graph import reached_from_rest
+from dpgcli.actuation.graph import reached_from_rest, stable_states
 from dpgcli.actuation.pressed import Halt, Pressed
-from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.rest import is_certified
 from dpgcli.actuation.staircase import Stair, Way
 from dpgcli.arrays import Array, Codes, Flags, Indices
-from dpgcli.states.certify import Status
-from dpgcli.states.patterns import chunks, codes_of, inverted_units
-from dpgcli.states.settle import lanes_at_once
+from dpgcli.states.patterns import codes_of
 
 
 class Outcome(IntEnum):
@@ -33,12 +30,12 @@ class Outcome(IntEnum):
         >>> Outcome.STAYS.text(0.299)
         'no unit leaves up to 0.299 MPa'
         """
-        return _TEXTS[self].format(pressure)
+        return _TEXTS[self].format(pressure, "down" if pressure < 0.0 else "up")
 
 
 _TEXTS = {
     Outcome.LEAVES: "",
-    Outcome.STAYS: "no unit leaves up to {:.4g} MPa",
+    Outcome.STAYS: "no unit leaves {1} to {0:.4g} MPa",
     Outcome.FOLDS: "folds onto itself at {:.4g} MPa",
     Outcome.LOST: "no equilibrium beyond {:.4g} MPa",
     Outcome.ASTRAY: "released from {:.4g} MPa it is in no certified state",
@@ -51,7 +48,8 @@ class Transitions(Rows):
 
     `pressure` (MPa) is where units flip, or else how far the state was followed, and `outcome` says
     which. `unit` is the first to leave, −1 where none does; `flipped` and `tied` are codes of all
-    units that flip and of those whose threshold is the same within `pressed.TIE`. `reached` is
+    units that flip and of others whose threshold is that of `unit` within `pressed.TIE`: the model
+    does not say which of these goes first, and `unit` is the one next to the base. `reached` is
     the code of the pattern at that pressure, `after` that of the pattern left at rest; both are
     the state's own where nothing happens, and what is left `ASTRAY` is no state.
     """
@@ -100,28 +98,21 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     """
     n_units = pressed.finger.n_units
     reach = thresholds_alone(pressed).reach
-    is_stable = np.concatenate([*_stable(pressed)])
-    code = np.flatnonzero(is_stable).astype(np.uint64)
+    is_stable = stable_states(pressed, 1)
+    code = np.flatnonzero(is_stable[0]).astype(np.uint64)
     directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
     parts = [_first(pressed, line_of, reach, part) for part in directions.chunks(n_units)]
     transitions = Transitions.joined([_none(), *parts])
     leads = transitions.take(np.flatnonzero(transitions.outcome == Outcome.LEAVES))
-    known = leads.code, leads.after
+    known = leads.code.astype(np.int64), leads.after.astype(np.int64)
     is_reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
-    return StateGraph(transitions, is_stable, is_reached, float(reach[0]))
+    return StateGraph(transitions, is_stable[0], is_reached[0], float(reach[0]))
 
 
 def _none() -> Transitions:
     places, codes = np.zeros(0, np.int64), np.zeros(0, np.uint64)
     which = codes, places, places, np.zeros(0)
     return Transitions(*which, places, places, codes, codes, codes, codes)
-
-
-def _stable(pressed: Pressed) -> Iterator[Flags]:
-    n_units = pressed.finger.n_units
-    for code in chunks(2**n_units, lanes_at_once(n_units)):
-        _, settled = at_rest(pressed, inverted_units(code, n_units))
-        yield np.asarray(settled.status == Status.STABLE)
 
 
 def _first(pressed: Pressed, line_of: Indices, reach: Array, directions: Directions) -> Transitions:
@@ -162,8 +153,10 @@ def _put(
     is_rest = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
     found.pressure[lanes] = on_line(halted.shapes, line_of, directions.line[lanes])
     found.outcome[lanes] = np.where(is_rest, Outcome.LEAVES, Outcome.ASTRAY)
-    found.unit[lanes] = halted.unit
+    units = np.arange(own.finger.n_units)[:, None]
+    together = (units == halted.unit) | halted.tied
+    found.unit[lanes] = together.argmax(axis=0)
     found.flipped[lanes] = codes_of(events.flipped)
-    found.tied[lanes] = codes_of(halted.tied)
+    found.tied[lanes] = codes_of(together & (units != found.unit[lanes]))
     found.reached[lanes] = codes_of(events.after.inverted)
     found.after[lanes] = codes_of(stair.rest.inverted)

@@ -1,7 +1,7 @@
 """`pulses`: the pulses of pressure that lead a finger from one state to another."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,14 +9,17 @@ import numpy as np
 
 from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions
-from dpgcli.actuation.graph import Graph, reachable
+from dpgcli.actuation.hindrances import hindrances
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.pulses import ABOVE, Intervals, Pulse, Replay, intervals, replayed, shortest
+from dpgcli.actuation.pulses import ABOVE, Intervals, intervals
 from dpgcli.actuation.rest import at_rest
+from dpgcli.actuation.sequences import Sequence, sequence
 from dpgcli.actuation.tables import numbered
+from dpgcli.api.graded import Graded, graded_for
 from dpgcli.api.inputs import Settings, SpecInput, check_texts
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table
+from dpgcli.api.transitions import pressure_lines
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, Field, UsageError
@@ -57,23 +60,26 @@ INTERVAL_COLUMNS = (
 class PulsesResult:
     """The shortest sequence of pulses from a state to another, or why there is none.
 
-    `given` is the spec with its lines; `start` and `target` are patterns. `pulses` is None where no
-    sequence exists, and `reasons` say why.
+    `given` is the spec with its lines; `start` and `target` are patterns. `reasons` say why no
+    sequence exists; `graded` is one of the finger with other dome heights, if some were found.
     """
 
     given: PressedInput
     start: str
     target: str
-    reach: float
-    graph: Graph
-    pulses: tuple[Pulse, ...] | None
-    replay: Replay | None
+    sequence: Sequence
     reasons: tuple[str, ...] = ()
+    graded: Graded | None = None
 
     @property
     def exists(self) -> bool:
         """Whether pulses lead there."""
-        return self.pulses is not None
+        return self.sequence.pulses is not None
+
+    @property
+    def heights(self) -> tuple[float, ...]:
+        """Dome heights, mm, with which pulses lead there where they do not now; none if unknown."""
+        return self.graded.heights if self.graded is not None and self.graded.holds else ()
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -83,7 +89,7 @@ class PulsesResult:
     @cached_property
     def rows(self) -> Columns:
         """Pulses by column."""
-        pulses, replay = self.pulses or (), self.replay
+        pulses, replay = self.sequence.pulses or (), self.sequence.replay
         n_units = self.given.pressed.finger.n_units
         at_peak, after = (replay.at_peak, replay.after) if replay else ((), ())
         ties = replay.ties if replay else ()
@@ -109,32 +115,34 @@ class PulsesResult:
         return tuple(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        way = f"from {self.start} to {self.target}"
-        if self.pulses is None:
-            yield (
-                f"no pulses lead {way}: {counted(len(self.graph.code), 'state')} of pulses from "
-                f"{self.start}, up to {self.reach:.4g} MPa"
-            )
+        way, found = f"from {self.start} to {self.target}", self.sequence
+        if found.pulses is None:
+            n_reached = counted(len(found.graph.code), "state")
+            yield f"no pulses up to {found.reach:.4g} MPa lead {way}: {n_reached} can be reached"
             yield from self.reasons
-        elif not self.pulses:
+        elif not found.pulses:
             yield f"{self.start} is the state to start from: no pulse is needed"
         else:
-            smallest = min(pulse.margin for pulse in self.pulses)
+            smallest = min(pulse.margin for pulse in found.pulses)
             yield (
-                f"{counted(len(self.pulses), 'pulse')} {way}, the fewest there are; smallest "
-                f"margin {smallest:.4g} MPa; replayed from rest, each ends as it says"
+                f"{counted(len(found.pulses), 'pulse')} {way}, the fewest there are; smallest "
+                f"margin {smallest:.4g} MPa; replayed from {self.start}, it ends there"
             )
-            yield from self._notes()
+            yield from _notes(found)
         yield from pressure_lines(self.given)
 
-    def _notes(self) -> Iterator[str]:
-        assert self.pulses is not None and self.replay is not None, "asked for pulses that exist"
-        if opens := [str(k) for k, pulse in enumerate(self.pulses, 1) if pulse.is_open]:
-            which = f"pulse{'s' * (len(opens) > 1)} {enumerated(opens)}"
-            yield f"{which}: no further threshold, the peak is {ABOVE:.0%} beyond the last one"
-        if tied := [str(k) for k, ties in enumerate(self.replay.ties, 1) if ties]:
-            which = f"pulse{'s' * (len(tied) > 1)} {enumerated(tied)}"
-            yield f"ties in {which}: the model does not say which of these units goes first"
+
+def _notes(found: Sequence) -> Iterator[str]:
+    """Where no further threshold bounds a peak, and ties."""
+    assert found.pulses is not None and found.replay is not None, "asked for pulses that exist"
+    if opens := [str(k) for k, pulse in enumerate(found.pulses, 1) if pulse.is_open]:
+        yield f"{_numbers(opens)}: no further threshold, the peak is {ABOVE:.0%} beyond the last"
+    if tied := [str(k) for k, ties in enumerate(found.replay.ties, 1) if ties]:
+        yield f"ties in {_numbers(tied)}: the model does not say which of these units goes first"
+
+
+def _numbers(pulses: list[str]) -> str:
+    return f"pulse{'s' * (len(pulses) > 1)} {enumerated(pulses)}"
 
 
 @dataclass(frozen=True)
@@ -214,17 +222,16 @@ def pulses_of(given: PressedInput, target: str, start: str = "") -> PulsesResult
     check_size(given)
     _check_state(given, "start", begin)
     keep_freed_memory()
-    pressed, line_of = given.pressed, given.pressure.line_of
-    reach = thresholds_alone(pressed).reach
-    graph = reachable(pressed, line_of, reach, np.array([begin], np.uint64))
-    found = shortest(graph, float(reach[0]), begin, end)
-    replay = None
-    if found:
-        replay = replayed(pressed, line_of, begin, found)
-        if replay.problem:
-            raise ActuationError(replay, f"the sequence found does not hold: {replay.problem}")
-    begins, ends = _pattern(begin, pressed), _pattern(end, pressed)
-    return PulsesResult(given, begins, ends, float(reach[0]), graph, found, replay)
+    pressed, lines = given.pressed, given.pressure
+    found = sequence(pressed, lines.line_of, begin, end)
+    names = _pattern(begin, pressed), _pattern(end, pressed)
+    if found.pulses is None:
+        reasons = [*hindrances(pressed, lines.lines, lines.line_of, found)]
+        graded = graded_for(given, found)
+        return PulsesResult(given, *names, found, (*reasons, *graded.text), graded)
+    if found.replay is not None and found.replay.problem:
+        raise ActuationError(found, f"the sequence found does not hold: {found.replay.problem}")
+    return PulsesResult(given, *names, found)
 
 
 def lookup(spec: SpecInput, *, start: str = "", settings: Settings = ()) -> LookupResult:
@@ -261,15 +268,6 @@ def check_size(given: PressedInput) -> None:
         raise UsageError(f"pulses of {n_units} units: expected at most {MOST_UNITS}")
 
 
-def pressure_lines(given: PressedInput) -> Iterator[str]:
-    """What pressures rest on, and warnings of calibrations in use."""
-    scene = given.given.scene
-    for trust in scene.trusts:
-        if trust.output is Output.PRESSURES:
-            yield f"pressures: {trust.basis_text}, {trust.source}; error {trust.known_error}"
-    yield from (f"warning: {warning}" for warning in scene.warnings)
-
-
 def _code(given: PressedInput, field: str, pattern: str) -> int:
     """The code of a pattern; of none, that of rest. Raises UsageError for what is none."""
     check_texts(**{field: pattern})
@@ -296,10 +294,10 @@ def _pattern(code: int, pressed: Pressed) -> str:
     return f"{code:0{pressed.finger.n_units}b}"
 
 
-def _patterns(codes: Sequence[int], n_units: int) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
+def _patterns(codes: Iterable[int], n_units: int) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
     """Patterns by their codes, empty for −1."""
     return np.array([f"{c:0{n_units}b}" if c >= 0 else "" for c in codes], f"S{n_units}")
 
 
-def _texts(words: Sequence[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
-    return np.array(words, np.str_)
+def _texts(words: Iterable[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
+    return np.array([*words], np.str_)

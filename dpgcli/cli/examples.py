@@ -43,6 +43,11 @@ EXAMPLES = {
         "dpg actuate finger.yaml --pressure 0:0.2:-0.1:0 --output path.parquet --plot path.svg",
         "dpg actuate finger.yaml --from 11000 --pressure 0:0.2:0 --cycles 100 --format csv",
     ),
+    "transitions": (
+        "dpg transitions finger.yaml",
+        "dpg transitions finger.yaml --set 'pressure.lines={A: 1-2, B: 3}' --graph states.graphml",
+        "dpg transitions finger.yaml --output transitions.parquet --plot states.svg",
+    ),
     "pulses": (
         "dpg pulses finger.yaml --to 11111",
         "dpg pulses finger.yaml --to 11100 --set 'pressure={lines: {A: 1-3, B: 4-5}}'",

@@ -81,7 +81,7 @@ def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Itera
 
 
 def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
-    """Print one array of row objects and pass on; null for what is not a finite number."""
+    """Print one array of row objects, empty perhaps, and pass on; null for no finite number."""
     names = [column.name for column in columns]
     separator = "[\n"
     for block in blocks:
@@ -91,7 +91,7 @@ def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iter
             put_json(f"{separator}  {text}")
             separator = ",\n"
         yield block
-    sys.stdout.write("\n]\n")
+    sys.stdout.write("[]\n" if separator.startswith("[") else "\n]\n")
 
 
 def table_printer(*, principal: bool) -> Printer:

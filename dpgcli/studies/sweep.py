@@ -149,7 +149,9 @@ class Study:
     def extent(self) -> Extent:
         """Time, disk and memory of the sweep."""
         allowed = self.evaluation.allowed if self.sweep.constraints else None
-        return Extent(self.sweep.space, self.sweep.base.finger.units, allowed)
+        base = self.sweep.base
+        has_pressure = base.design.pressure is not None
+        return Extent(self.sweep.space, base.finger.units, allowed, has_pressure)
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""

@@ -61,7 +61,8 @@ def design_states(
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
     for designs in _design_batches(n_designs, n_units):
-        metrics = Metrics(_designs(units, designs), len(designs))
+        pressure = scene.pressure and scene.pressure.take_lanes(designs)
+        metrics = Metrics(_designs(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
