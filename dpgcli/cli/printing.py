@@ -81,7 +81,7 @@ def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Itera
 
 
 def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
-    """Print one array of row objects, empty perhaps, and pass on; null for no finite number."""
+    """Print one array of row objects and pass on; null for what is not a finite number."""
     names = [column.name for column in columns]
     separator = "[\n"
     for block in blocks:
