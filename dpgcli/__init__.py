@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
+    from dpgcli.api.lookup import lookup
     from dpgcli.api.predict import predict
-    from dpgcli.api.pulses import lookup, pulses
+    from dpgcli.api.pulses import pulses
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
@@ -90,7 +91,7 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
-    "lookup": "api.pulses",
+    "lookup": "api.lookup",
     "merge": "api.sweep",
     "predict": "api.predict",
     "pulses": "api.pulses",

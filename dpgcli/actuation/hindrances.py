@@ -7,7 +7,7 @@ import numpy as np
 from dpgcli.actuation.orders import Obstacle, needed_order, obstacles
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest
-from dpgcli.actuation.sequences import Sequence
+from dpgcli.actuation.sequences import PulseSequence
 from dpgcli.arrays import Indices
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
@@ -17,7 +17,7 @@ MOST_NAMED = 4  # pairs of units
 
 
 def hindrances(
-    pressed: Pressed, lines: tuple[str, ...], line_of: Indices, found: Sequence
+    pressed: Pressed, lines: tuple[str, ...], line_of: Indices, found: PulseSequence
 ) -> Iterator[str]:
     """What keeps the pulses of a finger from the target of a sequence that does not exist."""
     n_units = pressed.finger.n_units
@@ -44,7 +44,7 @@ def hindrances(
         yield f"and {counted(len(pairs) - MOST_NAMED, 'pair')} of units more"
 
 
-def _statement(found: Sequence, pair: Obstacle) -> str:
+def _statement(found: PulseSequence, pair: Obstacle) -> str:
     """The thresholds of a pair of units that are in the wrong order."""
     one, other = pair.inverted, pair.other
     if pair.is_tie:

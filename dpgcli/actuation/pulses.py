@@ -166,11 +166,10 @@ def intervals(
     line_of: Indices,
     reach: Array,
     directions: Directions,
-    n_stairs: int | None = None,
 ) -> Intervals:
     """Everything that one pulse does to certified states, (lane,), in the order of lanes.
 
-    `reach` (design,) is how far pressures go, MPa; or they stop where so many times units flipped.
+    `reach` (design,) is how far pressures go, MPa.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
@@ -182,7 +181,7 @@ def intervals(
     >>> found.low.round(4).tolist(), found.after.tolist()
     ([0.0, 0.1495, 0.1922], [0, 2, 3])
     """
-    own, stairs, way = raised(pressed, line_of, reach, directions, n_stairs)
+    own, stairs, way = raised(pressed, line_of, reach, directions)
     code = directions.code.astype(np.int64)
     n, nothing = len(code), np.zeros(len(code))
     parts = [Intervals(np.arange(n), nothing, nothing, code, code, np.zeros(n, bool))]

@@ -12,7 +12,7 @@ from dpgcli.arrays import Indices
 
 
 @dataclass(frozen=True)
-class Sequence:
+class PulseSequence:
     """Pulses from the pattern with the code `start` to that of `target`, None where none lead.
 
     `alone` are thresholds of units by themselves, `graph` is what pulses reach from the start.
@@ -36,7 +36,7 @@ class Sequence:
         return self.replay is not None and not self.replay.problem
 
 
-def sequence(pressed: Pressed, line_of: Indices, start: int, target: int) -> Sequence:
+def pulse_sequence(pressed: Pressed, line_of: Indices, start: int, target: int) -> PulseSequence:
     """The fewest pulses on single lines that lead one finger from a state to another.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -44,7 +44,7 @@ def sequence(pressed: Pressed, line_of: Indices, start: int, target: int) -> Seq
     >>> from dpgcli.states.units import UnitSolutions
     >>> finger = uniform_finger(2, **STUDY).changed(stroke=np.array([[3.5], [4.5]]))
     >>> pressed = Pressed(UnitSolutions.of(finger), DomeVolumes(np.array([[31.61]])))
-    >>> found = sequence(pressed, np.array([0, 0]), 0b00, 0b01)
+    >>> found = pulse_sequence(pressed, np.array([0, 0]), 0b00, 0b01)
     >>> found.holds, found.replay.after
     (True, (3, 1))
     """
@@ -52,4 +52,4 @@ def sequence(pressed: Pressed, line_of: Indices, start: int, target: int) -> Seq
     graph = reachable(pressed, line_of, alone.reach, np.array([start], np.uint64))
     pulses = shortest(graph, float(alone.reach[0]), start, target)
     replay = None if pulses is None else replayed(pressed, line_of, start, pulses)
-    return Sequence(start, target, alone, graph, pulses, replay)
+    return PulseSequence(start, target, alone, graph, pulses, replay)

@@ -6,7 +6,7 @@ import numpy as np
 
 from dpgcli.actuation.grading import HEIGHT, SEPARATION, nearest_heights
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.sequences import Sequence, sequence
+from dpgcli.actuation.sequences import PulseSequence, pulse_sequence
 from dpgcli.api.pressure import PressedInput
 from dpgcli.design.by_unit import size_by_unit, with_sizes
 from dpgcli.design.resolve import resolve
@@ -24,7 +24,7 @@ class Graded:
 
     text: tuple[str, ...]
     heights: tuple[float, ...] = ()
-    sequence: Sequence | None = None
+    sequence: PulseSequence | None = None
 
     @property
     def holds(self) -> bool:
@@ -32,7 +32,7 @@ class Graded:
         return self.sequence is not None and self.sequence.holds
 
 
-def graded_for(given: PressedInput, missed: Sequence) -> Graded:
+def graded_for(given: PressedInput, missed: PulseSequence) -> Graded:
     """The nearest heights that lead to the target of a sequence that does not exist.
 
     The spec with these heights is resolved anew, and its pulses are searched and replayed.
@@ -52,11 +52,11 @@ def graded_for(given: PressedInput, missed: Sequence) -> Graded:
     scene = resolution.batch(np.zeros(1, np.int64))
     assert scene.pressure is not None, "the spec has it"
     pressed = Pressed.of(UnitSolutions.of(scene.finger), scene.pressure)
-    found = sequence(pressed, line_of, missed.start, missed.target)
+    found = pulse_sequence(pressed, line_of, missed.start, missed.target)
     return Graded((_text(given, names, found),), known, found)
 
 
-def _text(given: PressedInput, heights: str, found: Sequence) -> str:
+def _text(given: PressedInput, heights: str, found: PulseSequence) -> str:
     """What was found of the finger with other heights."""
     units = f"dome heights of {heights} mm (units 1 to {given.pressed.finger.n_units})"
     if not found.holds or found.pulses is None:

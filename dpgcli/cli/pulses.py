@@ -18,6 +18,19 @@ Start = Annotated[
 Lookup = Annotated[
     bool, typer.Option("--table", help="What pulses of all sizes do to the state, instead")
 ]
+Scatter = Annotated[
+    str | None,
+    typer.Option(
+        "--scatter", metavar="LIST", help="Standard deviations: dome_height_mm=0.1mm,stroke_mm=2%"
+    ),
+]
+NumberOfDraws = Annotated[
+    int | None,
+    typer.Option("--draws", metavar="N", help="Fingers to draw by --scatter  [default: 1000]"),
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", metavar="N", help="Seed of the draws  [default: 1]")
+]
 
 
 def pulses(
@@ -25,6 +38,9 @@ def pulses(
     target: To = "",
     start: Start = "",
     table: Lookup = False,
+    scatter: Scatter = None,
+    draws: NumberOfDraws = None,
+    seed: Seed = None,
     settings: Settings = None,
     printed_as: Annotated[
         Format, typer.Option("--format", help="How to print rows")
@@ -32,16 +48,27 @@ def pulses(
     quiet: Quiet = False,
 ) -> None:
     """Find the fewest pulses of pressure from one state to another."""
+    from dpgcli.api.lookup import LookupResult, lookup_of
     from dpgcli.api.pressure import pressed_input
-    from dpgcli.api.pulses import LookupResult, PulsesResult, lookup_of, pulses_of
+    from dpgcli.api.pulses import PulsesResult, pulses_of
+    from dpgcli.api.scatter import draws_of
     from dpgcli.errors import Field, UsageError
 
     if bool(target) == table:
         raise UsageError("expected ", Field("target"), " or ", Field("table"), ", one of both")
+    asked = {"scatter": scatter, "draws": draws, "seed": seed}
+    for field in (name for name, value in asked.items() if value is not None):
+        if table or scatter is None:
+            wanted = Field("target") if table else Field("scatter")
+            raise UsageError(Field(field), " goes with ", wanted)
     given = pressed_input(spec, settings or ())
+    drawn = None
+    if scatter is not None:
+        number, start_of = 1000 if draws is None else draws, 1 if seed is None else seed
+        drawn = draws_of(given, scatter, number, start_of)
     found: LookupResult | PulsesResult
     with under_way("following pulses", quiet=quiet):
-        found = lookup_of(given, start) if table else pulses_of(given, target, start)
+        found = lookup_of(given, start) if table else pulses_of(given, target, start, drawn)
     print_rows(found.columns, found.rows, printed_as)
     sys.stdout.flush()
     if not quiet:

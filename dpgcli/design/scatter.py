@@ -85,6 +85,7 @@ def scattered(
     The deviation of a dimension reaches the lattice by the rules behind its values; that of a
     lattice value moves the value itself, whatever it comes from.
 
+    >>> from dpgcli.design.dimensions import GivenValues
     >>> section = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
     ...     "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
     ...     "hinge_stiffness_N_mm_per_rad": 24.2}
