@@ -74,8 +74,9 @@ def window(low: Array, high: Array, n_needed: float) -> tuple[float, float]:
     """
     ends = np.concatenate([low, high[np.isfinite(high)]])
     steps = np.concatenate([np.ones(len(low)), -np.ones(len(ends) - len(low))])
-    order = np.lexsort((steps, ends))  # what ends somewhere does so before others begin
-    ends, count = ends[order], np.cumsum(steps[order])
+    order = np.argsort(ends)
+    is_last = np.append(np.diff(ends[order]) > 0.0, True)[: len(ends)]  # of those at one place
+    ends, count = ends[order][is_last], np.cumsum(steps[order])[is_last]
     is_inside = count >= n_needed
     begins = np.flatnonzero(is_inside & ~np.append(False, is_inside[:-1]))
     stops = np.flatnonzero(~is_inside & np.append(False, is_inside[:-1]))

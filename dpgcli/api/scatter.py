@@ -39,9 +39,12 @@ class Draws:
 
     def batches(self) -> Iterator[tuple[Indices, Pressed]]:
         """Draws that are fingers, under pressure, by their places."""
-        for draws, scene in self.scattered.batches():
+        for draws, scene, finger in self.scattered.batches():
             assert scene.pressure is not None, "asked for pressures"
-            yield draws, Pressed.of(UnitSolutions.of(scene.finger), scene.pressure)
+            pressed = Pressed.of(UnitSolutions.of(scene.finger), scene.pressure)
+            if finger is not scene.finger:
+                pressed = Pressed(UnitSolutions.of(finger), pressed.volumes)
+            yield draws, pressed
 
     @property
     def lines(self) -> Iterator[str]:

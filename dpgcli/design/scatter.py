@@ -11,19 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.design.by_unit import unit_by_unit
+from dpgcli.design.by_unit import size_by_unit, unit_by_unit
 from dpgcli.design.dimensions import (
     LINEAR_STIFFNESS,
     Design,
+    GivenPressure,
     Sizes,
     Tolerance,
     are_possible,
+    unit_range,
 )
+from dpgcli.design.geometry import REFERENCE, snap_pressure
 from dpgcli.design.problems import Issue
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import Scene
+from dpgcli.design.snap_pressures import SNAP, SNAP_PRESSURE
 from dpgcli.design.uncertainty import tolerance_issues
-from dpgcli.mechanics.finger import KEYS
+from dpgcli.mechanics.finger import KEYS, Finger
 
 OF_UNITS = (  # in this order, which is that of their streams of random numbers: append only
     "dome_height_mm",
@@ -61,14 +65,18 @@ class Scattered:
     moves: Mapping[str, Array]
     are_wrong: Flags
 
-    def batches(self) -> Iterator[tuple[Indices, Scene]]:
-        """The draws that are fingers, with scenes of arrays by draw."""
+    def batches(self) -> Iterator[tuple[Indices, Scene, Finger]]:
+        """The draws that are fingers: scenes of arrays by draw, and their fingers moved.
+
+        The areas on which pressure works are those of the fingers before: where lattice values
+        scatter, a dome that bears more snaps at a higher pressure.
+        """
         for part in self.resolution.alike(np.flatnonzero(~self.are_wrong)):
             scene = self.resolution.batch(part)
             moved = {KEYS[key]: move[:, part] for key, move in self.moves.items()}
             arrays = scene.finger.arrays()
-            finger = scene.finger.changed(**{name: arrays[name] + moved[name] for name in moved})
-            yield part, replace(scene, finger=finger)
+            changes = {name: arrays[name] + move for name, move in moved.items()}
+            yield part, scene, scene.finger.changed(**changes) if changes else scene.finger
 
 
 def scatter_issues(design: Design, spread: Mapping[str, Tolerance]) -> Iterator[Issue]:
@@ -92,8 +100,8 @@ def scattered(
     >>> lattice = {key: np.array([value]) for key, value in section.items()}
     >>> base = Design(2, GivenValues(lattice=lattice))
     >>> draws = scattered(base, {"stroke_mm": Tolerance(0.1, False)}, 1000, 1)
-    >>> (_, scene), = draws.batches()
-    >>> scene.finger.stroke.shape, scene.finger.stroke.std(axis=1, ddof=1).round(2).tolist()
+    >>> (_, _, finger), = draws.batches()
+    >>> finger.stroke.shape, finger.stroke.std(axis=1, ddof=1).round(2).tolist()
     ((2, 1000), [0.1, 0.1])
     """
     drawn = {key: _deviates(key, seed, n_draws, design.units) for key in spread}
@@ -144,4 +152,36 @@ def _moved(
         overrides[unit] = replace(section, geometry={**known, **changed})
     finger = replace(design.finger, geometry=scattered_sizes(design.finger.geometry, common))
     are_wrong = np.any(np.broadcast_arrays(*wrong), axis=0)
-    return replace(own, finger=finger, overrides=overrides), np.asarray(are_wrong)
+    moved = replace(own, finger=finger, overrides=overrides)
+    return replace(moved, pressure=_snapping(design, moved)), np.asarray(are_wrong)
+
+
+def _snapping(design: Design, moved: Design) -> GivenPressure | None:
+    """What is said of pressure; a snap pressure that is given is that of the sizes that are given.
+
+    Those of other sizes are scaled from it as any are, E t^2.5 h^1.2.
+    """
+    given = design.pressure
+    if given is None:
+        return None
+    scale = snap_pressure(*_dome_sizes(moved)) / snap_pressure(*_dome_sizes(design))
+    overrides = {}
+    for unit, row in enumerate(np.broadcast_to(scale, (design.units, scale.shape[1])), start=1):
+        said: dict[str, Array] = dict(given.values)
+        for text, own in given.overrides.items():
+            said |= own if unit in unit_range(text) else {}
+        if SNAP in said:
+            said[SNAP] = said[SNAP] * row
+        overrides[str(unit)] = said
+    return replace(given, values={}, overrides=overrides)
+
+
+def _dome_sizes(design: Design) -> tuple[Array, Array, Array]:
+    """Height, thickness and modulus of each dome; of the reference where none is given."""
+    usual = (REFERENCE.dome_height, REFERENCE.dome_thickness, REFERENCE.elastic_modulus)
+    pairs = zip(SNAP_PRESSURE.needs, usual, strict=True)
+    known = [(size_by_unit(design, key), number) for key, number in pairs]
+    height, thickness, modulus = (
+        np.array([[number]]) if size is None else size for size, number in known
+    )
+    return height, thickness, modulus
