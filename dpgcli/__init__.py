@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
+    from dpgcli.api.landscape import landscape
     from dpgcli.api.lookup import lookup
     from dpgcli.api.predict import predict
     from dpgcli.api.pulses import pulses
@@ -67,6 +68,7 @@ __all__ = [
     "fit_grid",
     "fit_hinge",
     "fit_unit",
+    "landscape",
     "lookup",
     "merge",
     "predict",
@@ -91,6 +93,7 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
+    "landscape": "api.landscape",
     "lookup": "api.lookup",
     "merge": "api.sweep",
     "predict": "api.predict",

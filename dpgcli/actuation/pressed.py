@@ -37,7 +37,6 @@ LEFT = 0.05  # of a stroke: what has moved further has left its place
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 TOLERANCE = 1e-12  # of the forces in play
 LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
-PLACES = 128  # of a dome's opening, at which its stiffness is looked at
 
 
 class Halt(IntEnum):
@@ -146,23 +145,11 @@ class Pressed:
             return None
         return limits(self.finger, self.volumes)
 
-    @cached_property
-    def stiffness(self) -> Array:
-        """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or batch)."""
-        finger = self.finger
-        domes = finger.domes
-        start = -np.broadcast_to(domes.contact, (finger.n_units, domes.contact.shape[1]))
-        way = domes.contact + 1.5 * domes.stroke
-        share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
-        bend = finger.law.pulling.response(start + share * way, domes).stiffness
-        return np.asarray(2.0 * np.abs(bend).max(axis=0))
-
     def take_lanes(self, index: Indices) -> "Pressed":
         """The fingers of some lanes."""
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
         if self.limits is not None:
             taken.__dict__["limits"] = Limits(*(take_lanes(part, index) for part in self.limits))
-        taken.__dict__["stiffness"] = take_lanes(self.stiffness, index)
         return taken
 
     @cached_property
@@ -180,8 +167,8 @@ class Pressed:
             law = replace(law, touching=shapes.touching, inverted=shapes.inverted, peak=peak)
         bare = self._bare
         coordinates = bare.coordinates
-        scale = self.finger.stroke
-        return Family(coordinates, bare.terms, coordinates.dome, law, scale, self.stiffness)
+        scale, stiffness = self.finger.stroke, self.units.holding_stiffness
+        return Family(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
 
     def potential(self, pressure: Array, inverted: Flags) -> Potential[FingerCoordinates]:
         """The energy less the work of fixed pressures, domes in touch or not as they come."""

@@ -154,7 +154,7 @@ class _Traveler:
         self.n_points = 0
         self.events: list[Event] = []
         self.holds: list[int] = []
-        self.marks: list[tuple[int, int, int, int]] = []  # what lay behind as cycles began
+        self.marks: list[tuple[int, list[int]]] = []  # what lay behind as cycles began
         self._pass(start, np.zeros(1))
 
     @property
@@ -166,12 +166,12 @@ class _Traveler:
     def begin(self) -> None:
         """Begin a cycle."""
         lists = self.behind, self.events, self.holds
-        self.marks.append((self.n_points, *(len(part) for part in lists)))
+        self.marks.append((self.n_points, [len(part) for part in lists]))
 
     def repeat(self, cycle: int, period: int) -> None:
         """Do what was done so many cycles ago; that ended where that one did."""
-        points, *starts = self.marks[cycle - 1 - period]
-        _, *stops = self.marks[cycle - period]
+        points, starts = self.marks[cycle - 1 - period]
+        _, stops = self.marks[cycle - period]
         shift = self.n_points - points
         behind, events, holds = (slice(*ends) for ends in zip(starts, stops, strict=True))
         again = [replace(part, cycle=0 * part.cycle + cycle) for part in self.behind[behind]]

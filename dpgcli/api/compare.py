@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, frame_of, scene_input
+from dpgcli.api.recalibration import CalibrationInput, recalibrated_scene
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
 from dpgcli.benchmark.timing import measured
@@ -15,7 +16,6 @@ from dpgcli.calibration import comparison
 from dpgcli.calibration.comparison import Comparison, frame_misfit
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
 from dpgcli.errors import Message
-from dpgcli.files.calibration import Calibration
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.mechanics.finger import Finger
@@ -29,7 +29,8 @@ REPEATS = 5
 class CompareResult:
     """Known states and the lattice's own, `calibrated` by another calibration if there is one.
 
-    `frame_words` say where the `frame` of the data is from.
+    `calibrated_law` is that of its domes, in words; `frame_words` say where the `frame` of the data
+    is from.
     """
 
     name: str
@@ -37,6 +38,7 @@ class CompareResult:
     known: KnownStates
     found: Comparison
     calibrated: Comparison | None
+    calibrated_law: str
     frame: Frame
     frame_words: str
 
@@ -59,8 +61,8 @@ class CompareResult:
     def summary(self) -> tuple[str, ...]:
         """Worst and mean errors of states that are in both, and the ratio of run times."""
         law = self.finger.law.description
-        lines = [*comparison_summary(self.found, self.calibrated, law), *self._frame()]
-        lines += self._times()
+        errors = comparison_summary(self.found, law, self.calibrated, self.calibrated_law)
+        lines = [*errors, *self._frame(), *self._times()]
         if self.known.unused:
             lines.append(f"columns not used: {', '.join(self.known.unused)}")
         return tuple(lines)
@@ -93,7 +95,7 @@ def compare(
     data: Tabular,
     *,
     settings: Settings = (),
-    calibration: str | Path | Calibration | None = None,
+    calibration: CalibrationInput | None = None,
     shapes: Tabular | None = None,
     first_station: Place = None,
     tip_offset: Place = None,
@@ -104,7 +106,8 @@ def compare(
     `files.known_states`. `first_station` is the lattice's first node in the data, `tip_offset`
     what the data call the tip, from the last node along the phalanx and to its left (mm), unless
     the data's header or the spec's section `data` says them. With a
-    `calibration` its values are compared, too. Raises SpecError for a wrong spec or data.
+    `calibration`, its file or the name of one that is built in ("published", "finite_elements"),
+    its values are compared, too. Raises SpecError for a wrong spec or data.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> known = {"pattern": ["00"], "tip_x_mm": [27.0], "tip_y_mm": [1.0]}
@@ -115,13 +118,14 @@ def compare(
     finger = given.scene.finger
     known = states_of(finger, data, shapes)
     frame, said = frame_of(given, known, first_station, tip_offset)
-    better = None if calibration is None else given.recalibrated(calibration).finger
+    better = None if calibration is None else recalibrated_scene(given, calibration).finger
     return CompareResult(
         name_of(data),
         finger,
         known,
         comparison.compare(finger, known, frame),
         None if better is None else comparison.compare(better, known, frame),
+        "" if better is None else better.law.description,
         frame,
         said,
     )

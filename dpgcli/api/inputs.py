@@ -19,20 +19,19 @@ from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, SpecError, UsageError
-from dpgcli.files.calibration import Calibration, read_calibration
+from dpgcli.files.calibration import Calibration
 from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
     canonical_json,
     checked,
-    recalibrated,
-    scene_in,
+    folder_of,
     scene_of,
+    with_files,
 )
 from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
-from dpgcli.files.scene_file.references import with_calibrations
 from dpgcli.files.scene_file.settings import with_settings
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
@@ -57,28 +56,21 @@ E = TypeVar("E", bound=StrEnum)
 class SceneInput:
     """A scene, and the spec that it was read from: none for a value that was handed in.
 
-    `name` is the spec's in messages, `files` are those that were read.
+    `name` is the spec's in messages, `document` what it says, with files by their names,
+    which are relative to `folder`; `files` are those that were read.
     """
 
     name: str
     scene: Scene
     spec: Spec | None = None
     document: Document | None = None
+    folder: Path = Path()
     files: tuple[Path, ...] = ()
 
     @property
     def json(self) -> str:
         """The spec as one line of JSON, as tables keep it."""
         return "{}" if self.spec is None else canonical_json(self.spec)
-
-    def recalibrated(self, calibration: str | Path | Calibration) -> Scene:
-        """The scene with a calibration's values in the place of its own."""
-        if self.document is None:
-            raise UsageError(Field("calibration"), " changes a spec, not a finger's values")
-        if not isinstance(calibration, Calibration):
-            path = path_of("calibration", calibration)
-            calibration = read_calibration(path).model_copy(update={"file": path.name})
-        return scene_of(checked(recalibrated(self.document, calibration)))
 
 
 SpecInput: TypeAlias = str | Path | Mapping[str, Any] | Scene | Finger | SceneInput
@@ -101,7 +93,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
             return spec
         return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
     if isinstance(spec, Mapping):
-        return _scene("spec", spec_document(spec, settings))
+        return _scene("spec", _without_files(spec, settings), Path())
     path = path_of("spec", spec)
     document = read_document(spec)
     if "space" in document.data and "finger" not in document.data:
@@ -112,28 +104,30 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
 
 def scene_input_in(document: Document, path: Path, settings: Settings = ()) -> SceneInput:
     """The same, of a document that was read from this path."""
-    return _scene(str(path), scene_in(document, path, setting_texts(settings)), path)
+    said = with_settings(document, setting_texts(settings))
+    return _scene(str(path), said, folder_of(path), path)
 
 
-def _scene(name: str, document: Document, *own: Path) -> SceneInput:
-    spec = checked(document)
-    return SceneInput(name, scene_of(spec), spec, document, files_of(*own, *document.files))
+def _scene(name: str, said: Document, folder: Path, *own: Path) -> SceneInput:
+    whole = with_files(said, folder)
+    spec = checked(whole)
+    return SceneInput(name, scene_of(spec), spec, said, folder, files_of(*own, *whole.files))
 
 
 def keys_of(spec: str | Path | Mapping[str, Any], settings: Settings = ()) -> Spec:
     """A spec key by key, as `files.scene_file.read_keys`: calibrations need not exist yet."""
     if isinstance(spec, Mapping):
-        return checked_keys(_without_calibrations(spec, settings))
+        return checked_keys(_without_files(spec, settings))
     path = path_of("spec", spec)
     return checked_keys(with_settings(read_document(path), setting_texts(settings)))
 
 
 def spec_document(data: Mapping[str, Any], settings: Settings = ()) -> Document:
-    """The data of a spec, as `settings` change it, with the calibrations it names."""
-    return with_calibrations(_without_calibrations(data, settings), Path())
+    """The data of a spec, as `settings` change it, with what the files hold that it names."""
+    return with_files(_without_files(data, settings), Path())
 
 
-def _without_calibrations(data: Mapping[str, Any], settings: Settings) -> Document:
+def _without_files(data: Mapping[str, Any], settings: Settings) -> Document:
     own = without_free_keys(plain(data))
     return with_settings(Document("spec", own, {}), setting_texts(settings))
 

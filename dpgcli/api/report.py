@@ -10,8 +10,9 @@ from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_reader import read_designs
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
-from dpgcli.reports.summary import DesignSpace, doubts
+from dpgcli.reports.summary import DesignSpace, ranked_metrics
 from dpgcli.studies.sweep import DESIGNS, REPORT
+from dpgcli.sweeps.gate import check_beyond_doubt
 
 PAGES = {".md": markdown, ".html": html}
 AT_END = "<!-- written by dpg -->"
@@ -50,21 +51,22 @@ def page(folder: Path, kind: str, *, strict: bool = False) -> tuple[DesignSpace,
 
 
 def _check_ranking(space: DesignSpace) -> None:
-    if not space.trusts:
-        where = " needs a table that says what its columns rest on, as dpg sweep writes it"
-        raise UsageError(Field("strict"), where)
-    if found := doubts(space):
-        raise UsageError(
-            Field("strict"), " allows no ranking by what is doubted:\n", "\n".join(found)
-        )
+    """Raise UsageError for a ranking by what no design should be judged by."""
+    if len(space.usable):  # else nothing is ranked
+        check_beyond_doubt(space.trusts, ranked=ranked_metrics(space))
 
 
-def summarize(folder: Path, *, is_new: bool) -> tuple[DesignSpace, str]:
-    """The designs of a finished sweep and their page, written into its folder if need be."""
+def summarize(folder: Path, *, is_new: bool, strict: bool = False) -> tuple[DesignSpace, str]:
+    """The designs of a finished sweep and their page, written into its folder if need be.
+
+    Where it is `strict`, raises UsageError as `report` does, with the page in its place.
+    """
     space, text = page(folder, ".md")
     path = folder / REPORT
     if is_new or not path.exists() or _is_outdated(path, text):
         write_page(path, text)
+    if strict:
+        _check_ranking(space)
     return space, text
 
 

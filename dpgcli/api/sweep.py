@@ -28,7 +28,7 @@ from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.trust import warnings_in
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.summary import DesignSpace, surely_ranked
 from dpgcli.reports.summary import doubts as ranked_doubts
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.columns import Kind
@@ -167,7 +167,7 @@ def sweep(
                 warn=silent,
                 tell=silent,
             )
-            result = _result(study, part, is_new, rules)
+            result = _result(study, part, is_new, rules, strict=strict)
         if output is None:
             _ = result.designs, result.states  # before their folder goes
     return result
@@ -195,19 +195,21 @@ def _check_part(
 
 
 def _result(
-    study: Study, part: Shard | None, is_new: bool, rules: Sequence[Expression]
+    study: Study, part: Shard | None, is_new: bool, rules: Sequence[Expression], *, strict: bool
 ) -> SweepResult:
     if part is not None:
         return SweepResult(study.folder, study.fingerprint, study.n_failed)
-    found = _summarized(study.folder, study.fingerprint, is_new=is_new)
+    found = _summarized(study.folder, study.fingerprint, is_new=is_new, strict=strict)
     if found.space is None or not rules:
         return found
     verdicts = check_requirements(found.space.designs, rules, found.space.trusts)
     return replace(found, verdicts=verdicts)
 
 
-def _summarized(folder: Path, fingerprint: str, *, is_new: bool) -> SweepResult:
-    space, text = summarize(folder, is_new=is_new)
+def _summarized(
+    folder: Path, fingerprint: str, *, is_new: bool, strict: bool = False
+) -> SweepResult:
+    space, text = summarize(folder, is_new=is_new, strict=strict)
     return SweepResult(folder, fingerprint, len(space.of_status("failed")), text, space)
 
 
@@ -230,10 +232,11 @@ def rules_of(
 ) -> tuple[list[Expression], list[Message]]:
     """Requirements over the columns of designs, checked before any work, and what is doubted.
 
-    Raises UsageError for what is no requirement, and where it is `strict` for what is doubted.
+    Raises UsageError for what is no requirement, and where it is `strict` for requirements and
+    rankings by what is doubted.
     """
     texts = as_texts("require", require)
-    if not texts:
+    if not texts and not strict:  # so that a large space need not be asked what it rests on
         return [], []
     columns = study.evaluation.design_columns
     numbers = [column.name for column in columns if column.kind in (Kind.COUNT, Kind.NUMBER)]
@@ -241,7 +244,7 @@ def rules_of(
     known = {trust.output: trust for trust in study.trusts}
     trusts = {c.name: [known[o] for o in c.outputs if o in known] for c in columns}
     if strict and known:  # else there is no design to judge
-        check_beyond_doubt(rules, trusts)
+        check_beyond_doubt(trusts, rules, surely_ranked(trusts))
     return rules, [doubt for rule in rules for doubt in doubts(rule, trusts)]
 
 

@@ -200,11 +200,18 @@ def rows(known: KnownStates, found: Comparison, calibrated: Comparison | None = 
         "known_x_mm": known.tip[0],
         "known_y_mm": known.tip[1],
     }
-    errors = {name: e for name, e in _errors(found).items() if np.isfinite(e).any()}
-    if calibrated is not None:
-        better = _errors(calibrated)
-        errors |= {CALIBRATED + name: better[name] for name in errors}
-    return {**table, **errors}
+    errors = _errors(found)
+    better = {} if calibrated is None else _errors(calibrated)
+    shown = [name for name in errors if _has_any(errors[name]) or _has_any(better.get(name))]
+    return {
+        **table,
+        **{name: errors[name] for name in shown},
+        **{CALIBRATED + name: better[name] for name in shown if better},
+    }
+
+
+def _has_any(errors: Array | None) -> bool:
+    return errors is not None and bool(np.isfinite(errors).any())
 
 
 def _errors(found: Comparison) -> Columns:

@@ -23,8 +23,13 @@ Shapes = Annotated[
     Path | None,
     typer.Option("--shapes", metavar="FILE", help="CSV of the layer's points: pattern, x_mm, y_mm"),
 ]
-CalibrationFile = Annotated[
-    Path | None, typer.Option("--calibration", metavar="FILE", help="Compare with its values, too")
+OtherCalibration = Annotated[
+    str | None,
+    typer.Option(
+        "--calibration",
+        metavar="NAME|FILE",
+        help="Compare with its values, too: a file, published, finite_elements",
+    ),
 ]
 
 
@@ -32,7 +37,7 @@ def compare(
     spec: SpecPath,
     data: Data,
     settings: Settings = None,
-    calibration: CalibrationFile = None,
+    calibration: OtherCalibration = None,
     shapes: Shapes = None,
     first_station: FirstStation = None,
     tip_offset: TipOffset = None,
@@ -55,7 +60,7 @@ def compare(
     given, frame = scene_input(spec, settings or ()), frame_of(first_station, tip_offset)
     if plot is not None:
         check_plot(plot)
-        sources = [path for path in (data, shapes, calibration) if path is not None]
+        sources = [Path(path) for path in (data, shapes, calibration) if path is not None]
         check_outputs([*sources, *given.files], (plot, Mark.FIGURE))
     found = compare(
         given,

@@ -9,6 +9,7 @@ EXAMPLES = {
         "dpg predict finger.yaml --pattern '1*' --set finger.geometry.unit_separation_mm=2.5",
         "dpg predict finger.yaml --output states.parquet --plot states.svg",
         "dpg predict finger.yaml --format csv > states.csv",
+        "dpg predict finger.yaml --columns barriers",
     ),
     "explain": (
         "dpg explain finger.yaml",
@@ -47,6 +48,10 @@ EXAMPLES = {
         "dpg transitions finger.yaml",
         "dpg transitions finger.yaml --set 'pressure.lines={A: 1-2, B: 3}' --graph states.graphml",
         "dpg transitions finger.yaml --output transitions.parquet --plot states.svg",
+    ),
+    "landscape": (
+        "dpg landscape finger.yaml --from 000 --to 111",
+        "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
     "pulses": (
         "dpg pulses finger.yaml --to 11111",

@@ -10,7 +10,7 @@ OPTIONS = {
     "setting": "-s",
     "patterns": "--pattern",
     "start": "--from",
-    "target": "--to",
+    "end": "--to",
 }
 
 

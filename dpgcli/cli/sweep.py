@@ -139,7 +139,7 @@ def sweep(
         drop_half_written(folder)
         is_new = carry_out(work) if described is None else described.beside(carry_out, work)
         if part is None:
-            n_failed, code = _judge(study, rules, summary_file, is_new, quiet)
+            n_failed, code = _judge(study, rules, summary_file, is_new, quiet, strict=strict)
         else:
             n_failed, code = study.n_failed, ExitCode.DONE
     check_failed(n_failed, max_failed)
@@ -217,14 +217,20 @@ def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None
 
 
 def _judge(
-    study: "Study", rules: "list[Expression]", summary_file: Path | None, is_new: bool, quiet: bool
+    study: "Study",
+    rules: "list[Expression]",
+    summary_file: Path | None,
+    is_new: bool,
+    quiet: bool,
+    *,
+    strict: bool,
 ) -> tuple[int, ExitCode]:
     """Report; how many designs failed, and how the command ends if they may."""
     from dpgcli.api.report import summarize
     from dpgcli.reports.page import verdicts_markdown
     from dpgcli.sweeps.gate import check_requirements
 
-    space, text = summarize(study.folder, is_new=is_new)
+    space, text = summarize(study.folder, is_new=is_new, strict=strict)
     designs = space.designs
     if is_new and not quiet:
         print_in_short(study.folder, space)

@@ -18,7 +18,7 @@ def _wrong(error: Any) -> str:
         message = str(getattr(error, "message", error)).rstrip(".")
         near = getattr(error, "possibilities", None)
         meant = f"; did you mean {' or '.join(near)}?" if near else ""
-        return f"{message[:1].lower()}{message[1:]}{meant}"
+        return f"{message[:1].lower()}{message[1:]}{_key_of_a_spec(error) or meant}"
     name = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[-1]
     if type(error).__name__ == "MissingParameter":
         return f"{name} is missing"
@@ -26,6 +26,17 @@ def _wrong(error: Any) -> str:
         return f"{name} {error.message}"
     (first, *_) = error.__cause__.errors()  # of pydantic
     return f"{name} {first['input']}: expected {_expected(error.message)}"
+
+
+def _key_of_a_spec(error: Any) -> str:
+    """How to say what is no option of a command, but a key of the spec that the command changes."""
+    from dpgcli.files.scene_file.models import FingerSpec
+
+    key = getattr(error, "option_name", "").lstrip("-").replace("-", "_")
+    context = getattr(error, "ctx", None)
+    options = [option for p in context.command.params for option in p.opts] if context else []
+    is_key = key in FingerSpec.model_fields and "--set" in options
+    return f"; a key of the spec: --set finger.{key}=VALUE" if is_key else ""
 
 
 def _expected(message: str) -> str:

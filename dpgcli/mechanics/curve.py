@@ -59,8 +59,7 @@ class Curve(Spline):
     `rests` are the top and the well, where the slope vanishes: the minimum that lies deepest below
     what is on both its sides, and the highest maximum before it; NaN where there is none.
     `branches` are the stretches between the two on which the energy falls, each from its top to its
-    well, the last one first. A curve that ends while it rises beyond its well goes on rising, at
-    least as stiffly as it did from there on average: the curvature of its end may be noise.
+    well, the last one first.
     """
 
     rests: tuple[float, float]
@@ -90,12 +89,7 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     rest: Any = (1, 0.0) if starts_at_rest else "not-a-knot"
     counted = np.subtract(value, value[0] if starts_at_rest else 0.0)
     cubic = CubicSpline(travel, counted, bc_type=(rest, "not-a-knot"))
-    rests, branches = _rests(cubic)
-    pieces = spline_pieces(cubic)
-    end, slope = cubic.x[-1], float(cubic(cubic.x[-1], 1))
-    if slope > 0.0 and rests[1] < end:
-        pieces[1, -1] = max(pieces[1, -1], 0.5 * slope / (end - rests[1]))
-    return Curve(np.asarray(travel, float), pieces, rests, branches)
+    return Curve(np.asarray(travel, float), spline_pieces(cubic), *_rests(cubic))
 
 
 def spline_pieces(cubic: "CubicSpline") -> Array:
@@ -122,13 +116,18 @@ def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tup
 
     Each piece goes on as far as it is long, at most through a third of the gap, by the parabola of
     its nearest third (assumed: nothing is known there). Without these points a spline bends over
-    the whole gap, and takes the pieces' ends along.
+    the whole gap, and takes the pieces' ends along. The last piece goes on beyond its end too, if
+    it stiffens: the curvature of a spline at the very end is that of the last points' noise.
 
     >>> travel = np.array([0.0, 1.0, 2.0, 3.0, 9.0, 10.0, 11.0, 12.0])
     >>> more, value = bridged(travel, travel**2, [(3.0, 9.0)])
     >>> more[4:7].round(2).tolist(), np.abs(value - more**2).max() < 1e-12
     ([3.67, 4.33, 5.0], np.True_)
+    >>> more[-3:].tolist()
+    [13.0, 14.0, 15.0]
     """
+    if not gaps:
+        return travel, value
     edges = [travel[0], *(end for gap in gaps for end in gap), travel[-1]]
     travels, values = [travel], [value]
     for piece in range(0, len(edges), 2):
@@ -137,24 +136,28 @@ def bridged(travel: Array, value: Array, gaps: Sequence[Sequence[float]]) -> tup
             continue
         first, last = travel[own].min(), travel[own].max()
         for end, sign, gap in ((first, -1.0, piece // 2 - 1), (last, 1.0, piece // 2)):
-            if not 0 <= gap < len(gaps):
+            if gap < 0:
                 continue
-            reach = min(last - first, (gaps[gap][1] - gaps[gap][0]) / 3.0)
-            beyond = sign * reach * np.array([1.0, 2.0, 3.0]) / 3.0
-            travels.append(end + beyond)
-            values.append(_continued(travel[own] - end, value[own], beyond))
+            is_inner = gap < len(gaps)
+            room = (gaps[gap][1] - gaps[gap][0]) / 3.0 if is_inner else np.inf
+            beyond = sign * min(last - first, room) * np.array([1.0, 2.0, 3.0]) / 3.0
+            slope, bend = _parabola(travel[own] - end, value[own])
+            if is_inner or bend > 0.0:
+                near = value[own][np.abs(travel[own] - end).argmin()]
+                travels.append(end + beyond)
+                values.append(near + slope * beyond + bend * beyond**2)
     order = np.argsort(np.concatenate(travels))
     return np.concatenate(travels)[order], np.concatenate(values)[order]
 
 
-def _continued(travel: Array, value: Array, beyond: Array) -> Array:
-    """Values beyond the point at travel 0 of a piece, by the parabola of its nearest third."""
+def _parabola(travel: Array, value: Array) -> tuple[float, float]:
+    """Slope and half the curvature at travel 0, an end of a piece, by its nearest third."""
     nearest = np.argsort(np.abs(travel))[: max(FEWEST_POINTS, len(travel) // 3)]
     rise = value[nearest] - value[nearest[0]]
     slope, bend = np.linalg.lstsq(
         np.stack((travel[nearest], travel[nearest] ** 2), axis=1), rise, rcond=None
     )[0]
-    return np.asarray(value[nearest[0]] + slope * beyond + bend * beyond**2)
+    return float(slope), float(bend)
 
 
 def _rests(

@@ -54,22 +54,22 @@ class Drawing:
         title = "A finger under pressure"
         with figure_to(path, *page, title, self._description(), layout=None) as figure:
             room = (WIDTH - LEFT - RIGHT + BETWEEN) / len(lines)
-            first = None
+            drawn: list[Any] = []
             for place, line in enumerate(lines):
                 box = LEFT + place * room, below + FOOT, room - BETWEEN, CURVES
-                axes = figure.add_axes(_share(box, page), sharey=first)
-                first = first or axes
+                axes = figure.add_axes(_share(box, page), sharey=drawn[0] if drawn else None)
+                drawn.append(axes)
                 self._draw_curve(axes, place)
                 axes.set_xlabel(f"pressure{f' of line {line}' if len(lines) > 1 else ''} (MPa)")
                 axes.tick_params("y", labelleft=place == 0)
-            first.set_ylabel("deflection of the tip, \u2212y (mm)")
+            drawn[0].set_ylabel("deflection of the tip, \u2212y (mm)")
             self._draw_key(figure, page)
             self._draw_holds(figure, page)
 
     @cached_property
     def deflection(self) -> Array:
         """How far the tip is towards the inner side, mm, by point."""
-        return -self.readings.pose[1]
+        return np.asarray(-self.readings.pose[1])
 
     @cached_property
     def holds(self) -> Indices:
@@ -77,7 +77,7 @@ class Drawing:
         holds = np.array(self.way.holds, int)
         holds = holds[self.way.points.cycle[holds] == 1]
         n = min(len(holds), MOST_PANELS)
-        return holds[np.linspace(0, len(holds) - 1, n).round().astype(int)]
+        return np.asarray(holds[np.linspace(0, len(holds) - 1, n).round().astype(int)])
 
     @cached_property
     def states(self) -> list[DrawnState]:
@@ -117,7 +117,7 @@ class Drawing:
             (is_jump, JUMP, ":"),
         ):
             axes.add_collection(
-                LineCollection(segments[which], colors=color, linestyles=dashes, lw=1.6)
+                LineCollection([*segments[which]], colors=color, linestyles=dashes, lw=1.6)
             )
         self._mark_events(axes, line, points)
         axes.margins(x=0.12, y=0.08)
@@ -213,7 +213,7 @@ class Drawing:
 
 
 def _share(box: Sequence[float], page: tuple[float, float]) -> Array:
-    return np.array(box) / np.array([*page, *page])
+    return np.asarray(np.array(box) / np.array([*page, *page]))
 
 
 def _drawn(scene: Scene, readings: Readings, which: Indices) -> Iterator[DrawnState]:

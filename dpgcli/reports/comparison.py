@@ -23,13 +23,15 @@ if TYPE_CHECKING:  # SciPy is in the way of comparisons, which need none
 FOOT, HEAD = 1.25, 0.35  # inches
 
 
-def comparison_summary(found: Comparison, calibrated: Comparison | None, law: str) -> Iterator[str]:
+def comparison_summary(
+    found: Comparison, law: str, calibrated: Comparison | None, calibrated_law: str
+) -> Iterator[str]:
     """Worst and mean errors of the states that are in both, before and after a calibration."""
     if calibrated is None:
         yield from _errors(found, law)
     else:
         yield from _errors(found, f"as in the spec, {law}")
-        yield from _errors(calibrated, f"calibrated, {law}")
+        yield from _errors(calibrated, f"calibrated, {calibrated_law}")
 
 
 def _errors(found: "Comparison", what: str) -> Iterator[str]:

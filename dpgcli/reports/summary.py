@@ -5,7 +5,7 @@ Same table, same sections: what differs between runs is in run.json alone.
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,11 +14,11 @@ import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
-from dpgcli.design.outputs import Trust, doubts_about
+from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Origin
 from dpgcli.files.trust import trusts_in, warnings_in
 from dpgcli.reports.base import bar_stiffness, base_lines
-from dpgcli.sweeps.gate import swept_names
+from dpgcli.sweeps.gate import ranking_doubts, swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero
     "workspace_area_mm2": True,
@@ -248,9 +248,21 @@ def _extremes(space: DesignSpace) -> list[str | PageTable]:
 
 def doubts(space: DesignSpace) -> list[str]:
     """Why designs should not be ranked by some of the metrics, in a line for each reason."""
-    ranked = dict.fromkeys(extreme.metric for extreme in extremes(space))
-    trusts = {name: space.trusts.get(name, ()) for name in ranked}
-    return [f"ranking: {why}" for why in doubts_about(trusts)]
+    return ranking_doubts(ranked_metrics(space), space.trusts)
+
+
+def ranked_metrics(space: DesignSpace) -> list[str]:
+    """The metrics by which designs are ranked."""
+    return [*dict.fromkeys(extreme.metric for extreme in extremes(space))]
+
+
+def surely_ranked(columns: Iterable[str]) -> list[str]:
+    """The same of a table with these columns, before it is made.
+
+    Whether a largest stiffness shows more than bars is not known before.
+    """
+    found = {*columns} - {STIFFEST}
+    return [name for name in METRICS if name in found]
 
 
 def _trust(space: DesignSpace) -> Iterator[PageSection]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
+from dpgcli.states.barriers import Barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
@@ -74,6 +75,7 @@ class SolvedFingers(SolvedStates):
     settled: Settled
     tip: Tip
     around: Surroundings
+    barriers_if_asked: Barriers | None = None
 
     @classmethod
     def of(
@@ -83,6 +85,7 @@ class SolvedFingers(SolvedStates):
         dropped_error: float | Array,
         *,
         with_compliance: bool,
+        barriers: Barriers | None = None,
     ) -> "SolvedFingers":
         """The states of a batch; `dropped_error` is added to the error of each tip, mm."""
         at_tip = tip(settled, with_compliance=with_compliance)
@@ -97,7 +100,15 @@ class SolvedFingers(SolvedStates):
             settled,
             at_tip,
             around,
+            barriers,
         )
+
+    @property
+    def barriers(self) -> Barriers:
+        """What units have to get over to flip, and which of them needs least."""
+        if self.barriers_if_asked is None:
+            raise ValueError("the states were solved without their barriers")
+        return self.barriers_if_asked
 
     @cached_property
     def eigenvalues(self) -> Array:

@@ -23,6 +23,7 @@ from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, w
 from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask, reason_against
+from dpgcli.sweeps.designs import designs_at_once
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
@@ -142,8 +143,14 @@ class Study:
 
     @property
     def chunk_size(self) -> int:
-        """Designs per chunk: many states, but never so many that one waits for it."""
-        return max(1, STATES_PER_CHUNK >> self.extent.most_units)
+        """Designs per chunk: many states, but never so many that one waits for it.
+
+        Under pressure a batch of them takes a second or more.
+        """
+        most_units = self.extent.most_units
+        if self.extent.has_pressure:
+            return designs_at_once(most_units)
+        return max(1, STATES_PER_CHUNK >> most_units)
 
     @cached_property
     def extent(self) -> Extent:

@@ -82,8 +82,13 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
+def designs_at_once(n_units: int) -> int:
+    """How many designs to solve in one batch, all states of each."""
+    return max(1, lanes_at_once(n_units) >> n_units)
+
+
 def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
-    size = max(1, lanes_at_once(n_units) >> n_units)
+    size = designs_at_once(n_units)
     for first in range(0, n_designs, size):
         yield np.arange(first, min(first + size, n_designs))
 

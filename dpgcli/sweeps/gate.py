@@ -1,6 +1,6 @@
 """Requirements on a table of designs: thresholds that every design has to meet."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -107,17 +107,34 @@ def doubts(rule: Expression, trusts: Trusts) -> tuple[Message, ...]:
     return tuple(Message(Field("require"), f" {rule.text!r}: {why}") for why in found)
 
 
-def check_beyond_doubt(rules: Sequence[Expression], trusts: Trusts) -> None:
-    """Raise UsageError for requirements on what no design should be judged by.
+def ranking_doubts(metrics: Iterable[str], trusts: Trusts) -> list[str]:
+    """Why designs should not be ranked by some of the metrics, in a line for each reason."""
+    return [f"ranking: {why}" for why in doubts_about({m: trusts.get(m, ()) for m in metrics})]
 
-    And for a table that does not say what its columns rest on.
+
+def check_beyond_doubt(
+    trusts: Trusts, rules: Sequence[Expression] = (), ranked: Iterable[str] = ()
+) -> None:
+    """Raise UsageError for requirements on, and rankings by, what no design should be judged by.
+
+    And for a table that does not say what its columns rest on. `ranked` are metrics.
     """
     if not trusts:
         where = " needs a table that says what its columns rest on, as dpg sweep writes it"
         raise UsageError(Field("strict"), where)
-    if found := [doubt for rule in rules for doubt in doubts(rule, trusts)]:
-        lines = (part for doubt in found for part in ("\n", doubt))
-        raise UsageError(Field("strict"), " allows no requirement on what is doubted:", *lines)
+    refused: dict[str, Sequence[str]] = {
+        "requirement on": [doubt for rule in rules for doubt in doubts(rule, trusts)],
+        "ranking by": ranking_doubts(ranked, trusts),
+    }
+    lines = [
+        line
+        for what, found in refused.items()
+        if found
+        for line in (Message(Field("strict"), f" allows no {what} what is doubted:"), *found)
+    ]
+    if lines:
+        first, *others = lines
+        raise UsageError(first, *(part for line in others for part in ("\n", line)))
 
 
 def number_columns(designs: Columns) -> list[str]:
@@ -154,8 +171,8 @@ def check_designs(
     """
     columns = number_columns(designs)
     rules = [requirement(text, columns) for text in texts]
-    if strict:
-        check_beyond_doubt(rules, trusts)
+    if strict and (designs["n_stable"] > 0).any():  # else there is nothing to doubt
+        check_beyond_doubt(trusts, rules)
     return check_requirements(designs, rules, trusts)
 
 

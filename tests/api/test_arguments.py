@@ -11,6 +11,10 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
+from dpgcli.api.given import sweep_input
+from dpgcli.api.inputs import scene_input
+from dpgcli.api.recalibration import recalibrated_scene
+from dpgcli.files.scene_file import scene_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 FINGER = uniform_finger(2, **STUDY)
@@ -178,3 +182,46 @@ def test_no_finger_has_such_values(values: dict[str, Any], said: str) -> None:
 
 def test_hinges_may_have_no_stiffness() -> None:
     assert uniform_finger(2, **{**STUDY, "hinge_stiffness": 0.0}).n_units == 2
+
+
+def test_a_calibration_is_a_name_a_path_or_a_value() -> None:
+    """A Path is never the name of one that is built in."""
+    spec, bent = study("published"), {"pattern": ["11"], "tip_x_mm": [26.0], "tip_y_mm": [-4.0]}
+    errors = {
+        name: dpg.compare(spec, bent, calibration=name).table["calibrated_error_mm"]
+        for name in ("published", "finite_elements")
+    }
+    plain, shipped = (dpg.compare(study(name), bent).table["error_mm"] for name in errors)
+    np.testing.assert_array_equal(errors["published"], plain)
+    np.testing.assert_array_equal(errors["finite_elements"], shipped)
+    assert np.abs(plain - shipped).max() > 0.1
+    with pytest.raises(dpg.UsageError, match=r"^calibration published: expected .* no such file"):
+        dpg.compare(spec, bent, calibration=Path("published"))
+    with pytest.raises(dpg.UsageError, match="changes a spec, not a finger's values"):
+        dpg.compare(FINGER, bent, calibration="published")
+    with pytest.raises(dpg.SpecError, match=r"dome_height_mm.*; with calibration published\)"):
+        dpg.compare(BASE, bent, calibration="published")
+
+
+def test_pressures_in_a_file_that_data_name_are_read(tmp_path: Path) -> None:
+    """As in a spec; also beside another calibration, and in the base of a sweep."""
+    (tmp_path / "steps.csv").write_text("A_MPa\n0\n0.15\n")
+    data = {**study("published"), "pressure": {"history": str(tmp_path / "steps.csv")}}
+    given = scene_input(data)
+    assert given.files == (tmp_path / "steps.csv",)
+    sweep = sweep_input({"base": data, "space": SWEEP["space"]})
+    for pressure in (
+        given.scene.pressure,
+        recalibrated_scene(given, "finite_elements").pressure,
+        scene_of(sweep.base).pressure,
+    ):
+        assert pressure is not None and pressure.history is not None
+        assert pressure.history.pressure.tolist() == [[0.0], [0.15]]
+
+
+def study(calibration: str) -> dict[str, Any]:
+    """A finger of the study's dimensions."""
+    geometry = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "unit_cell_mm": 22}
+    geometry |= {"chamber_length_mm": 9, "channel_width_mm": 10, "unit_separation_mm": 3}
+    geometry |= {"limiting_layer_thickness_mm": 1.5, "elastic_modulus_MPa": 26}
+    return {"finger": {"units": 2, "calibration": calibration, "geometry": geometry}}

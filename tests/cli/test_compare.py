@@ -218,7 +218,11 @@ def test_a_figure_of_both(call: Any, published: tuple[str, ...], lever: str, fol
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "cal.yaml: file: expected a readable file, found no such file"),
+        (
+            None,
+            '--calibration cal.yaml: expected "published", "finite_elements" or the name of a '
+            "calibration file, found no such file",
+        ),
         ("", "cal.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
         (LEVER.replace("12.33", "-12"), "cal.yaml:4:30: values.segment_height_mm.value: expected"),
         (
@@ -298,6 +302,103 @@ def test_calibrated_is_what_a_spec_with_that_calibration_predicts(
     for pattern, row in found.items():
         assert row["calibrated_error_mm"] == expected[pattern]["error_mm"]
         assert row["calibrated_error_percent"] == expected[pattern]["error_percent"]
+
+
+OWN = {  # what a spec says itself
+    "finger.wall_compliance_mm_per_N": "0.2",
+    "finger.lattice.segment_height_mm": "10.75",
+    "finger.lattice.bistable_stiffness_N_per_mm": "9",
+    "finger.lattice.hinge_stiffness_N_mm_per_rad": "20",
+}
+GIVEN = {"published": [*OWN][2:], "finite_elements": [*OWN]}  # of these, what a calibration has
+KEPT = {"finger.geometry.chamber_length_mm": "null", "finger.lattice.segment_length_mm": "13.75"}
+ALONE = {"finger.lattice.force_linearity": "0.1"}  # beside no calibration
+BEFORE = ("", "published", "lever.yaml,published", "finite_elements")
+
+
+def set_to(values: dict[str, str]) -> list[str]:
+    return [word for key, value in values.items() for word in ("-s", f"{key}={value}")]
+
+
+@pytest.mark.parametrize("law", ["", "published", "push_only"])
+@pytest.mark.parametrize("before", BEFORE)
+@pytest.mark.parametrize("name", ["published", "finite_elements"])
+def test_names_that_are_built_in_are_what_a_spec_with_them_predicts(
+    call: Any, folder: Path, lever: str, name: str, before: str, law: str
+) -> None:
+    """The law, too, where the spec has none; lattice values that the calibration has go."""
+    assert lever == "lever.yaml"
+    (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n110,36,-15\n011,38,-8\n")
+    own = OWN | KEPT | ({"finger.calibration": f"[{before}]"} if before else ALONE)
+    said = own | ({"finger.law": law} if law else {})
+    listed = f"[{name},{before}]" if before and name != "published" else name
+    given = dict.fromkeys([*GIVEN[name], *ALONE], "null")
+    other = said | given | {"finger.calibration": listed}
+    without = ("-s", "finger.calibration=null")
+    command = ("compare", "three_unit.yaml", "tips.csv", "--format", "json", *without)
+    expected = call(*command, *set_to(other))
+    result = call(*command, *set_to(said), "--calibration", name)
+    found, wanted = rows(result.stdout), rows(expected.stdout)
+    assert found.keys() == wanted.keys() == {"110", "011"}
+    for pattern, row in found.items():
+        assert row["calibrated_error_mm"] == wanted[pattern]["error_mm"] != row["error_mm"]
+    words = expected.stderr.partition("errors of the model (")[2].partition(")")[0]
+    assert f"(calibrated, {words})" in result.stderr
+
+
+def test_names_in_the_spec_stay_relative_to_it(
+    call: Any, folder: Path, published: tuple[str, ...], lever: str
+) -> None:
+    command, spec, *others = published
+    text = (folder / spec).read_text().replace("finger:", f"finger:\n  calibration: {lever}", 1)
+    (folder / "own").mkdir()
+    (folder / lever).rename(folder / "own" / lever)
+    (folder / "own" / spec).write_text(text)
+    (folder / "new.yaml").write_text(dome(6.5, 2.0))
+    result = call(command, f"own/{spec}", *others, "--calibration", "new.yaml")
+    assert result.exit_code == ExitCode.DONE
+
+
+def test_what_exists_by_the_calibration_alone_is_shown(call: Any, folder: Path) -> None:
+    (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n110,36,-15\n")
+    soft = set_to({"finger.lattice.hinge_stiffness_N_mm_per_rad": "1e4"})
+    command = ("compare", "three_unit.yaml", "tips.csv", "--format", "json")
+    (row,) = rows(call(*command, *soft, "--calibration", "published").stdout).values()
+    assert row["error_mm"] is None
+    (plain,) = rows(call(*command).stdout).values()
+    assert row["calibrated_error_mm"] == plain["error_mm"] > 0.0
+
+
+def test_published_springs_have_no_curve(call: Any, folder: Path) -> None:
+    (folder / "tips.csv").write_text("pattern,tip_x_mm,tip_y_mm\n110,36,-15\n")
+    shipped = {"finger.calibration": "finite_elements", "finger.law": "tabulated"}
+    command = ("compare", "three_unit.yaml", "tips.csv", *set_to(shipped))
+    assert call(*command).exit_code == ExitCode.DONE
+    result = call(*command, "--calibration", "published")
+    assert result.exit_code == ExitCode.USAGE
+    assert "finger.law: expected a calibration with a curve" in result.stderr
+    assert "with --calibration published)" in result.stderr
+
+
+def test_a_name_that_is_built_in_is_no_file(
+    call: Any, folder: Path, published: tuple[str, ...], lever: str
+) -> None:
+    """As in a spec; a path that is spelled out is one."""
+    (folder / "published").write_bytes((folder / lever).read_bytes())
+    own, file = (
+        rows(call(*published, "--calibration", name, "--format", "json", "-q").stdout)
+        for name in ("./published", lever)
+    )
+    assert own == file
+    result = call(*published, "--calibration", "published")
+    assert result.exit_code == ExitCode.USAGE
+    problems = result.stderr.splitlines()[:-1]
+    assert all("with --calibration published)" in line for line in problems)
+    assert any(
+        "finger.lattice.bistable_stiffness_N_per_mm: expected a value, or geometry with dome_height"
+        in line
+        for line in problems
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """What to trust is said where it is used: explain, predict, tables, requirements, rankings."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -111,19 +112,72 @@ def test_each_doubt_is_one_line_and_alone(
         assert (strict.stdout == "") is (name in doubted)
 
 
+NO_REQUIREMENT = "dpg: --strict allows no requirement on what is doubted:"
+NO_RANKING = "dpg: --strict allows no ranking by what is doubted:"
+UNSEEN = {"stiffness_max_N_per_mm"}  # whether designs are ranked by it is known by their states
+
+
+@pytest.mark.parametrize("rule", ["n_states > 0", "min_barrier_mJ > 0.1"])
+@pytest.mark.parametrize("of", [(), ("--shard", "1/2")])
 @pytest.mark.parametrize(("settings", "doubted"), SPACES)
 def test_strict_is_an_error_before_the_work(
-    call: Call, domes: Path, settings: tuple[str, ...], doubted: set[str]
+    call: Call,
+    domes: Path,
+    settings: tuple[str, ...],
+    doubted: set[str],
+    of: tuple[str, ...],
+    rule: str,
 ) -> None:
-    rule = "min_barrier_mJ > 0.1"
-    done = call("sweep", "sweep.yaml", *SERIAL, *settings, "--require", rule, "--strict")
-    is_refused = "min_barrier_mJ" in doubted
+    """Of requirements and of rankings, in the words of `report`; of a shard there is no table."""
+    required = () if of else ("--require", rule)
+    done = call("sweep", "sweep.yaml", *SERIAL, *settings, *required, *of, "--strict")
+    is_refused = bool(doubted - UNSEEN)
     assert done.exit_code == (ExitCode.USAGE if is_refused else ExitCode.DONE)
     assert (domes / "out").exists() is not is_refused
+    lines = done.stderr.splitlines() if is_refused else []
+    if required and "min_barrier_mJ" in doubted and rule.startswith("min_barrier_mJ"):
+        assert lines[0] == NO_REQUIREMENT
+        assert lines[1].startswith(f"dpg: --require '{rule}': min_barrier_mJ rests on barriers (")
+        lines = lines[2:]
     if is_refused:
-        first, second = done.stderr.splitlines()
-        assert first == "dpg: --strict allows no requirement on what is doubted:"
-        assert second.startswith(f"dpg: --require '{rule}': min_barrier_mJ rests on barriers (")
+        call("sweep", "sweep.yaml", *SERIAL, *settings, "-q")
+        assert lines == call("report", "out", "--strict").stderr.splitlines()
+        assert lines[0] == NO_RANKING
+        words = " ".join(line.split(" rests on ")[0].split(" rest on ")[0] for line in lines)
+        assert all(name in words for name in doubted - UNSEEN - {"n_stable"})
+
+
+def test_a_ranking_that_is_known_by_its_states_is_refused_after_them(
+    call: Call, domes: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The largest stiffness shows more than the bars only where a hinge is as stiff as they are."""
+    axis = "{key: finger.lattice.hinge_stiffness_N_mm_per_rad, values: [24, 1e7]}"
+    (domes / "sweep.yaml").write_text(f"base: three_unit.yaml\nspace: [{axis}]\n")
+    done = call("sweep", "sweep.yaml", *SERIAL, *DOME, *WALL, "--strict")
+    assert (done.exit_code, done.stdout) == (ExitCode.USAGE, "")
+    assert {path.name for path in (domes / "out").iterdir()} >= {"designs.parquet", "report.md"}
+    head, *lines = [line for line in done.stderr.splitlines() if line.startswith("dpg: ")]
+    assert head == NO_RANKING
+    assert [line.split(" rests on ")[0] for line in lines] == [
+        "dpg: ranking: stiffness_max_N_per_mm"
+    ]
+    again = call("sweep", "sweep.yaml", *SERIAL, *DOME, *WALL, "--strict")
+    assert again.exit_code == ExitCode.USAGE, "also where there is nothing left to do"
+    assert call("sweep", "sweep.yaml", *SERIAL, *DOME, *WALL).exit_code == ExitCode.DONE
+    monkeypatch.chdir(domes)
+    settings = [text for text in (*DOME, *WALL) if text != "-s"]
+    with pytest.raises(dpg.UsageError, match=r"^strict allows no ranking.*\n.*stiffness_max_N"):
+        dpg.sweep("sweep.yaml", executor="serial", settings=settings, strict=True)
+
+
+def test_where_nothing_can_be_judged_nothing_is_refused(call: Call, domes: Path) -> None:
+    """A table of designs that constraints exclude does not say what it rests on."""
+    text = (domes / "sweep.yaml").read_text()
+    (domes / "sweep.yaml").write_text(text + "constraints: [unit_separation_mm > 9]\n")
+    assert call("sweep", "sweep.yaml", *SERIAL, "--strict").exit_code == ExitCode.DONE
+    assert call("report", "out", "--strict").exit_code == ExitCode.DONE
+    checked = call("check", "out/designs.parquet", "--require", "n_stable > 0", "--strict")
+    assert checked.exit_code == ExitCode.NOTHING_SELECTED
 
 
 def test_a_doubt_names_the_basis_and_what_to_do(call: Call, domes: Path) -> None:
@@ -179,7 +233,7 @@ def test_a_ranking_is_warned_of_and_refused(call: Call, domes: Path) -> None:
     assert (strict.exit_code, strict.stdout) == (ExitCode.USAGE, "")
     assert not (domes / "page.html").exists()
     first, *others = strict.stderr.splitlines()
-    assert first == "dpg: --strict allows no ranking by what is doubted:"
+    assert first == NO_RANKING
     assert [f"warning: {line.removeprefix('dpg: ')}" for line in others] == lines
     assert call("sweep", "sweep.yaml", *SERIAL, "-q", "--restart").stderr == ""
 
@@ -352,11 +406,15 @@ def test_a_table_that_does_not_say_it_is_taken_but_not_strictly(call: Call, dome
     rule = ("own.parquet", "--require", "min_barrier_mJ > 0")
     done = call("check", *rule)
     assert (done.exit_code, done.stderr) == (ExitCode.DONE, "")
-    strict = call("check", *rule, "--strict")
-    assert strict.exit_code == ExitCode.USAGE
-    assert strict.stderr == (
-        "dpg: --strict needs a table that says what its columns rest on, as dpg sweep writes it\n"
-    )
+    (domes / "own").mkdir()
+    shutil.copy(domes / "own.parquet", domes / "own" / "designs.parquet")
+    assert call("report", "own").exit_code == ExitCode.DONE
+    for strict in (call("check", *rule, "--strict"), call("report", "own", "--strict")):
+        assert strict.exit_code == ExitCode.USAGE
+        assert strict.stderr == (
+            "dpg: --strict needs a table that says what its columns rest on, "
+            "as dpg sweep writes it\n"
+        )
 
 
 def test_json_of_check_has_the_warnings(call: Call, domes: Path) -> None:
@@ -396,6 +454,8 @@ def test_from_python(domes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         with pytest.raises(dpg.UsageError, match="strict allows no requirement"):
             strict()
+    with pytest.raises(dpg.UsageError, match=r"^strict allows no ranking by what is doubted:\n"):
+        dpg.sweep("sweep.yaml", "no", settings=settings, strict=True)
     with pytest.raises(dpg.UsageError, match=r"^require needs the whole table"):
         dpg.sweep("sweep.yaml", "no", require=rule, shard="1/2")
     assert not Path("no").exists()

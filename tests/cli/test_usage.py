@@ -164,6 +164,15 @@ def test_an_option_is_spelled_the_same_everywhere() -> None:
         (("fit", "bistabel"), "no such command 'bistabel'. Did you mean 'bistable'?"),
         (("predict", "x", "--output=a", "b"), "got unexpected extra argument(s) (b)"),
         (("predict", "x", "--colums"), "no such option: --colums; did you mean --columns?"),
+        (
+            ("predict", "x", "--calibration", "finite_elements"),
+            "no such option: --calibration; a key of the spec: --set finger.calibration=VALUE",
+        ),
+        (
+            ("fit", "finger", "x", "y", "--law=push_only"),
+            "no such option: --law; a key of the spec: --set finger.law=",
+        ),
+        (("report", "x", "--law", "push_only"), "no such option: --law (see dpg report --help)"),
         (("predict", "x", "--format", "xml"), "--format xml: expected one of 'table', 'json'"),
         (("predict", "x", "--tolerance", "small"), "--tolerance small: expected a valid number"),
         (("sweep", "x", "-o", "o", "-j", "0"), "--jobs 0: expected a number greater than or equ"),

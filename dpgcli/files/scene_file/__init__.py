@@ -22,6 +22,7 @@ __all__ = [
     "canonical",
     "canonical_json",
     "checked",
+    "folder_of",
     "json_schema",
     "read_keys",
     "read_scene",
@@ -32,6 +33,7 @@ __all__ = [
     "scene_of",
     "spelled",
     "starter",
+    "with_files",
 ]
 
 GRIPPER = re.compile(r"^( *)# (?=gripper:|base_spacing_mm:|mounting_angle_deg:)", re.MULTILINE)
@@ -61,8 +63,20 @@ def read_scene(path: str | Path, settings: Sequence[str] = ()) -> Document:
 
 def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ()) -> Document:
     """The same, of a document that was read from this path."""
-    folder = Path() if str(path) == "-" else Path(path).parent
-    return with_history(with_calibrations(with_settings(document, settings), folder), folder)
+    return with_files(with_settings(document, settings), folder_of(path))
+
+
+def with_files(document: Document, folder: Path) -> Document:
+    """The document with what the files hold that it names, calibrations and histories.
+
+    Names are relative to the spec's folder.
+    """
+    return with_history(with_calibrations(document, folder), folder)
+
+
+def folder_of(path: str | Path) -> Path:
+    """What names of files in a spec are relative to; standard input has no folder."""
+    return Path() if str(path) == "-" else Path(path).parent
 
 
 def reason_against(data: Mapping[str, Any], changes: Mapping[str, float]) -> str:

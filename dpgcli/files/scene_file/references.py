@@ -1,5 +1,6 @@
 """Calibration files that a spec names, read and put in the place of their names."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import dpgcli
 from dpgcli.design.calibrations import FINITE_ELEMENTS, PUBLISHED
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
+from dpgcli.design.rules import DERIVATIONS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
 from dpgcli.files.content import beside, quoted_if
@@ -15,6 +17,7 @@ from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
 from dpgcli.text import KeyPath
 
+BUILT_IN = (PUBLISHED, FINITE_ELEMENTS)
 EXPECTED = '"published", "finite_elements" or the name of a calibration file'
 KEY, LAW = ("finger", "calibration"), ("finger", "law")
 SHIPPED = Path(dpgcli.__file__).parent / FINITE_ELEMENTS
@@ -46,27 +49,41 @@ def with_calibrations(document: Document, folder: Path) -> Document:
     return replace(embedded, problems=problems, files=tuple(reader.files))
 
 
-def recalibrated(document: Document, calibration: Calibration) -> Document:
-    """The document with a calibration's values in the place of its own, wherever it has them.
+def recalibrated(document: Document, calibration: Calibration | str) -> Document:
+    """The document, before its calibrations are read, with another one's values instead of its own.
 
-    They come before its other calibrations, and its lattice sections lose what the file gives.
+    `calibration` is one that was read, or the name of one that is built in. Its values come before
+    those of the other calibrations, and lattice sections lose what it gives. The published springs
+    come alone: what others give is what they are held against.
     """
     finger = document.data["finger"]
     said = finger.get("calibration")
-    known = calibration.known
     before = said if isinstance(said, list) else [] if said is None else [said]
+    is_given = _given_by(calibration)
 
     def without(section: dict[str, Any]) -> dict[str, Any]:
         kept = (section.get("lattice") or {}).items()
-        return {**section, "lattice": {k: v for k, v in kept if not known.has(k)}}
+        return {**section, "lattice": {k: v for k, v in kept if not is_given(k)}}
 
-    changes = {**without(finger), "calibration": [calibration, *before]}
+    listed = PUBLISHED if calibration == PUBLISHED else [calibration, *before]
+    changes = {**without(finger), "calibration": listed}
     for key in (LINEAR_STIFFNESS, WALL_COMPLIANCE):
-        if known.has(key):
+        if is_given(key):
             changes.pop(key, None)
     overrides = finger.get("overrides") or {}
     changes["overrides"] = {units: without(own or {}) for units, own in overrides.items()}
     return replace(document, data={**document.data, "finger": changes})
+
+
+def _given_by(calibration: Calibration | str) -> Callable[[str], bool]:
+    """Whether a key of the lattice is given by a calibration, which may be one that is built in."""
+    if calibration == PUBLISHED:
+        return {rule.key for rule in DERIVATIONS if rule.origin is not None}.__contains__
+    if calibration == FINITE_ELEMENTS:
+        known = [_shipped(name).known for name in SHIPPED_FILES]
+        return lambda key: any(one.has(key) for one in known)
+    assert isinstance(calibration, Calibration), "a file is read before"
+    return calibration.known.has
 
 
 def _shipped(name: str) -> Calibration:
@@ -95,6 +112,8 @@ class _Reader:
 
     def found(self, path: KeyPath, said: object) -> object:
         """The calibration that is said, or those of the package; "published" remains."""
+        if isinstance(said, Calibration):
+            return said
         try:
             if isinstance(said, dict):
                 return calibration_in(self.document.section(path, said))
