@@ -96,6 +96,17 @@ def test_a_figure(call: Any, folder: Path, graded: str, name: str) -> None:
     assert (folder / name).read_bytes() == first
 
 
+def test_unstable_branches_go_into_files(call: Any, folder: Path, graded: str) -> None:
+    arguments = ("actuate", graded, "--pressure", "0:0.2", "--unstable")
+    assert call(*arguments).exit_code == ExitCode.USAGE
+    result = call(*arguments, "-o", "path.parquet", "--plot", "path.svg")
+    assert result.exit_code == ExitCode.DONE
+    is_stable = pq.read_table(folder / "path.parquet")["is_stable"].to_pylist()
+    assert True in is_stable
+    assert False in is_stable
+    assert "unstable" in (folder / "path.svg").read_text(encoding="utf-8")
+
+
 REFUSED = {
     "one number": (("--pressure", "0.15"), "0:0.15:0 back as well"),
     "kPa": (("--pressure", "0:150kPa:0"), "--pressure: 0:150kPa:0: expected"),
