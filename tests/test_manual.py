@@ -33,6 +33,7 @@ from dpgcli.cli import (
     schema,
     stress,
     sweep,
+    transitions,
     validate,
 )
 from dpgcli.cli.exits import ExitCode
@@ -64,6 +65,7 @@ COMMANDS = {
             compare,
             stress,
             actuate,
+            transitions,
             merge,
             check,
             report,
