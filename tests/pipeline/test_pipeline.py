@@ -146,6 +146,28 @@ def test_another_sweep_is_no_longer_up_to_date(checkout: Path) -> None:
     assert "1 designs" in (out / "report.html").read_text(encoding="utf-8")
 
 
+def test_a_script_beside_a_sweep_or_spec_of_its_name_replaces_neither(checkout: Path) -> None:
+    """As Make's own rules would have it, and the whole study would be lost."""
+    sweeps = checkout / "configs" / "sweeps"
+    said = "base: finger\nspace: [{key: finger.units, values: [3]}]\n"
+    (sweeps / "study").write_text(said, encoding="utf-8")
+    shutil.copy(checkout / "configs" / "three_unit.yaml", sweeps / "finger")
+    spec = (sweeps / "finger").read_bytes()
+    assert make(checkout, "SWEEP=../sweeps/study").returncode == 0
+    os.utime(sweeps / "study", (1e9, 1e9))
+    os.utime(sweeps / "finger", (1e9, 1e9))
+    for name in ("study.sh", "finger.sh"):
+        (sweeps / name).write_text("#!/bin/sh\n# newer\n", encoding="utf-8")
+    assert "dpg sweep" not in make(checkout, "SWEEP=../sweeps/study").stdout
+    assert (sweeps / "study").read_text(encoding="utf-8") == said
+    shell(
+        "make -f calibration.mk -k SPEC=../sweeps/finger DPG=true",
+        checkout,
+        sweeps.parent / "pipeline",
+    )
+    assert (sweeps / "finger").read_bytes() == spec
+
+
 def test_other_choices_make_a_calibration_anew(checkout: Path) -> None:
     """Dry runs: `dpg` prints what it would do, and makes what it is told to."""
     program = checkout / "bin" / "dpg"
