@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -30,6 +30,7 @@ def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> s
     names = [f"{each}/{name}" for each in (folder, Path(folder)) for name in tables]
     targets = dict.fromkeys(map(_target, names))
     sources = [_plain(source) for source in files if source != Path("-")]
+    _check_members(sources)
     text = f"{HEAD}\n{' '.join(targets)}: {' '.join(map(_spelled, sources))}\n"
     text += "".join(f"\n{_target(source)}:\n" for source in sources)
     return f"{text}\n{NO_BUILTIN_RULES}\n"
@@ -73,6 +74,18 @@ def _plain(path: Path) -> str:
     plain = os.path.normpath(path)
     is_same = os.path.realpath(Path(plain).parent) == os.path.realpath(path.parent)
     return plain if is_same else os.fspath(path)
+
+
+def _check_members(names: Sequence[str]) -> None:
+    """Raise UsageError for names that together are members of an archive: lib(one two)."""
+    from dpgcli.errors import UsageError
+
+    last = max((place for place, name in enumerate(names) if name.endswith(")")), default=0)
+    opening = next((name for name in names[:last] if "(" in HERE.sub("", name)[1:]), None)
+    if opening is not None:
+        raise UsageError(
+            f"--depfile: Make cannot take the names {opening} … {names[last]} together"
+        )
 
 
 def _target(name: str) -> str:

@@ -245,3 +245,39 @@ def test_a_rule_that_makes_what_was_read_stays_one(here: Path, rule: str, is_fir
     aged(here / "dome.csv", CHANGED)
     done = subprocess.run(command, capture_output=True, check=True)
     assert (done.stdout, done.stderr) == (b"fitted\nswept\n", b"")
+
+
+PARENTHESES = [
+    *(
+        (names, True)
+        for names in ("a(b c)", "a( b)", "a(b x c)", "a(b)c d)", "a(b.csv (c)", "./a(b c)")
+    ),
+    *(
+        (names, False)
+        for names in ("(a b)", "c) a(b", "a(b.csv c)d", "ab d)", "(x)y d)", "./(a b)")
+    ),
+]
+
+
+@needs_make
+@pytest.mark.parametrize(("names", "is_archive"), PARENTHESES)
+def test_names_that_make_takes_for_members_of_an_archive(
+    here: Path, names: str, is_archive: bool
+) -> None:
+    """A parenthesis in one name and one that closes it at the end of a later one."""
+    files = names.split()
+    if is_archive:
+        with pytest.raises(UsageError, match=r"Make cannot take the names \S*a\("):
+            depend("out", *files)
+        return
+    for name in files:
+        (here / name).touch()
+        aged(here / name, OLD)
+    depend("out", *files)
+    (here / "out" / "states.parquet").touch()
+    aged(here / "out" / "states.parquet", NEW)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    for name in files:
+        aged(here / name, CHANGED)
+        assert make() == "again\n"
+        aged(here / name, OLD)
