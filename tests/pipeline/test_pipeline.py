@@ -116,6 +116,22 @@ def test_other_code_judges_anew(checkout: Path) -> None:
     assert "dpg" not in make(checkout).stdout
 
 
+@pytest.mark.slow
+def test_a_part_that_is_new_in_an_inner_folder_is_judged(checkout: Path) -> None:
+    inner = checkout / "configs" / "sweeps" / "designs" / "a"
+    inner.mkdir(parents=True)
+    (inner / "p.csv").write_text("finger.geometry.dome_height_mm\n6.5\n", encoding="utf-8")
+    said = "base: ../three_unit.yaml\nspace: [{table: designs}]\n"
+    (checkout / "configs" / "sweeps" / "s.yaml").write_text(said, encoding="utf-8")
+    gate = ("SWEEP=../sweeps/s.yaml", "REQUIRE='reach_max_mm < 41'")
+    first = make(checkout, *gate)
+    assert first.returncode == 0, first.stderr
+    (inner / "q.csv").write_text("finger.geometry.unit_separation_mm\n4\n", encoding="utf-8")
+    changed = make(checkout, *gate)
+    assert changed.returncode == 2, changed.stdout
+    assert "other columns in q.csv" in changed.stderr
+
+
 def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     result = make(checkout, "REQUIRE='min_barrier_mJ > 1e6'")
     assert result.returncode == 2  # of make: a recipe failed
