@@ -34,6 +34,7 @@ from dpgcli.cli import (
     schema,
     stress,
     sweep,
+    transitions,
     validate,
 )
 from dpgcli.cli.exits import ExitCode
@@ -65,6 +66,7 @@ COMMANDS = {
             compare,
             stress,
             actuate,
+            transitions,
             merge,
             check,
             report,
