@@ -35,7 +35,7 @@ Seed = Annotated[
 
 def pulses(
     spec: SpecPath,
-    target: To = "",
+    end: To = "",
     start: Start = "",
     table: Lookup = False,
     scatter: Scatter = None,
@@ -54,12 +54,12 @@ def pulses(
     from dpgcli.api.scatter import draws_of
     from dpgcli.errors import Field, UsageError
 
-    if bool(target) == table:
-        raise UsageError("expected ", Field("target"), " or ", Field("table"), ", one of both")
+    if bool(end) == table:
+        raise UsageError("expected ", Field("end"), " or ", Field("table"), ", one of both")
     asked = {"scatter": scatter, "draws": draws, "seed": seed}
     for field in (name for name, value in asked.items() if value is not None):
         if table or scatter is None:
-            wanted = Field("target") if table else Field("scatter")
+            wanted = Field("end") if table else Field("scatter")
             raise UsageError(Field(field), " goes with ", wanted)
     given = pressed_input(spec, settings or ())
     drawn = None
@@ -68,7 +68,7 @@ def pulses(
         drawn = draws_of(given, scatter, number, start_of)
     found: LookupResult | PulsesResult
     with under_way("following pulses", quiet=quiet):
-        found = lookup_of(given, start) if table else pulses_of(given, target, start, drawn)
+        found = lookup_of(given, start) if table else pulses_of(given, end, start, drawn)
     print_rows(found.columns, found.rows, printed_as)
     sys.stdout.flush()
     if not quiet:
