@@ -20,8 +20,7 @@ from dpgcli.api.scatter import (
     SHARE,
     Draws,
     ScatterInput,
-    check_draws,
-    draws_of,
+    drawn_by,
     share_interval,
 )
 from dpgcli.api.tables import Table
@@ -203,8 +202,8 @@ def pulses(
     end: str,
     start: str = "",
     scatter: ScatterInput | None = None,
-    draws: int = 1000,
-    seed: int = 1,
+    draws: int | None = None,
+    seed: int | None = None,
     settings: Settings = (),
 ) -> PulsesResult:
     """The shortest sequence of pulses of pressure that leads from a state to another.
@@ -212,7 +211,7 @@ def pulses(
     `end` and `start` are patterns such as "10110"; without a start all units are at rest.
     Each pulse raises or lowers one line and lets it go. The sequence is replayed by path following.
     `scatter`, such as "dome_thickness_mm=2%,dome_height_mm=0.1mm", are standard deviations of
-    values around those of the spec: so many `draws` of fingers are followed as well.
+    values around those of the spec: so many `draws` of fingers, 1000 unless given, are followed.
     Raises SpecError for a wrong spec or scatter, UsageError for patterns that are no stable states
     and other wrong choices, ActuationError where the replay ends elsewhere.
 
@@ -227,9 +226,8 @@ def pulses(
     >>> found.scattered.probability
     1.0
     """
-    check_draws(draws, seed)
     given = pressed_input(spec, settings)
-    drawn = None if scatter is None else draws_of(given, scatter, draws, seed)
+    drawn = drawn_by(given, scatter, draws, seed)
     return pulses_of(given, end, start, drawn)
 
 
