@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Trust
 from dpgcli.errors import UsageError
+from dpgcli.files.access import reading
 from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
 from dpgcli.files.trust import outputs_of, trusts_in
@@ -50,7 +51,9 @@ def read_designs(path: Path) -> DesignTable:
     Columns are text, whole numbers or numbers, whatever types they were stored as; what is
     neither is left out. Raises UsageError for what is damaged, or no table of designs.
     """
-    if path.is_dir():
+    with reading(path):
+        is_folder = path.is_dir()
+    if is_folder:
         raise UsageError(f"{path} is a folder: name the table in it, designs.parquet")
     return designs_in(read_undamaged(path, partial(_readable, str(path))), str(path))
 

@@ -6,7 +6,7 @@ A metric is written here and nowhere else: tables, metadata and the manual follo
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers
-from dpgcli.sweeps.pressures import PressedDesigns
+
+if TYPE_CHECKING:
+    from dpgcli.sweeps.pressures import PressedDesigns
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
 CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
@@ -78,8 +80,10 @@ class Metrics:
         return {m.name: m.of(self) for m in known if has_pressure or not m.needs_pressure}
 
     @cached_property
-    def pressed(self) -> PressedDesigns:
+    def pressed(self) -> "PressedDesigns":
         """What pressure does to the designs, which have it."""
+        from dpgcli.sweeps.pressures import PressedDesigns
+
         assert self.pressure is not None, "no metric that needs pressure is asked for"
         return PressedDesigns(self.units, self.pressure, self.n_designs)
 
@@ -159,7 +163,7 @@ def _under_pressure(
     name: str,
     unit: str,
     description: str,
-    of: Callable[[PressedDesigns], NDArray[Any]],
+    of: Callable[["PressedDesigns"], NDArray[Any]],
     kind: Kind = Kind.NUMBER,
 ) -> Metric:
     def of_pressed(metrics: Metrics) -> NDArray[Any]:

@@ -27,9 +27,9 @@ def lanes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Numbers of lanes of every minimization from now on."""
     counted: list[int] = []
 
-    def counting(potential: Any, guess: Array, *options: Any) -> newton.Equilibrium:
+    def counting(potential: Any, guess: Array, *options: Any, **named: Any) -> newton.Equilibrium:
         counted.append(guess.shape[1])
-        return newton.minimize(potential, guess, *options)
+        return newton.minimize(potential, guess, *options, **named)
 
     monkeypatch.setattr(settle_module, "minimize", counting)
     return counted

@@ -343,3 +343,51 @@ def test_stiff_bars_change_nothing_but_the_last_digits(
         found: Saddles = saddles(every_flip(finger, all_patterns))
         assert (found.status == SaddleStatus.CERTIFIED).all()
         np.testing.assert_allclose(found.energy, rigid, rtol=0.05 / ratio + 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("place", "depth", "width"), [(0.25, 0.08, 0.05), (0.62, 0.03, 0.03), (0.86, 0.03, 0.03)]
+)
+@pytest.mark.parametrize("is_attached", [True, False])
+def test_a_curve_with_ripples_has_no_barrier_that_is_not_certified(
+    place: float,
+    depth: float,
+    width: float,
+    is_attached: bool,
+    all_patterns: Callable[[int], Flags],
+) -> None:
+    """Down from its highest top it goes to a ripple, before or behind: said, not made up."""
+    u = np.arange(0.0, 1.16, 0.02)
+    smooth = 4.0 * u**2 * (1.0 - u) ** 2 + 0.04 * u**2 * (3.0 - 2.0 * u)
+    curve = spline(tuple(u), tuple(smooth - depth * np.exp(-(((u - place) / width) ** 2))))
+    before = np.linspace(0.01, curve.rests[0] - 0.01, 500)
+    assert (curve(before).slope.min() < 0.0) == (place < 0.5)
+    assert len(curve.branches) == 1 + (place > 0.5)
+    finger = uniform_finger(2, **STUDY, linear_stiffness=1e4)
+    if is_attached:
+        finger = replace(finger, law=Tabulated(curve))
+    else:
+        finger = replace(finger, law=PushOnly(Tabulated(curve)))
+        finger = finger.changed(dome_travel=np.array([[13.0]]))
+    flips = every_flip(finger, all_patterns)
+    found = saddles(flips)
+    assert (found.status == SaddleStatus.NOT_FOUND).all()
+    assert np.isnan(found.energy).all()
+    states = settle(flips.units, chain_potential, all_patterns(2), 1e-12)
+    table = barriers(flips.units, chain_potential, states, 1e-12)
+    assert table.n_not_found.tolist() == [2] * 4
+    assert np.isnan(table.least).all()
+    assert table.least_robust.tolist() == [""] * 4
+
+
+@pytest.mark.parametrize("law", LAWS[2:], ids=lambda law: law.description)
+def test_saddles_between_soft_bars_are_found_from_the_held_path_too(
+    graded_finger: Fingers, all_patterns: Callable[[int], Flags], law: DomeLaw
+) -> None:
+    """Bars as soft as a quarter of a dome's spring: barriers between rigid bars lead astray."""
+    finger = replace(graded_finger(3, 4, 3.0), law=law)
+    flips = every_flip(finger, all_patterns)
+    found = saddles(flips)
+    assert (found.status == SaddleStatus.CERTIFIED).all()
+    for lane in (0, 5, 10):
+        assert found.energy[lane] == pytest.approx(highest_held(finger, flips, lane), rel=1e-6)
