@@ -92,6 +92,8 @@ def _on_one_line(
     """Heights of the units of a line, (unit,), by thresholds at their candidates."""
     up = _peaks(snap)[:, None, None]
     down = np.append(0.0, _peaks(reset))[None, :, None]  # none perhaps
+    if not up.size:  # no unit is bistable at any height
+        return None
     low, high = 1.0 - 0.5 * SEPARATION, 1.0 + 0.5 * SEPARATION
     cost, chosen = np.zeros((up.size, down.size)), []
     for unit, is_up in enumerate(inverted):

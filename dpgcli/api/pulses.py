@@ -20,8 +20,7 @@ from dpgcli.api.scatter import (
     SHARE,
     Draws,
     ScatterInput,
-    check_draws,
-    draws_of,
+    drawn_by,
     share_interval,
 )
 from dpgcli.api.tables import Table
@@ -83,14 +82,14 @@ class ScatteredPulses:
 class PulsesResult:
     """The shortest sequence of pulses from a state to another, or why there is none.
 
-    `given` is the spec with its lines; `start` and `target` are patterns. `reasons` say why no
+    `given` is the spec with its lines; `start` and `end` are patterns. `reasons` say why no
     sequence exists; `graded` is one of the finger with other dome heights, if some were found, and
     `scattered` what scatter does to it, if that was asked for.
     """
 
     given: PressedInput
     start: str
-    target: str
+    end: str
     sequence: PulseSequence
     reasons: tuple[str, ...] = ()
     graded: Graded | None = None
@@ -140,7 +139,7 @@ class PulsesResult:
         return tuple(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        way, found = f"from {self.start} to {self.target}", self.sequence
+        way, found = f"from {self.start} to {self.end}", self.sequence
         if found.pulses is None:
             n_reached = counted(len(found.graph.code), "state")
             yield f"no pulses up to {found.reach:.4g} MPa lead {way}: {n_reached} can be reached"
@@ -162,7 +161,7 @@ class PulsesResult:
         yield from scattered.draws.lines
         low, high = scattered.interval
         yield (
-            f"{scattered.probability:.1%} of draws end in {self.target} "
+            f"{scattered.probability:.1%} of draws end in {self.end} "
             f"({CONFIDENCE:.0%} confidence: {low:.1%} to {high:.1%})"
         )
         empty = np.isnan(scattered.found.windows[:, 0])
@@ -200,19 +199,19 @@ def _numbers(pulses: list[str]) -> str:
 def pulses(
     spec: SpecInput,
     *,
-    target: str,
+    end: str,
     start: str = "",
     scatter: ScatterInput | None = None,
-    draws: int = 1000,
-    seed: int = 1,
+    draws: int | None = None,
+    seed: int | None = None,
     settings: Settings = (),
 ) -> PulsesResult:
     """The shortest sequence of pulses of pressure that leads from a state to another.
 
-    `target` and `start` are patterns such as "10110"; without a start all units are at rest.
+    `end` and `start` are patterns such as "10110"; without a start all units are at rest.
     Each pulse raises or lowers one line and lets it go. The sequence is replayed by path following.
     `scatter`, such as "dome_thickness_mm=2%,dome_height_mm=0.1mm", are standard deviations of
-    values around those of the spec: so many `draws` of fingers are followed as well.
+    values around those of the spec: so many `draws` of fingers, 1000 unless given, are followed.
     Raises SpecError for a wrong spec or scatter, UsageError for patterns that are no stable states
     and other wrong choices, ActuationError where the replay ends elsewhere.
 
@@ -221,29 +220,28 @@ def pulses(
     ...     "segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
     ...     "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
     ...     "hinge_stiffness_N_mm_per_rad": 24.2}}, "pressure": {"effective_area_mm2": 31.61}},
-    ...     target="01", scatter="stroke_mm=1%", draws=100)
+    ...     end="01", scatter="stroke_mm=1%", draws=100)
     >>> found.table["pattern_after"].tolist(), found.table["peak_pressure_MPa"].round(4).tolist()
     (['11', '01'], [0.2115, -0.0742])
     >>> found.scattered.probability
     1.0
     """
-    check_draws(draws, seed)
     given = pressed_input(spec, settings)
-    drawn = None if scatter is None else draws_of(given, scatter, draws, seed)
-    return pulses_of(given, target, start, drawn)
+    drawn = drawn_by(given, scatter, draws, seed)
+    return pulses_of(given, end, start, drawn)
 
 
 def pulses_of(
-    given: PressedInput, target: str, start: str = "", draws: Draws | None = None
+    given: PressedInput, end: str, start: str = "", draws: Draws | None = None
 ) -> PulsesResult:
     """The same, of what was read before."""
-    begin, end = code_of(given, "start", start), code_of(given, "target", target)
+    begin, target = code_of(given, "start", start), code_of(given, "end", end)
     check_size(given)
     check_state(given, "start", begin)
     keep_freed_memory()
     pressed, lines = given.pressed, given.pressure
-    found = pulse_sequence(pressed, lines.line_of, begin, end)
-    names = pattern_of(given, begin), pattern_of(given, end)
+    found = pulse_sequence(pressed, lines.line_of, begin, target)
+    names = pattern_of(given, begin), pattern_of(given, target)
     if found.pulses is None:
         reasons = [*hindrances(pressed, lines.lines, lines.line_of, found)]
         graded = graded_for(given, found)

@@ -23,6 +23,7 @@ ScatterInput: TypeAlias = Mapping[str, str | float] | str
 
 FIELD = Field("scatter")
 GRIPPERS = ("base_spacing_mm", "mounting_angle_deg")
+DRAWS, SEED = 1000, 1  # unless others are asked for
 MOST_DRAWS = 100_000
 CONFIDENCE = 0.95
 SHARE = 0.95  # of draws that do what a pulse is for, within its window
@@ -58,12 +59,20 @@ class Draws:
             yield f"{counted(n_wrong, 'draw')} make no finger, and count as failures"
 
 
-def draws_of(given: PressedInput, scatter: ScatterInput, draws: int, seed: int) -> Draws:
-    """Fingers drawn around a spec by standard deviations of its values.
+def drawn_by(
+    given: PressedInput, scatter: ScatterInput | None, draws: int | None, seed: int | None
+) -> Draws | None:
+    """Fingers drawn around a spec by standard deviations of its values, if these are given.
 
     Raises SpecError with all that is wrong with these, UsageError for other wrong choices, and
     where no draw is a finger.
     """
+    if scatter is None:
+        for field, value in (("draws", draws), ("seed", seed)):
+            if value is not None:
+                raise UsageError(Field(field), " goes with ", FIELD)
+        return None
+    draws, seed = DRAWS if draws is None else draws, SEED if seed is None else seed
     check_draws(draws, seed)
     spec = given.given.spec
     if spec is None:

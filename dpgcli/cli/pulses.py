@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.cli.options import Quiet, Settings, SpecPath
+from dpgcli.cli.options import NumberOfDraws, Quiet, Scatter, Seed, Settings, SpecPath
 from dpgcli.cli.printing import Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
@@ -18,24 +18,11 @@ Start = Annotated[
 Lookup = Annotated[
     bool, typer.Option("--table", help="What pulses of all sizes do to the state, instead")
 ]
-Scatter = Annotated[
-    str | None,
-    typer.Option(
-        "--scatter", metavar="LIST", help="Standard deviations: dome_height_mm=0.1mm,stroke_mm=2%"
-    ),
-]
-NumberOfDraws = Annotated[
-    int | None,
-    typer.Option("--draws", metavar="N", help="Fingers to draw by --scatter  [default: 1000]"),
-]
-Seed = Annotated[
-    int | None, typer.Option("--seed", metavar="N", help="Seed of the draws  [default: 1]")
-]
 
 
 def pulses(
     spec: SpecPath,
-    target: To = "",
+    end: To = "",
     start: Start = "",
     table: Lookup = False,
     scatter: Scatter = None,
@@ -51,24 +38,18 @@ def pulses(
     from dpgcli.api.lookup import LookupResult, lookup_of
     from dpgcli.api.pressure import pressed_input
     from dpgcli.api.pulses import PulsesResult, pulses_of
-    from dpgcli.api.scatter import draws_of
+    from dpgcli.api.scatter import drawn_by
     from dpgcli.errors import Field, UsageError
 
-    if bool(target) == table:
-        raise UsageError("expected ", Field("target"), " or ", Field("table"), ", one of both")
-    asked = {"scatter": scatter, "draws": draws, "seed": seed}
-    for field in (name for name, value in asked.items() if value is not None):
-        if table or scatter is None:
-            wanted = Field("target") if table else Field("scatter")
-            raise UsageError(Field(field), " goes with ", wanted)
+    if bool(end) == table:
+        raise UsageError("expected ", Field("end"), " or ", Field("table"), ", one of both")
+    if table and scatter is not None:
+        raise UsageError(Field("scatter"), " goes with ", Field("end"))
     given = pressed_input(spec, settings or ())
-    drawn = None
-    if scatter is not None:
-        number, start_of = 1000 if draws is None else draws, 1 if seed is None else seed
-        drawn = draws_of(given, scatter, number, start_of)
+    drawn = drawn_by(given, scatter, draws, seed)
     found: LookupResult | PulsesResult
     with under_way("following pulses", quiet=quiet):
-        found = lookup_of(given, start) if table else pulses_of(given, target, start, drawn)
+        found = lookup_of(given, start) if table else pulses_of(given, end, start, drawn)
     print_rows(found.columns, found.rows, printed_as)
     sys.stdout.flush()
     if not quiet:
