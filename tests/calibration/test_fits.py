@@ -9,7 +9,7 @@ from scipy.optimize import curve_fit
 from dpgcli.arrays import Array
 from dpgcli.calibration import search
 from dpgcli.calibration.choices import Loss
-from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.calibration.fits import Fit, Parameter, fit, fit_linear
 from dpgcli.calibration.losses import TUNING, growth, influence
 from dpgcli.errors import FitError
 
@@ -255,3 +255,24 @@ def test_a_value_that_drowns_in_noise_is_said() -> None:
     )
     (said,) = found.warnings
     assert said.startswith("bend: its standard error")
+
+
+@pytest.mark.parametrize("loss", [Loss.LINEAR, Loss.HUBER])
+def test_errors_that_add_up_have_the_covariance_of_their_sums(loss: Loss) -> None:
+    """The trapezoids as a matrix T: S = H⁻¹ Jᵀ diag(ψ') T, s² by means of two errors each."""
+    along = np.array([0.0, 0.5, 0.7, 1.5, 1.5, 2.0, 3.0])
+    observed = np.array([0.0, 0.4, 0.9, 1.2, 1.3, 9.0, 2.8])
+    design = np.stack((along, along**2), axis=1)
+    terms = [Parameter("slope", 1.0), Parameter("bend", 0.1)]
+    found = fit_linear(terms, design, observed, loss=loss, loss_scale=0.5, along=along)
+    steps = np.diff(along)
+    trapezoids = np.zeros((7, 7))
+    for step, width in enumerate(steps):
+        trapezoids[step + 1 :, step : step + 2] += 0.5 * width
+    counted = np.abs(found.residuals) <= (0.5 if loss is Loss.HUBER else np.inf)
+    assert counted.all() == (loss is Loss.LINEAR), "one point is an outlier"
+    hessian = design.T @ (counted[:, None] * design)
+    weights = np.linalg.solve(hessian, (design * counted[:, None]).T) @ trapezoids
+    means = np.diff(found.residuals)[steps > 0.0] / steps[steps > 0.0]
+    expected = 2.0 * (means**2).sum() / 5.0 * weights @ weights.T
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
