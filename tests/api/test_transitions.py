@@ -215,3 +215,30 @@ def test_soft_bars_let_units_pull_each_other_along() -> None:
     assert flips == [len(unit.split(",")) for unit in leads["unit"]]
     assert max(flips) == 3
     assert found.reachable == ("000", "011", "111")
+
+
+def test_scatter_adds_the_spread_of_thresholds() -> None:
+    """Of the material alone: 2 % of the modulus are 2 % of every threshold."""
+    plain = dpg.transitions(GRADED).table
+    found = dpg.transitions(GRADED, scatter="elastic_modulus_MPa=2%", draws=200)
+    table = found.table
+    assert list(table.names) == [
+        *plain.names,
+        *("share_leaving", "share_same_unit", "pressure_mean_MPa", "pressure_deviation_MPa"),
+        *("pressure_low_MPa", "pressure_high_MPa"),
+    ]
+    leaves = ~np.isnan(plain["pressure_MPa"])
+    assert np.array_equal(table["share_leaving"], leaves)
+    nominal = plain["pressure_MPa"][leaves]
+    ratio = table["pressure_deviation_MPa"][leaves] / np.abs(nominal)
+    np.testing.assert_allclose(ratio, 0.02, rtol=0.15)
+    np.testing.assert_allclose(table["pressure_mean_MPa"][leaves], nominal, rtol=0.005)
+    assert (table["share_same_unit"][leaves] == 1.0).all()
+    assert any("200 fingers drawn, seed 1" in line for line in found.summary)
+
+
+def test_too_many_scattered_thresholds_are_refused() -> None:
+    with pytest.raises(UsageError, match="give fewer draws"):
+        dpg.transitions(GRADED, scatter="stroke_mm=1%", draws=100_000)
+    with pytest.raises(UsageError, match="draws goes with scatter"):
+        dpg.transitions(GRADED, draws=5)
