@@ -21,8 +21,8 @@ from dpgcli.cli.streams import put, say
 if TYPE_CHECKING:
     from dpgcli.api.stress import HardCases, StressResult
     from dpgcli.arrays import Columns
+    from dpgcli.hard_cases.outcomes import Outcome
     from dpgcli.hard_cases.table import FamilySummary
-    from dpgcli.hard_cases.verdicts import Outcome
     from dpgcli.mechanics.finger import Finger
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
