@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from dpgcli.api.actuate import actuate
     from dpgcli.api.bench import bench
     from dpgcli.api.check import check
     from dpgcli.api.compare import compare
@@ -27,12 +28,15 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
+    from dpgcli.api.landscape import landscape
     from dpgcli.api.predict import predict
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
+    from dpgcli.api.transitions import transitions
     from dpgcli.api.validate import validate
     from dpgcli.errors import (
+        ActuationError,
         DpgError,
         FitError,
         NothingSelectedError,
@@ -44,6 +48,7 @@ if TYPE_CHECKING:
     from dpgcli.mechanics.finger import uniform_finger
 
 __all__ = [
+    "ActuationError",
     "DpgError",
     "FitError",
     "NothingSelectedError",
@@ -51,6 +56,7 @@ __all__ = [
     "SpecError",
     "UsageError",
     "__version__",
+    "actuate",
     "bench",
     "check",
     "compare",
@@ -60,17 +66,20 @@ __all__ = [
     "fit_grid",
     "fit_hinge",
     "fit_unit",
+    "landscape",
     "merge",
     "predict",
     "read_calibration",
     "report",
     "stress",
     "sweep",
+    "transitions",
     "uniform_finger",
     "validate",
 ]
 
 _HOMES = {
+    "actuate": "api.actuate",
     "bench": "api.bench",
     "check": "api.check",
     "compare": "api.compare",
@@ -80,12 +89,14 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
+    "landscape": "api.landscape",
     "merge": "api.sweep",
     "predict": "api.predict",
     "read_calibration": "files.calibration",
     "report": "api.report",
     "stress": "api.stress",
     "sweep": "api.sweep",
+    "transitions": "api.transitions",
     "uniform_finger": "mechanics.finger",
     "validate": "api.validate",
 }

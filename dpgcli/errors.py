@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from dpgcli.text import printable
 
@@ -102,6 +102,14 @@ class OutputError(DpgError):
 
 class FitError(DpgError):
     """A fit that failed; the message says why. Nothing is written."""
+
+
+class ActuationError(DpgError):
+    """A finger cannot go on under these pressures; `result` has what happened before."""
+
+    def __init__(self, result: Any, *parts: str) -> None:
+        super().__init__(*parts)
+        self.result = result
 
 
 class SolverError(DpgError):

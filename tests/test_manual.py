@@ -19,6 +19,7 @@ from typer.models import OptionInfo
 import dpgcli as dpg
 from dpgcli.benchmark.ablation import ABLATIONS
 from dpgcli.cli import (
+    actuate,
     bench,
     check,
     compare,
@@ -62,6 +63,7 @@ COMMANDS = {
             bench,
             compare,
             stress,
+            actuate,
             merge,
             check,
             report,

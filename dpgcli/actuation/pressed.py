@@ -21,7 +21,7 @@ from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
 from dpgcli.equilibrium.family import Family
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import LARGEST_STEP, Ends, Outcome, follow
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, Outcome, Watch, follow
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.curve import Spline
@@ -37,7 +37,6 @@ LEFT = 0.05  # of a stroke: what has moved further has left its place
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 TOLERANCE = 1e-12  # of the forces in play
 LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
-PLACES = 128  # of a dome's opening, at which its stiffness is looked at
 
 
 class Halt(IntEnum):
@@ -146,23 +145,11 @@ class Pressed:
             return None
         return limits(self.finger, self.volumes)
 
-    @cached_property
-    def stiffness(self) -> Array:
-        """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or batch)."""
-        finger = self.finger
-        domes = finger.domes
-        start = -np.broadcast_to(domes.contact, (finger.n_units, 1))
-        way = domes.contact + 1.5 * domes.stroke
-        share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
-        bend = finger.law.pulling.response(start + share * way, domes).stiffness
-        return np.asarray(2.0 * np.abs(bend).max(axis=0))
-
     def take_lanes(self, index: Indices) -> "Pressed":
         """The fingers of some lanes."""
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
         if self.limits is not None:
             taken.__dict__["limits"] = Limits(*(take_lanes(part, index) for part in self.limits))
-        taken.__dict__["stiffness"] = take_lanes(self.stiffness, index)
         return taken
 
     @cached_property
@@ -180,8 +167,8 @@ class Pressed:
             law = replace(law, touching=shapes.touching, inverted=shapes.inverted, peak=peak)
         bare = self._bare
         coordinates = bare.coordinates
-        scale = self.finger.stroke
-        return Family(coordinates, bare.terms, coordinates.dome, law, scale, self.stiffness)
+        scale, stiffness = self.finger.stroke, self.units.holding_stiffness
+        return Family(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
 
     def potential(self, pressure: Array, inverted: Flags) -> Potential[FingerCoordinates]:
         """The energy less the work of fixed pressures, domes in touch or not as they come."""
@@ -193,14 +180,32 @@ class Pressed:
             return DomesAt(self.finger, PressureWork(pressure, self.volumes, self.finger.domes))
         return pushing(self.finger, self.volumes, self.limits, pressure, inverted)
 
+    def as_touching(self, shapes: Shapes) -> Potential[FingerCoordinates]:
+        """The energy less the work of the pressures, each dome in touch or not as it is."""
+        work = PressureWork(shapes.pressure, self.volumes, self.finger.domes)
+        return self._with(DomesAt(self.finger, work, shapes.touching))
+
     def _with(self, law: ScalarLaw) -> Potential[FingerCoordinates]:
         bare = self._bare
         dome = Term("domes", bare.coordinates.dome, law)
         return Potential(bare.coordinates, (*bare.terms, dome))
 
+    @property
+    def coordinates(self) -> FingerCoordinates:
+        """The system of coordinates of shapes."""
+        return self._bare.coordinates
+
     def extensions(self, coordinates: Array) -> Array:
         """Extensions of the domes' springs, mm, (unit, batch)."""
-        return self._bare.coordinates.dome(coordinates).value
+        return self.coordinates.dome(coordinates).value
+
+    def travels(self, shapes: Shapes) -> Array:
+        """Travels of the domes' poles, mm, (unit, batch): apart from their neighbors, their own."""
+        law = self.domes(shapes.pressure, shapes.inverted)
+        extension = self.extensions(shapes.coordinates)
+        if isinstance(law, PushingDomes):
+            extension = np.clip(extension, law.low, law.high)
+        return extension + self.finger.domes.contact
 
     def energy(self, shapes: Shapes) -> Array:
         """Energy less the work of the pressures, mJ, (batch,)."""
@@ -235,18 +240,28 @@ class Pressed:
             shapes, coordinates=coordinates, inverted=inverted, touching=touching
         ), is_there
 
-    def followed(self, shapes: Shapes, target: Array, largest_step: float = LARGEST_STEP) -> Halted:
-        """Follow shapes towards other pressures, (unit, batch), until something happens."""
+    def followed(
+        self,
+        shapes: Shapes,
+        target: Array,
+        largest_step: float = LARGEST_STEP,
+        watch: Watch | None = None,
+    ) -> Halted:
+        """Follow shapes towards other pressures, (unit, batch), until something happens.
+
+        `watch` is told what is on the way, with shares of it as loads.
+        """
         shapes = self._about_to_touch(shapes, target)
         family = self.family(shapes, target)
         end, alone = self._lost_alone(shapes, target)
-        ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step)
+        ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step, watch)
         pressure = shapes.pressure + ends.load * (target - shapes.pressure)
         there = replace(shapes, coordinates=ends.coordinates, pressure=pressure)
         is_alone = (ends.outcome == Outcome.ARRIVED) & alone.any(axis=0)
         unit = np.where(is_alone, alone.argmax(axis=0), ends.cell)
         start, left = self._past(family, ends, target - shapes.pressure)
-        tied = np.where(is_alone, alone, left) & (np.arange(len(left))[:, None] != unit)
+        tied = np.where(is_alone, alone, left) | self._meeting(family, ends)
+        tied &= np.arange(len(left))[:, None] != unit
         reason = _reasons(ends, shapes.touching)
         reason = np.where(is_alone, Halt.ALONE, reason)
         is_folded = family.coordinates.springs(ends.coordinates).is_folded
@@ -278,6 +293,17 @@ class Pressed:
             left[:, folds] = np.abs(few.measure(here).value - values) > LEFT * few.scale
         start[:, folds] = here + DISPLACED * ends.onward[:, folds]
         return start, left
+
+    def _meeting(self, family: Family[FingerCoordinates, PressedDomes], ends: Ends) -> Flags:
+        """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
+        law, values = family.law, family.measure(ends.coordinates).value
+        margin = law.margin(values, ends.load)
+        if margin is None or law.touching is None:
+            return np.zeros(values.shape, bool)
+        push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
+        is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
+        near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL
+        return np.asarray(near & is_alike & (ends.outcome == Outcome.EVENT))
 
     def after(self, halted: Halted) -> tuple[Shapes, Flags]:
         """What becomes of shapes that halted, at their pressures; which have come to rest.

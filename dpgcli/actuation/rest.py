@@ -6,8 +6,10 @@ from dpgcli.actuation.pressed import Pressed, Shapes
 from dpgcli.arrays import Flags
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
-from dpgcli.states.certify import Settled
+from dpgcli.states.certify import Settled, Status
 from dpgcli.states.settle import settle
+
+SAME_SHAPE = 1e-6  # of the largest change of a coordinate in one step: far above any rounding
 
 
 def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
@@ -28,3 +30,11 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     touching = None if pressed.limits is None else inverted.copy()
     coordinates = settled.equilibrium.coordinates
     return Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching), settled
+
+
+def is_certified(pressed: Pressed, shapes: Shapes) -> Flags:
+    """Which shapes without pressure are the certified stable states of their patterns, (batch,)."""
+    rest, settled = at_rest(pressed, shapes.inverted)
+    away = np.abs(shapes.coordinates - rest.coordinates)
+    is_same = (away <= SAME_SHAPE * settled.potential.coordinates.step_cap).all(axis=0)
+    return np.asarray((settled.status == Status.STABLE) & is_same)

@@ -9,6 +9,7 @@ EXAMPLES = {
         "dpg predict finger.yaml --pattern '1*' --set finger.geometry.unit_separation_mm=2.5",
         "dpg predict finger.yaml --output states.parquet --plot states.svg",
         "dpg predict finger.yaml --format csv > states.csv",
+        "dpg predict finger.yaml --columns barriers",
     ),
     "explain": (
         "dpg explain finger.yaml",
@@ -37,6 +38,20 @@ EXAMPLES = {
     "stress": (
         "dpg stress finger.yaml",
         "dpg stress --only crossed --format csv > cases.csv",
+    ),
+    "actuate": (
+        "dpg actuate finger.yaml --pressure 0:0.15:0",
+        "dpg actuate finger.yaml --pressure 0:0.2:-0.1:0 --output path.parquet --plot path.svg",
+        "dpg actuate finger.yaml --from 11000 --pressure 0:0.2:0 --cycles 100 --format csv",
+    ),
+    "transitions": (
+        "dpg transitions finger.yaml",
+        "dpg transitions finger.yaml --set 'pressure.lines={A: 1-2, B: 3}' --graph states.graphml",
+        "dpg transitions finger.yaml --output transitions.parquet --plot states.svg",
+    ),
+    "landscape": (
+        "dpg landscape finger.yaml --from 000 --to 111",
+        "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",

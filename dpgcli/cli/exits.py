@@ -19,6 +19,7 @@ from dpgcli.cli.spelling import problem_with_options, with_options
 from dpgcli.cli.streams import OUTPUT, open_streams, say
 from dpgcli.cli.usage import refusal
 from dpgcli.errors import (
+    ActuationError,
     FitError,
     NothingSelectedError,
     NoWorkerError,
@@ -45,6 +46,8 @@ REFUSALS = (  # of memory, by the loader of libraries and by those that start th
     "can't start new thread",
     "Failed to launch worker thread",
 )
+
+REFUSED = (UsageError, FitError, OutputError, WorkplaceError, SolverError, ActuationError)
 
 
 class ExitCode(IntEnum):
@@ -79,7 +82,7 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             raise typer.Exit(ExitCode.USAGE) from None
         except NoWorkerError as error:
             fail(ExitCode.FAILED_CASES, error.message)
-        except (UsageError, FitError, OutputError, WorkplaceError, SolverError) as error:
+        except REFUSED as error:
             fail(ExitCode.USAGE, error.message)
         except NothingSelectedError as error:
             fail(ExitCode.NOTHING_SELECTED, error.message)

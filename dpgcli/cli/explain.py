@@ -163,7 +163,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
         f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
         f"  solves          {counted(plan.n_unit_solves, 'unit well')}, "
-        f"{counted(plan.n_finger_solves, 'finger')}",
+        f"{counted(plan.n_finger_solves, 'finger')}{_barriers(plan)}",
         f"  certificate     residual up to {plan.residual_limit:.1e} N "
         f"({plan.request.tolerance:g} of the forces in play), positive pivots, "
         "every unit in its own well",
@@ -199,6 +199,14 @@ def _pressure_lines(plan: "Plan") -> Iterator[str]:
             f"{line} (unit{'s' * (len(units) > 1)} {unit_text(units)})" for line, units in lines
         )
         yield f"  pressure lines  {named}"
+
+
+def _barriers(plan: "Plan") -> str:
+    """What is solved between states, if it is asked for."""
+    from dpgcli.states.columns import Group
+
+    is_asked = Group.BARRIERS in plan.groups
+    return f", {counted(plan.n_states * plan.n_units, 'barrier')} between states" * is_asked
 
 
 def expected(plan: "Plan") -> str:

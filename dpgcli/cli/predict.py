@@ -30,6 +30,7 @@ from dpgcli.cli.options import (
 from dpgcli.cli.printing import ROWS_SHOWN, Format, printer_of
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import is_read, put, say
+from dpgcli.text import counted
 
 if TYPE_CHECKING:
     from dpgcli.arrays import Columns
@@ -199,6 +200,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"
     yield from _uncertainty(prediction)
+    yield from _barriers(summary)
     yield from (f"warning: {warning}" for warning in plan.warnings)
     yield f"the model's own error: {plan.scene.model_error.text}"
 
@@ -212,6 +214,16 @@ def _uncertainty(prediction: "Prediction") -> Iterator[str]:
     largest_first = sorted(worst.shares.items(), key=lambda item: -item[1])
     causes = ", ".join(f"{share:.2g} by {cause}" for cause, share in largest_first)
     yield f"the least certain tip, of {worst.pattern}: ± {worst.total:.2g} mm; {causes} alone"
+
+
+def _barriers(summary: "Summary") -> Iterator[str]:
+    """The least robust unit of all states, and saddles that were not found."""
+    if summary.least_robust is not None:
+        barrier, where = summary.least_robust.barrier, summary.least_robust.pattern
+        yield f"least robust: unit {summary.least_robust.unit} in {where}, {barrier:.5g} mJ"
+    if summary.n_saddles_not_found:
+        n = counted(summary.n_saddles_not_found, "barrier")
+        yield f"{n} not found: no certified saddle parts the two states, though both exist"
 
 
 def _chosen(level: "AccuracyLevel", bound: float, target: float) -> str:

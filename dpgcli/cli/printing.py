@@ -83,7 +83,7 @@ def print_csv(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Itera
 def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iterator["Columns"]:
     """Print one array of row objects and pass on; null for what is not a finite number."""
     names = [column.name for column in columns]
-    separator = "[\n"
+    first = separator = "[\n"
     for block in blocks:
         for row in _rows(columns, block):
             finite = (None if isinstance(v, float) and not math.isfinite(v) else v for v in row)
@@ -91,7 +91,7 @@ def print_json(columns: tuple[Column, ...], blocks: Iterable["Columns"]) -> Iter
             put_json(f"{separator}  {text}")
             separator = ",\n"
         yield block
-    sys.stdout.write("\n]\n")
+    sys.stdout.write("[]\n" if separator == first else "\n]\n")
 
 
 def table_printer(*, principal: bool) -> Printer:

@@ -5,7 +5,13 @@ from dataclasses import replace
 from dpgcli.errors import Problem, respelled
 
 # where it is not the field's own name
-OPTIONS = {"settings": "--set", "setting": "-s", "patterns": "--pattern"}
+OPTIONS = {
+    "settings": "--set",
+    "setting": "-s",
+    "patterns": "--pattern",
+    "start": "--from",
+    "end": "--to",
+}
 
 
 def option_of(field: str) -> str:

@@ -34,6 +34,7 @@ ASSUMED_AREA = (
 )
 ASSUMED_SNAP = "the snap pressure is assumed: that of finite elements of the study's dome"
 SAY_SNAP = "say pressure.snap_pressure_MPa, or effective_area_mm2, as measured"
+BRIDGED_RESET = "reset pressures are assumed: nothing is sampled where domes come back"
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
 WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
@@ -178,7 +179,9 @@ def _pressures(case: Case) -> Trust:
         found = Trust(Output.PRESSURES, Basis.ASSUMED, UNKNOWN, str(answer))
         return replace(found, doubt=doubt, instead=SAY_SNAP)
     known = case.known_by(Output.PRESSURES, answer) or UNKNOWN
-    return _checked(Trust(Output.PRESSURES, answer.basis, known, str(answer)), answer)
+    is_bridged = case.domes.calibration is not None and any(_gaps(case))
+    source = f"{answer}; {BRIDGED_RESET}" if is_bridged else str(answer)
+    return _checked(Trust(Output.PRESSURES, answer.basis, known, source), answer)
 
 
 def _unasked_pressures(case: Case) -> Trust:

@@ -19,7 +19,9 @@ SAID = {
     "volume": "area dV/du on the branches of its curve",
     "pressure": "area E'/p on the branches of its curve",
 }
-BETWEEN = "monotone between them (assumed)"
+BETWEEN = "monotone between them, the pressure below its limit (assumed)"
+N_BETWEEN = 200  # points in the stretch behind the way from rest
+FALLS = 0.05  # of the limit pressure, over that stretch
 
 
 class Sampled(NamedTuple):
@@ -41,8 +43,9 @@ def swept_shape(domes: Domes) -> Spline | None:
     """The volume v over the travel u/D, v' = 1 at the limit point of the way from rest.
 
     The area is dV/du where volumes were measured, else E'(u)/p(u), on each sampled branch; it goes
-    on beyond a branch as at its end, and monotonically to the next one (assumed). None where
-    neither is known on the way from rest.
+    on beyond a branch as at its end, and monotonically to the next one (assumed); behind the way
+    from rest it is as large as it takes for the dome to bear no more there than it did before it
+    snapped. None where neither is known on the way from rest.
     """
     file, law = domes.calibration, domes.law.curve
     if file is None or file.curve is None or law is None or not area_rule(domes):
@@ -56,10 +59,26 @@ def swept_shape(domes: Domes) -> Spline | None:
     if not rises.any():
         return None
     limit = int(np.argmax(np.where(rises, force / area, -np.inf)))
+    n_before = len(parts[0].travel)
+    if len(parts) > 1 and limit < n_before:
+        ends = slice(n_before - 1, n_before + 1)
+        between = np.linspace(travel[n_before - 1], travel[n_before], N_BETWEEN)[1:-1]
+        needed = force_unit * law(between / full).slope * area[limit] / force[limit]
+        borne = _borne(between, travel[ends], area[ends], needed)
+        travel, area = (np.insert(a, n_before, b) for a, b in ((travel, between), (area, borne)))
     if travel[0] > 0.0:
         travel, area = np.append(0.0, travel), np.append(area[0], area)
         limit += 1
     return volume_shape(tuple((travel / full).tolist()), tuple((area / area[limit]).tolist()))
+
+
+def _borne(between: Array, travel: Array, area: Array, needed: Array) -> Array:
+    """Areas between two branches: monotone, but where E' needs more at the limit pressure."""
+    from scipy.interpolate import PchipInterpolator
+
+    falling = 1.0 - FALLS * (between - travel[0]) / (travel[1] - travel[0])
+    smooth = PchipInterpolator([*travel], [*area])(between)
+    return np.asarray(np.maximum(smooth, needed / falling))
 
 
 def _scales(domes: Domes, file: Calibration, curve: DomeCurve) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Indices
 
 in_lanes = np.errstate(
     divide="ignore", invalid="ignore", over="ignore"
@@ -29,6 +29,11 @@ class Factorization:
     lower: Array
     pivots: Array
     column_depths: tuple[int, ...]
+
+    @property
+    def n_negative(self) -> Indices:
+        """How many eigenvalues are negative, (batch,)."""
+        return np.asarray((self.pivots < 0.0).sum(axis=0))
 
 
 @in_lanes

@@ -1,6 +1,6 @@
-"""Damped Newton–Raphson, batched: each lane walks downhill on its own to a minimum.
+"""Newton–Raphson, batched: damped, it walks downhill to a minimum; undamped, to a saddle, too.
 
-A step solves L|D|Lᵀ p = −g, which is Newton's where the Hessian is positive definite and
+A damped step solves L|D|Lᵀ p = −g, which is Newton's where the Hessian is positive definite and
 goes downhill elsewhere; it is capped, and halved until the energy falls (Armijo; Nocedal and
 Wright, Numerical Optimization, 2nd ed., 2006, sections 3.1 and 3.4). Lanes do not touch each
 other: a lane's result is the same, bit for bit, in any batch.
@@ -44,6 +44,12 @@ class Equilibrium:
     curvature: Array
     iterations: Indices
 
+    @property
+    def energy(self) -> Array:
+        """All kinds of energy together."""
+        first, *rest = self.energies.values()
+        return sum(rest, start=first)
+
     def with_lanes(self, lanes: Indices, others: "Equilibrium", taken: Indices) -> "Equilibrium":
         """The equilibria with `lanes` replaced by those at `taken` of others of this potential."""
 
@@ -63,9 +69,15 @@ class Equilibrium:
 
 @in_lanes
 def minimize(
-    potential: Potential[Coordinates], guess: Array, tolerance: float, max_iterations: int = 200
+    potential: Potential[Coordinates],
+    guess: Array,
+    tolerance: float,
+    max_iterations: int = 200,
+    largest_step: float = 1.0,
 ) -> Equilibrium:
     """Walk from `guess`, shape (size, batch), until each lane's relative residual is small.
+
+    No step is larger than `largest_step` of the step cap: one that is small follows the valley.
 
     The last step must have been small as well: where stiff directions settle before soft
     ones, the residual alone stops too early. A lane that has not converged after
@@ -97,9 +109,58 @@ def minimize(
             keep = np.flatnonzero(~walk.finished)
             lanes = lanes[keep]
             walk, evaluation = walk.only(keep), _only(evaluation, keep)
-        walk.step_from(evaluation)
+        walk.step_from(evaluation, largest_step)
     final[:, lanes] = walk.here
     return _equilibrium(potential, final, potential.evaluate(final), iterations)
+
+
+def looked_at(potential: Potential[Coordinates], coordinates: Array) -> Equilibrium:
+    """What there is at coordinates, (size, batch), wherever they are: no step is taken.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> bent = looked_at(chain_potential(uniform_finger(1, **STUDY)), np.array([[0.2], [0.0]]))
+    >>> bool(bent.residual[0] > 1.0), bent.iterations.tolist()
+    (True, [0])
+    """
+    evaluation = potential.evaluate(coordinates)
+    return _equilibrium(potential, coordinates, evaluation, np.zeros(coordinates.shape[1], int))
+
+
+@in_lanes
+def stationary(
+    potential: Potential[Coordinates], guess: Array, tolerance: float, max_iterations: int = 40
+) -> Equilibrium:
+    """Walk by Newton's own steps, capped only, to where the gradient is small: maybe a saddle.
+
+    What it is, is for the signs of the pivots to say. It has to begin near: `guess` (size, batch).
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.terms import chain_potential
+    >>> potential = chain_potential(uniform_finger(1, **STUDY))
+    >>> top = stationary(potential, np.array([[0.09], [0.09]]), 1e-12)  # corners, rad
+    >>> print(sum(top.energies.values()).round(6), top.factorization.n_negative)  # mJ
+    [6.038233] [1]
+    """
+    here, n_lanes = guess.copy(), guess.shape[1]
+    iterations = np.full(n_lanes, max_iterations)
+    settled, finished = np.zeros(n_lanes, bool), np.zeros(n_lanes, bool)
+    for count in range(max_iterations):
+        evaluation = potential.evaluate(here)
+        newly = (_relative_residual(potential, evaluation.gradient) <= tolerance) & settled
+        iterations[newly & ~finished] = count
+        finished |= newly
+        if finished.all():
+            break
+        factorization = factorize(evaluation.hessian, potential.column_depths)
+        step = forward(factorization, -evaluation.gradient)
+        step /= factorization.pivots
+        step = backward(factorization, step)
+        length = _largest(step, potential.coordinates.step_cap)
+        step /= np.maximum(1.0, length)
+        here = np.where(finished, here, potential.coordinates.moved(here, step))
+        settled = length <= SETTLED_STEP
+    return _equilibrium(potential, here, potential.evaluate(here), iterations)
 
 
 @dataclass
@@ -143,9 +204,9 @@ class _Walk:
         self.finished = self.finished | newly
         return newly
 
-    def step_from(self, evaluation: Evaluation) -> None:
+    def step_from(self, evaluation: Evaluation, largest: float) -> None:
         """Choose the next trial: a new step after an accepted one, else half of the last."""
-        step, slope, length = _downhill(self.potential, evaluation)
+        step, slope, length = _downhill(self.potential, evaluation, largest)
         if self.accepted.all():
             self.step, self.slope = step, slope
             self.fraction, self.settled = np.ones(len(slope)), length <= SETTLED_STEP
@@ -172,7 +233,7 @@ def _falls(evaluation: Evaluation, energy: Array, expected: Array) -> Flags:
 
 
 def _downhill(
-    potential: Potential[Coordinates], evaluation: Evaluation
+    potential: Potential[Coordinates], evaluation: Evaluation, largest: float
 ) -> tuple[Array, Array, Array]:
     """The step, the slope of the energy along it and its length over the cap; uses the Hessian."""
     factorization = factorize(evaluation.hessian, potential.column_depths)
@@ -181,7 +242,7 @@ def _downhill(
     step /= stiffness
     step = backward(factorization, step)
     length = _largest(step, potential.coordinates.step_cap)
-    step /= np.maximum(1.0, length)
+    step /= np.maximum(1.0, length / largest)
     return step, total(evaluation.gradient * step), length
 
 

@@ -11,6 +11,7 @@ that cells which reach their folds at the same load do no harm: at a distance of
 of the fold by ½ τ dλ/dτ, up to terms of order τ³.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import NamedTuple
@@ -32,6 +33,9 @@ TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
 MAX_CORRECTIONS = 8
 MAX_STEPS = 600
+
+Watch = Callable[[Indices, Array, Array], None]
+"""Told lanes, their coordinates (size, lane) and loads (lane,) after each step."""
 
 
 class Outcome(IntEnum):
@@ -75,7 +79,8 @@ class _Walk:
 
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
-    one before and `last_slope` the slope there, NaN if another cell was followed.
+    one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
+    moves `cell` is −1, and steps are of the load itself.
     """
 
     coordinates: Array
@@ -107,11 +112,13 @@ def follow(
     load: Array,
     end: Array,
     largest_step: float = LARGEST_STEP,
+    watch: Watch | None = None,
 ) -> Ends:
     """Follow stable equilibria from loads to others, (batch,), as far as they go.
 
     The paths begin at equilibria, (size, batch), and end at a fold, where the Hessian is singular,
-    at an event, where a margin of the law falls to zero, or at the load asked for.
+    at an event, where a margin of the law falls to zero, or at the load asked for. `watch` is told
+    where they are after each step; one that failed is told as no step.
     """
     n = len(load)
     depth = max(family.column_depths)
@@ -128,6 +135,8 @@ def follow(
         if not len(active):
             break
         ending = _one_step(own, walk, end[active], towards[active], depth, largest_step)
+        if watch is not None:
+            watch(active, walk.coordinates.copy(), walk.load.copy())
         finished = np.flatnonzero(ending >= 0)
         if len(finished):
             _write(ends, active[finished], walk.only(finished), ending[finished])
@@ -241,7 +250,7 @@ def _tried(
 ) -> _Trial:
     """Try a step of each walk along its cell, or to the end of its load where that is nearer."""
     to_end = np.where(walk.slope > 0.0, (end - walk.load) * towards / walk.slope, 0.0)
-    is_last = (walk.cell < 0) | (to_end <= step)
+    is_last = to_end <= step
     step = np.where(is_last, to_end, step)
     cell = np.where(is_last, -1, walk.cell)
     guess = family.coordinates.moved(walk.coordinates, walk.onward * step)
@@ -393,6 +402,7 @@ def _turn(
     walk.sign = np.sign(rate) * forwards
     per_step = np.where(moves, forwards / np.abs(np.where(moves, rate, 1.0)), 0.0)
     walk.onward = motion * per_step
-    walk.slope = np.where(moves, np.abs(by * per_step), 0.0)
+    walk.slope = np.where(moves, np.abs(by * per_step), 1.0)
+    walk.step = np.where(moves, walk.step, np.inf)  # to the end, or to an event
     is_other = walk.cell != cell
     walk.last_slope = np.where(is_other, np.nan, walk.last_slope)

@@ -20,7 +20,9 @@ ENDS = 2**14  # bytes at the head and at the tail of a file among which its mark
 # by a file system that has no permissions, or cannot be told when to write: Windows drives in WSL,
 # FUSE, network drives; a full or broken disk says something else
 REFUSED = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EBADF)  # and PermissionError
-NO_TEXT = (".parquet", ".csv", ".yaml", ".yml", ".json", ".html", ".svg", ".png", ".pdf")
+NO_TEXT = (
+    *(".parquet", ".csv", ".yaml", ".yml", ".json", ".html", ".svg", ".png", ".pdf", ".graphml"),
+)
 
 
 class Mark(Enum):
@@ -35,6 +37,7 @@ class Mark(Enum):
     FACTS = rb'\A\{\s*"written_by": "dpg '
     REPORT = rb"^<!-- written by dpg -->\n?\Z"
     FIGURE = rb"\A<\?xml (?s:.){,999}<dc:title>drawn by dpg<|\A\x89PNG(?s:.){,99}\x00drawn by dpg"
+    GRAPH = rb"\A<\?xml [^>]*>\n<!-- written by dpg -->\n<graphml "
     CALIBRATION = rb"\Acalibration_version: .*\nmade_by: dpg "
     DEPFILE = rb"\A# dpg sweep: "
     DECK = rb"\A\*\* dpg fe "

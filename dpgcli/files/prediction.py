@@ -1,6 +1,5 @@
 """A prediction in files: the table of its states, and what differs between runs beside it."""
 
-import hashlib
 import json
 import platform
 from collections.abc import Iterable, Sequence
@@ -11,7 +10,7 @@ from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
 from dpgcli.files.output import run_file
 from dpgcli.files.record_batches import record_batch, schema
-from dpgcli.files.scene_file import spelled
+from dpgcli.files.scene_metadata import scene_metadata
 from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
 from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.plan import Plan
@@ -83,17 +82,11 @@ def _metadata(plan: Plan, spec_json: str) -> dict[str, str]:
     request = plan.request
     return {
         "dpg.schema_version": str(SCHEMA_VERSION),
-        "dpg.spec": spec_json,
-        "dpg.spec_sha256": hashlib.sha256(spec_json.encode()).hexdigest(),
+        **scene_metadata(plan.scene, spec_json),
         "dpg.patterns": json.dumps(request.patterns),
         "dpg.formulation": request.formulation,
         "dpg.method": plan.method,
         "dpg.tolerance": repr(request.tolerance),
-        "dpg.law": plan.scene.finger.law.description,
-        "dpg.sources": json.dumps(
-            [[s.key, s.units, spelled(s.value), s.origin, s.rule] for s in plan.scene.sources]
-        ),
-        "dpg.model_error": plan.scene.model_error.text,
         **trust_metadata(plan.trusts, plan.warnings),
         **({"dpg.uncertainty": plan.covers} if plan.covers else {}),
         "dpg.versions": versions(),

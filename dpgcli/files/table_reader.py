@@ -21,7 +21,7 @@ from dpgcli.files.seal import is_whole_in
 from dpgcli.files.trust import outputs_of, trusts_in
 from dpgcli.sweeps.metrics import METRICS
 
-TEXTS = ("calibration", "status", "reason", "accuracy_level")
+TEXTS = ("calibration", "status", "reason", "accuracy_level", "reachable_patterns")
 COUNTS = ("design", "n_stable")
 NEEDED = ("design", "calibration", "status", "reason", "n_stable")
 OTHERS = {*NEEDED, *TEXTS, "error_bound_mm", *(metric.name for metric in METRICS)}  # not swept

@@ -30,6 +30,10 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "min_barrier_mJ": True,
     "aperture_max_mm": True,
     "aperture_min_mm": False,
+    "n_reachable": True,
+    "snap_pressure_max_MPa": False,
+    "reset_pressure_min_MPa": False,
+    "smallest_threshold_gap_MPa": True,
 }
 SHORT_HEAD = ("metric", "best", "of design (best)", "worst", "of design (worst)")
 STIFFEST = "stiffness_max_N_per_mm"

@@ -7,7 +7,7 @@ from dpgcli.states.columns import Group
 from dpgcli.states.omissions import Omission
 from dpgcli.states.quantities import Quantity, named
 
-ON_REQUEST = (Group.NODES, Group.UNCERTAINTY, Group.SHARES)
+ON_REQUEST = (Group.BARRIERS, Group.NODES, Group.UNCERTAINTY, Group.SHARES)
 MOST_STATES_WITH = {
     Group.EIGENVALUE: 2**10,
     Group.STIFFNESS: 2**16,
@@ -43,7 +43,7 @@ def chosen_columns(
 
 
 def _why_left_out(group: Group, n_states: int) -> str:
-    if group is Group.SHARES:
+    if group in (Group.BARRIERS, Group.SHARES):  # they have no option of their own
         return Message("given on request: ", Field("columns"), f" {group}")
     if group in ON_REQUEST:
         return Message("given on request: ", Field(group))

@@ -25,6 +25,7 @@ class Group(StrEnum):
     STIFFNESS = "stiffness"
     ENERGIES = "energies"
     OPENINGS = "openings"
+    BARRIERS = "barriers"
     GRIPPER = "gripper"
     UNCERTAINTY = "uncertainty"
     SHARES = "uncertainty_shares"

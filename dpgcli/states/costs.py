@@ -8,6 +8,7 @@ from dpgcli.states.settle import lanes_at_once
 UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
 PAIR_SECONDS = 1.0e-6
 EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
+BARRIER_SECONDS = 1.0e-5  # times the square of the number of units
 START_SECONDS = 0.3
 LIBRARY_BYTES = 96 * 2**20  # bytes
 ROWS_WRITTEN, COPIES_WRITTEN = 2**17, 4  # of a table, at once; fewer rows of more columns
@@ -23,7 +24,8 @@ def seconds(
         length = n // 2 + split.context
         return START_SECONDS + split.n_solves * length * per_unit + n_states * PAIR_SECONDS
     eigenvalue = EIGENVALUE_SECONDS * (4 * n) ** 3 if Group.EIGENVALUE in groups else 0.0
-    return START_SECONDS + n_states * (n * per_unit + eigenvalue)
+    barrier = BARRIER_SECONDS * n * n if Group.BARRIERS in groups else 0.0
+    return START_SECONDS + n_states * (n * per_unit + eigenvalue + barrier)
 
 
 def rows_at_once(n_columns: int) -> int:

@@ -28,7 +28,7 @@ from dpgcli.states.omissions import Omission, omissions
 from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
-from dpgcli.states.quantities import ALWAYS, Quantity, declared, shares
+from dpgcli.states.quantities import ALWAYS, LEAST, MISSED, Quantity, declared, shares
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
@@ -125,8 +125,12 @@ class Plan:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities to compute: those of its columns, those that judge every state, shares."""
-        wanted = dict.fromkeys((*ALWAYS, *self.columns, *self.shares.values()))
+        """The quantities to compute: those of its columns, those that judge every state, shares.
+
+        Where barriers are asked for, also those that the summary tells.
+        """
+        of_barriers = (*LEAST, MISSED) if Group.BARRIERS in self.groups else ()
+        wanted = dict.fromkeys((*ALWAYS, *self.columns, *self.shares.values(), *of_barriers))
         return tuple(wanted)
 
     @property
@@ -160,7 +164,7 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
     _check(scene, request)
     n = scene.finger.n_units
     scene_units = UnitSolutions.of(scene.finger)
-    needs_bars = any(quantity.needs_bars for quantity in _asked_for(request))
+    needs_bars = any(quantity.needs_bars for quantity in _asked_for(request, n))
     ((_, exactness),) = exactnesses(
         scene_units, request.tolerance, request.target_error, needs_bars=needs_bars
     )
@@ -249,10 +253,10 @@ def _check_uncertainty(scene: Scene, request: Request) -> None:
         )
 
 
-def _asked_for(request: Request) -> Iterator[Quantity]:
+def _asked_for(request: Request, n_units: int) -> Iterator[Quantity]:
     """Quantities that columns name, themselves or by group, among those of every finger."""
     names = {*request.columns, *(Group if "all" in request.columns else ())}
-    return (q for q in declared(1, (), False) if q.name in names or q.group in names)
+    return (q for q in declared(n_units, (), False) if q.name in names or q.group in names)
 
 
 def _split(

@@ -8,11 +8,12 @@ import numpy as np
 
 from dpgcli.arrays import Codes, Columns, Flags, keep_freed_memory
 from dpgcli.design.scene import Scene
+from dpgcli.states.barriers import TIE
 from dpgcli.states.certify import Status
 from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
-from dpgcli.states.quantities import rows
+from dpgcli.states.quantities import LEAST, MISSED, rows
 from dpgcli.states.rows import as_text, solved_rows
 from dpgcli.states.settle import lanes_at_once
 
@@ -26,12 +27,22 @@ class Breakdown:
     shares: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class LeastRobust:
+    """The smallest barrier of all states, mJ, its pattern and its unit, or units where they tie."""
+
+    barrier: float
+    pattern: str
+    unit: str
+
+
 @dataclass
 class Summary:
     """Summary of the states solved so far; errors and residuals are the largest of stable states.
 
     Residual in N, tip error in mm, times in seconds spent on the states alone. `breakdown` is of
-    the least certain state, by the columns of `shares`, if there are any.
+    the least certain state, by the columns of `shares`, if there are any; `least_robust` and the
+    number of saddles that were not found where barriers are asked for.
     """
 
     n_finger_solves: int = 0
@@ -42,6 +53,8 @@ class Summary:
     cpu_seconds: float = 0.0
     shares: Mapping[str, str] = field(default_factory=dict)
     breakdown: Breakdown | None = None
+    least_robust: LeastRobust | None = None
+    n_saddles_not_found: int = 0
 
     @property
     def n_states(self) -> int:
@@ -56,6 +69,20 @@ class Summary:
             self.residual = max(self.residual, float(block["residual_N"][stable].max()))
             self.tip_error = max(self.tip_error, float(block["numerical_error_mm"][stable].max()))
             self._break_down(block, stable)
+        if MISSED.name in block:
+            self._add_barriers(block)
+
+    def _add_barriers(self, block: Columns) -> None:
+        self.n_saddles_not_found += int(block[MISSED.name].sum())
+        barriers, units = (block[column.name] for column in LEAST)
+        if np.isnan(barriers).all():
+            return
+        ties = barriers <= (1.0 + TIE) * np.nanmin(barriers)
+        place = int(ties.argmax())  # the first pattern: which is less by rounding says nothing
+        known = self.least_robust
+        if known is None or (1.0 + TIE) * barriers[place] < known.barrier:
+            pattern = block["pattern"][place].decode()
+            self.least_robust = LeastRobust(float(barriers[place]), pattern, str(units[place]))
 
     def _break_down(self, block: Columns, stable: Flags) -> None:
         if not self.shares:

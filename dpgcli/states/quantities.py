@@ -71,6 +71,8 @@ def declared(
         *_STIFFNESS,
         *(_energy(kind) for kind in _ENERGY_KINDS if kind in energy_kinds),
         *(_opening(unit) for unit in range(n_units)),
+        *(_barrier(unit) for unit in range(n_units)),
+        *LEAST,
         *(_GRIPPER if is_gripper else ()),
         *(() if uncertainty is None else _uncertain(uncertainty, is_gripper)),
         *(_nodes(n_units, "upper_", "lower_") if is_gripper else _nodes(n_units, "")),
@@ -228,6 +230,46 @@ def _opening(unit: int) -> Quantity:
         lambda s: s.openings[unit],
         Group.OPENINGS,
     )
+
+
+def _over(name: str, unit: str, description: str, of: Of, **more: Any) -> Quantity:
+    about = {"outputs": (Output.BARRIERS,), "needs_bars": True, **more}
+    return Quantity(name, unit, description, Group.BARRIERS, of=of, **about)
+
+
+def _barrier(unit: int) -> Quantity:
+    return _over(
+        f"barrier_{unit + 1}_mJ",
+        "mJ",
+        f"energy that unit {unit + 1} needs to snap, or to reset where it is inverted",
+        lambda s: s.barriers.energy[unit],
+    )
+
+
+LEAST = (
+    _over(
+        "least_barrier_mJ",
+        "mJ",
+        "the smallest of a state's barriers",
+        lambda s: s.barriers.least,
+    ),
+    _over(
+        "least_robust_unit",
+        "",
+        "the unit that it is of; all of them where they tie",
+        lambda s: s.barriers.least_robust,
+        kind=Kind.TEXT,
+        is_always=True,
+    ),
+)
+MISSED = _over(
+    "n_saddles_not_found",
+    "",
+    "saddles of a state that exist and were not found",
+    lambda s: s.barriers.n_not_found,
+    kind=Kind.COUNT,
+    is_always=True,
+)  # no column: a sum of all states is said beside the table
 
 
 def _gripper(name: str, unit: str, description: str, of: Of, kind: Kind = Kind.NUMBER) -> Quantity:

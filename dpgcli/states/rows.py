@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Columns, Flags
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.states.barriers import barriers
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows
@@ -53,8 +54,11 @@ def solved_rows(units: UnitSolutions, inverted: Flags, request: RowRequest) -> C
     settled = settle(units, request.formulate, inverted, request.tolerance)
     told = [q for q in request.quantities if request.has_bars or not q.needs_bars]
     has_stiffness = any(q.group is Group.STIFFNESS for q in told)
+    over = None
+    if any(q.group is Group.BARRIERS for q in told):
+        over = barriers(units, request.formulate, settled, request.tolerance)
     solved = SolvedFingers.of(
-        settled, request.around, request.dropped_error, with_compliance=has_stiffness
+        settled, request.around, request.dropped_error, with_compliance=has_stiffness, barriers=over
     )
     unknown = np.full(inverted.shape[1], np.nan)
     return dict.fromkeys((q.name for q in request.quantities), unknown) | rows(solved, told)

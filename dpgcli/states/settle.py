@@ -62,12 +62,13 @@ def settle_from(
     start: Array,
     tolerance: float,
     own: slice = slice(None),
+    largest_step: float = 1.0,
 ) -> Settled:
     """Walk from coordinates, (size, batch), to where the residual is small, and certify.
 
     Near a fold the tolerance may not do: there the walk goes on to where rounding ends it.
     """
-    there = minimize(potential, start, tolerance)
+    there = minimize(potential, start, tolerance, largest_step=largest_step)
     settled = certified(units, potential, inverted, there, tolerance, own)
     is_close = there.relative_residual <= tolerance
     lanes = np.flatnonzero(is_close & ~settled.is_balanced)

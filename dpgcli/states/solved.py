@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
-from dpgcli.mechanics.coordinates import Stations
+from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
+from dpgcli.states.barriers import Barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
@@ -58,6 +59,15 @@ class Surroundings:
 ALONE = Surroundings()
 
 
+def all_nodes(system: FingerCoordinates, coordinates: Array) -> Stations:
+    """Positions of all nodes, the clamped ones first, mm, each (unit + 1, batch)."""
+    stations = system.stations(coordinates)
+    origin = np.zeros_like(stations.base_x[:1])
+    clamped = (origin, origin, origin, origin + system.finger.segment_height)
+    pairs = zip(clamped, stations, strict=True)
+    return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
+
+
 @dataclass(frozen=True)
 class SolvedFingers(SolvedStates):
     """States that were solved as whole fingers; everything further is computed when asked for."""
@@ -65,6 +75,7 @@ class SolvedFingers(SolvedStates):
     settled: Settled
     tip: Tip
     around: Surroundings
+    barriers_if_asked: Barriers | None = None
 
     @classmethod
     def of(
@@ -74,6 +85,7 @@ class SolvedFingers(SolvedStates):
         dropped_error: float | Array,
         *,
         with_compliance: bool,
+        barriers: Barriers | None = None,
     ) -> "SolvedFingers":
         """The states of a batch; `dropped_error` is added to the error of each tip, mm."""
         at_tip = tip(settled, with_compliance=with_compliance)
@@ -88,7 +100,15 @@ class SolvedFingers(SolvedStates):
             settled,
             at_tip,
             around,
+            barriers,
         )
+
+    @property
+    def barriers(self) -> Barriers:
+        """What units have to get over to flip, and which of them needs least."""
+        if self.barriers_if_asked is None:
+            raise ValueError("the states were solved without their barriers")
+        return self.barriers_if_asked
 
     @cached_property
     def eigenvalues(self) -> Array:
@@ -105,11 +125,7 @@ class SolvedFingers(SolvedStates):
     def nodes(self) -> Stations:
         """Positions of all nodes, the clamped ones first, mm, each (unit + 1, state)."""
         coordinates = self.settled.potential.coordinates
-        stations = coordinates.stations(self.settled.equilibrium.coordinates)
-        origin = np.zeros_like(stations.base_x[:1])
-        clamped = (origin, origin, origin, origin + coordinates.finger.segment_height)
-        pairs = zip(clamped, stations, strict=True)
-        return Stations(*(np.concatenate((row, rows)) for row, rows in pairs))
+        return all_nodes(coordinates, self.settled.equilibrium.coordinates)
 
     @cached_property
     def in_gripper(self) -> GripperPose:

@@ -1,10 +1,12 @@
 """Solutions of single units: wells, barriers and openings, before any pattern is solved."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from dpgcli.arrays import Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.crossing import fewest_in_loop
 from dpgcli.states.guess import FirstOrder, first_order
@@ -12,6 +14,7 @@ from dpgcli.states.wells import Wells, inverted_wells
 
 LARGEST_TURN = 0.05  # of a unit's own angle: bars that turn it further are soft
 LARGEST_STRAIN = 0.05  # of a bar: what the first order says of it is no longer small
+PLACES = 128  # of a dome's opening, at which its stiffness is looked at
 WIDE_ANGLE = np.pi / 3.0  # of a corner, beyond which strokes come close to twice the height
 
 
@@ -42,6 +45,17 @@ class UnitSolutions:
         is_stiff = finger.hinge_stiffness > LARGEST_TURN * bars  # its hinge, beside the bars
         is_out_of_reach = ~self.wells.exists & (self.wells.angle > WIDE_ANGLE)
         return is_turned | is_strained | is_stiff | is_out_of_reach
+
+    @cached_property
+    def holding_stiffness(self) -> Array:
+        """A spring that keeps a dome anywhere on its curve, N/mm, (unit, 1 or design)."""
+        finger = self.finger
+        domes = finger.domes
+        start = np.zeros((finger.n_units, 1)) - domes.contact
+        way = domes.contact + 1.5 * domes.stroke
+        share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
+        bend = finger.law.pulling.response(start + share * way, domes).stiffness
+        return np.asarray(2.0 * np.abs(bend).max(axis=0))
 
     @property
     def shortest_loop(self) -> int | None:
@@ -80,8 +94,12 @@ class UnitSolutions:
 
     def take_lanes(self, index: Indices) -> "UnitSolutions":
         """One design for each lane, by index, so that designs and patterns share a batch."""
-        return UnitSolutions(
+        taken = UnitSolutions(
             self.finger.take_lanes(index),
             self.wells.take_lanes(index),
             self.first_order.take_lanes(index),
         )
+        known = self.__dict__.get("holding_stiffness")
+        if known is not None:
+            taken.__dict__["holding_stiffness"] = take_lanes(known, index)
+        return taken

@@ -23,6 +23,7 @@ from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, w
 from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask, reason_against
+from dpgcli.sweeps.designs import designs_at_once
 from dpgcli.sweeps.differences import differences
 from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
@@ -142,14 +143,22 @@ class Study:
 
     @property
     def chunk_size(self) -> int:
-        """Designs per chunk: many states, but never so many that one waits for it."""
-        return max(1, STATES_PER_CHUNK >> self.extent.most_units)
+        """Designs per chunk: many states, but never so many that one waits for it.
+
+        Under pressure a batch of them takes a second or more.
+        """
+        most_units = self.extent.most_units
+        if self.extent.has_pressure:
+            return designs_at_once(most_units)
+        return max(1, STATES_PER_CHUNK >> most_units)
 
     @cached_property
     def extent(self) -> Extent:
         """Time, disk and memory of the sweep."""
         allowed = self.evaluation.allowed if self.sweep.constraints else None
-        return Extent(self.sweep.space, self.sweep.base.finger.units, allowed)
+        base = self.sweep.base
+        has_pressure = base.design.pressure is not None
+        return Extent(self.sweep.space, base.finger.units, allowed, has_pressure)
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""

@@ -61,7 +61,8 @@ def design_states(
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
     for designs in _design_batches(n_designs, n_units):
-        metrics = Metrics(_designs(units, designs), len(designs))
+        pressure = scene.pressure and scene.pressure.take_lanes(designs)
+        metrics = Metrics(_designs(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
@@ -81,8 +82,13 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
+def designs_at_once(n_units: int) -> int:
+    """How many designs to solve in one batch, all states of each."""
+    return max(1, lanes_at_once(n_units) >> n_units)
+
+
 def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
-    size = max(1, lanes_at_once(n_units) >> n_units)
+    size = designs_at_once(n_units)
     for first in range(0, n_designs, size):
         yield np.arange(first, min(first + size, n_designs))
 

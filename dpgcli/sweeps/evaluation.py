@@ -79,7 +79,9 @@ class Evaluation:
     @property
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
-        metrics = (c for c in METRICS if c.group in self.groups)
+        has_pressure = self.base.pressure is not None
+        every = (c for c in METRICS if c.group in self.groups)
+        metrics = (c for c in every if has_pressure or not c.needs_pressure)
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
 
@@ -247,9 +249,11 @@ class Evaluation:
         rows = dict(described)
         finished = [(p.places, p.metrics) for p in solved if p.metrics is not None]
         for column in self.design_columns[len(described) + 2 :]:
-            values = np.full(n_designs, EMPTY.get(column.kind, np.nan), _dtype(column.kind))
-            for places, metrics in finished:
-                values[places] = metrics[column.name]
+            found = [(places, metrics[column.name]) for places, metrics in finished]
+            widest = np.result_type(_dtype(column.kind), *(part.dtype for _, part in found))
+            values = np.full(n_designs, EMPTY.get(column.kind, np.nan), widest)
+            for places, part in found:
+                values[places] = part
             rows[column.name] = values
         for places, metrics in finished:
             complete = metrics["n_stable"] == metrics["n_states"]

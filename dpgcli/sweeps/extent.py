@@ -19,6 +19,8 @@ DESIGN_SECONDS = 2e-5  # of a design, its states aside; measured
 BYTES_PER_STATE = 120  # in the tables and, while they are made, in the parts
 FILE_BYTES, DESIGN_FILE_BYTES = 40 * 2**10, 14  # of empty tables and parts, of a design; measured
 PROCESS_BYTES, DESIGN_BYTES, VALUE_BYTES = 400 * 2**20, 350, 24  # in memory; measured
+PRESSED_SECONDS = 1.3e-4  # of a unit of a state under pressure; measured
+MOST_PRESSED = 12  # units: longer fingers take minutes each
 MOST_CHUNKS = 10**6  # days of work, and a file each
 MOST_SENT = 2**22  # states of a design, about 250 MB
 MOST_ASKED = 10**6  # designs that are held against constraints before the work
@@ -31,12 +33,14 @@ class Extent:
     """Extent of a sweep; constraints count where there are long fingers that they may exclude.
 
     `base_units` is the number of units where the space leaves it alone. `allowed` says, if there
-    are constraints, which designs meet them, from their values by key.
+    are constraints, which designs meet them, from their values by key. With `has_pressure` every
+    state is followed under pressure, too.
     """
 
     space: Space
     base_units: int
     allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]] | None = None
+    has_pressure: bool = False
 
     @cached_property
     def most_units(self) -> int:
@@ -81,7 +85,8 @@ class Extent:
 
     def seconds_of(self, n_states: int) -> float:
         """The same, with another number of states."""
-        of_states = n_states * self.most_units * UNIT_STATE_SECONDS["chain"]
+        of_unit = UNIT_STATE_SECONDS["chain"] + (PRESSED_SECONDS if self.has_pressure else 0.0)
+        of_states = n_states * self.most_units * of_unit
         return START_SECONDS + self.space.size * DESIGN_SECONDS + of_states
 
     def check(self, chunk_size: int, *, is_sent: bool) -> None:
@@ -94,6 +99,11 @@ class Extent:
             raise UsageError(
                 f"{size:,} designs in {n_chunks:,} chunks of work: expected at most "
                 f"{MOST_CHUNKS:,}; take fewer values or units"
+            )
+        if self.has_pressure and self.most_units > MOST_PRESSED:
+            raise UsageError(
+                f"a finger of {self.most_units} units under pressure: expected at most "
+                f"{MOST_PRESSED}; take fewer units, or the section pressure out of the base"
             )
         n_states, most = 2**self.most_units, MOST_SENT if is_sent else MOST_SELECTED
         if n_states > most:

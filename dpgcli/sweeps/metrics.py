@@ -5,16 +5,20 @@ A metric is written here and nowhere else: tables, metadata and the manual follo
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
 from dpgcli.design.outputs import STIFFNESS, Output
+from dpgcli.design.pressure import Pressure
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers
+from dpgcli.sweeps.pressures import PressedDesigns
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
 CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
@@ -25,12 +29,14 @@ CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
 class Metric(Column):
     """A column of designs: what `of` makes of all their states, (design,).
 
-    Or, with a value `over` the states, the `extreme` of it among a design's stable ones.
+    Or, with a value `over` the states, the `extreme` of it among a design's stable ones. What
+    `needs_pressure` is there for designs that have it.
     """
 
-    of: Callable[["Metrics"], Array | Indices] = field(kw_only=True, compare=False)
+    of: Callable[["Metrics"], NDArray[Any]] = field(kw_only=True, compare=False)
     over: str = field(default="", kw_only=True)
     extreme: np.ufunc = field(default=np.minimum, kw_only=True)
+    needs_pressure: bool = field(default=False, kw_only=True)
 
 
 @dataclass
@@ -38,11 +44,13 @@ class Metrics:
     """The row of metrics of each of some designs, from blocks of their states.
 
     A block holds, design by design, equally many states of each. Its memory is that of a block
-    and of the distinct tips, however many states there are.
+    and of the distinct tips, however many states there are. `pressure` is that of the designs,
+    if they have any.
     """
 
     units: UnitSolutions
     n_designs: int
+    pressure: Pressure | None = None
     n_stable: Indices = field(init=False)
     extremes: dict[str, Array] = field(init=False, default_factory=dict)
 
@@ -66,7 +74,14 @@ class Metrics:
     def columns(self) -> Columns:
         """One row per design; NaN where it has no stable state."""
         known = (m for m in METRICS if not m.over or m.name in self.extremes)
-        return {metric.name: metric.of(self) for metric in known}
+        has_pressure = self.pressure is not None
+        return {m.name: m.of(self) for m in known if has_pressure or not m.needs_pressure}
+
+    @cached_property
+    def pressed(self) -> PressedDesigns:
+        """What pressure does to the designs, which have it."""
+        assert self.pressure is not None, "no metric that needs pressure is asked for"
+        return PressedDesigns(self.units, self.pressure, self.n_designs)
 
     def extreme(self, name: str) -> Array:
         """The extreme of a metric that is one, (design,)."""
@@ -140,6 +155,69 @@ def _most(
     return replace(least, extreme=np.maximum)
 
 
+def _under_pressure(
+    name: str,
+    unit: str,
+    description: str,
+    of: Callable[[PressedDesigns], NDArray[Any]],
+    kind: Kind = Kind.NUMBER,
+) -> Metric:
+    def of_pressed(metrics: Metrics) -> NDArray[Any]:
+        return of(metrics.pressed)
+
+    outputs = (Output.PRESSURES,)
+    return Metric(
+        name, unit, description, kind=kind, outputs=outputs, of=of_pressed, needs_pressure=True
+    )
+
+
+UNDER_PRESSURE = (
+    _under_pressure(
+        "n_reachable",
+        "",
+        "states that pulses of pressure lead to from rest",
+        lambda d: d.n_reachable,
+        Kind.COUNT,
+    ),
+    _under_pressure(
+        "reachable_patterns",
+        "",
+        "the patterns of these states",
+        lambda d: d.reachable_patterns,
+        Kind.TEXT,
+    ),
+    _under_pressure(
+        "snap_pressure_min_MPa",
+        "MPa",
+        "pressure at which the first unit snaps, each by itself",
+        lambda d: np.fmin.reduce(d.thresholds.snap, axis=0),
+    ),
+    _under_pressure(
+        "snap_pressure_max_MPa",
+        "MPa",
+        "pressure at which the last unit snaps, each by itself",
+        lambda d: np.fmax.reduce(d.thresholds.snap, axis=0),
+    ),
+    _under_pressure(
+        "reset_pressure_min_MPa",
+        "MPa",
+        "pressure at which the last unit resets, each by itself",
+        lambda d: np.fmin.reduce(d.thresholds.reset, axis=0),
+    ),
+    _under_pressure(
+        "reset_pressure_max_MPa",
+        "MPa",
+        "pressure at which the first unit resets, each by itself",
+        lambda d: np.fmax.reduce(d.thresholds.reset, axis=0),
+    ),
+    _under_pressure(
+        "smallest_threshold_gap_MPa",
+        "MPa",
+        "smallest difference of two units' snap, or reset, pressures on one line",
+        lambda d: d.smallest_gap,
+    ),
+)
+
 METRICS = (
     _count("n_units", "number of units", lambda m: m.alike(m.units.finger.n_units)),
     _count("n_states", "number of patterns", lambda m: m.alike(2**m.units.finger.n_units)),
@@ -197,6 +275,7 @@ METRICS = (
         outputs=(Output.BARRIERS,),
         of=lambda m: m.alike(barriers(m.units.finger, m.units.wells)),
     ),
+    *UNDER_PRESSURE,
     _most("max_residual_N", "N", "largest unbalanced force of any state", "residual_N"),
     _most(
         "max_numerical_error_mm", "mm", "largest numerical error of any tip", "numerical_error_mm"

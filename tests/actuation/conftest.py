@@ -1,6 +1,8 @@
 """Fingers under pressure, as the tests of this folder take them."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -31,3 +33,57 @@ def pressed() -> Callable[..., Pressed]:
         return Pressed(UnitSolutions.of(finger), DomeVolumes(np.array([[area]])))
 
     return made
+
+
+State = tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Hysterons:
+    """Independent hysterons, the Preisach model: each flips up and down at thresholds of its own.
+
+    A second way to what fingers between rigid bars do, which shares nothing with the program:
+    thresholds up > 0 > down, and the line that each is on.
+    """
+
+    up: tuple[float, ...]
+    down: tuple[float, ...]
+    line: tuple[int, ...]
+
+    def at(self, state: State, line: int, field: float) -> State:
+        """The state once the field of a line has gone to a value, and stays there."""
+        return tuple(
+            is_up if own != line else (is_up or field >= up) and not field <= down
+            for is_up, up, down, own in zip(state, self.up, self.down, self.line, strict=True)
+        )
+
+    def thresholds(self, state: State, line: int, sign: int) -> list[float]:
+        """Fields at which units of a state flip as its line goes that way, nearest first."""
+        own = [
+            self.up[i] if sign > 0 else self.down[i]
+            for i, is_up in enumerate(state)
+            if self.line[i] == line and is_up == (sign < 0)
+        ]
+        return sorted(own, key=abs)
+
+    def pulses(self, state: State, line: int, sign: int, reach: float) -> list[tuple[object, ...]]:
+        """Ranges of peaks and the state that each leads to: hysterons stay when the field goes."""
+        fields = [*self.thresholds(state, line, sign), sign * reach]
+        return [(start, stop, self.at(state, line, start)) for start, stop in pairwise(fields)]
+
+    def reached(self) -> set[State]:
+        """States that pulses lead to from the one in which all are down."""
+        found, todo = set[State](), [(False,) * len(self.up)]
+        while todo:
+            state = todo.pop()
+            if state not in found:
+                found.add(state)
+                fields = zip((*self.up, *self.down), (*self.line, *self.line), strict=True)
+                todo += [self.at(state, line, field) for field, line in fields]
+        return found
+
+
+@pytest.fixture
+def hysterons() -> type[Hysterons]:
+    """The peer of fingers between rigid bars."""
+    return Hysterons

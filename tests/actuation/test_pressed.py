@@ -140,6 +140,24 @@ def test_a_dome_that_only_pushes_leaves_its_neighbor_when_sucked_back(
     assert not way.shapes.touching.any()
 
 
+def test_domes_that_are_pulled_back_meet_their_neighbors_at_no_pressure(
+    study: Study, pressed: Made
+) -> None:
+    """Nothing moves before, so that there is no path to be followed but that of the pressure."""
+    finger = study(3)
+    finger = pressed(type(finger)(**{**vars(finger), "law": PushOnly(PUBLISHED)}))
+    start, _ = at_rest(finger, np.zeros((3, 1), bool))
+    shapes = driven(finger, start, np.full((3, 1), -0.3)).shapes
+    way = driven(finger, shapes, np.full((3, 1), 0.1))
+    (event,) = way.events
+    assert event.halted.reason.tolist() == [Halt.CONTACT]
+    assert event.halted.shapes.pressure[:, 0] == pytest.approx([0.0] * 3, abs=1e-12)
+    assert event.halted.tied.sum() == 2
+    assert way.shapes.touching is not None
+    assert way.shapes.touching.all()
+    assert (finger.extensions(way.shapes.coordinates) > 0.3).all()
+
+
 def test_the_inverted_state_under_pressure_is_the_root_of_its_force(
     study: Study, pressed: Made
 ) -> None:

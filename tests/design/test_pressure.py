@@ -1,6 +1,7 @@
 """Areas and snap pressures of designs: from specs, curves and assumptions, many at once."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ from dpgcli.design.dimensions import Design, GivenPressure, GivenValues
 from dpgcli.design.outputs import Basis, Output
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import Origin
+from dpgcli.files.scene_file import read_spec, scene_of
 from dpgcli.mechanics.curve import Spline
+
+STUDY = Path(__file__).parents[2] / "configs" / "three_unit.yaml"
 
 GEOMETRY = {
     "dome_height_mm": 6.5,
@@ -207,18 +211,32 @@ def test_areas_by_travel_are_those_of_the_data(columns: str, law: str, gaps: Any
 def test_between_its_branches_and_beyond_them(columns: str) -> None:
     design = of(dome(GAP, snap_pressure=0.12, **COLUMNS[columns]))
     shape = pressure(design).shape
-    between = areas(shape, design, np.linspace(*GAP, 200))
+    between = areas(shape, design, np.linspace(6.0, GAP[1], 200))  # where E' is negative
     assert (np.diff(between) < 2e-4).all()  # of a volume that is twice differentiable
-    assert np.ptp(between) > 0.2
-    ends = areas(shape, design, np.array([*GAP]))
-    assert between[[0, -1]] == pytest.approx(ends, rel=1e-9)
+    assert np.ptp(between) > 0.1
     beyond = areas(shape, design, np.array([15.0, 16.0, 40.0]))
     assert beyond == pytest.approx(beyond[0], rel=1e-9)
     rule = source(design).rule
     how = "dV/du" if columns == "volume" else "E'/p"
     assert rule == f"from dome.yaml; area {how} on the branches of its curve, " + (
-        "monotone between them (assumed)"
+        "monotone between them, the pressure below its limit (assumed)"
     )
+
+
+@pytest.mark.parametrize("end", [1.0, 1.5, 2.0])
+def test_a_dome_bears_no_more_behind_its_last_sample(end: float) -> None:
+    """It snapped there, whatever the energy of the bridge to the other branch is."""
+    design = of(dome((end, 12.0), snap_pressure=0.12, pressure=FORCE / AREAS))
+    scene = resolve(design).scene()
+    shape, curve = pressure(design).shape, scene.finger.law.curve
+    assert curve is not None
+    full = scene.finger.dome_travel[0, 0]
+    travel = np.linspace(0.1, 12.0, 2000)
+    pressures = curve(travel / full).slope / shape(travel / full).slope
+    assert travel[pressures.argmax()] == pytest.approx(end, abs=0.1)
+    own = travel < end
+    known = np.interp(travel[own], TRAVEL, FORCE / AREAS)
+    assert pressures[own] / pressures.max() == pytest.approx(known / known.max(), rel=1.5e-2)
 
 
 def test_pressures_are_met_between_samples_too() -> None:
@@ -244,6 +262,58 @@ def test_pressures_that_were_not_measured_everywhere() -> None:
     at = np.array([1.0, 2.0, 10.0, 14.5])
     found, known = (areas(pressure(design).shape, design, at) for design in (part, whole))
     assert found == pytest.approx(known, rel=1e-2)
+
+
+def test_an_area_is_no_noise_over_noise() -> None:
+    """A gauge that shows 0.1 % of its range too much says nothing of areas near rest."""
+    shown = FORCE / AREAS + 1e-3 * np.max(FORCE / AREAS)
+    design = of(dome(GAP, snap_pressure=0.12, pressure=shown))
+    shape = pressure(design).shape
+    own = (GAP[0] >= TRAVEL) | ((TRAVEL >= 13.0) & (TRAVEL <= 13.5))
+    found = areas(shape, design, TRAVEL[own])
+    assert found == pytest.approx(AREAS[own] / AREAS[GAP[0] == TRAVEL], rel=0.1)
+
+
+def test_one_branch_by_volume_and_the_other_by_pressure() -> None:
+    volumes = [v if u < GAP[0] + 0.1 else None for u, v in zip(TRAVEL, VOLUME, strict=True)]
+    kept = (GAP[0] >= TRAVEL) | (GAP[1] <= TRAVEL)
+    some = [v for v, is_kept in zip(volumes, kept, strict=True) if is_kept]
+    for law in ("push_only", "tabulated"):
+        design = of(dome(GAP, snap_pressure=0.12, volume=some, pressure=FORCE / AREAS), law)
+        found = areas(pressure(design).shape, design, np.array([1.0, 12.8, 14.5]))
+        assert found == pytest.approx(AREAS[[8, 102, 116]] / AREAS[16], rel=2e-2)
+
+
+def test_a_curve_that_begins_beside_rest() -> None:
+    whole = dome(GAP, snap_pressure=0.12, volume=VOLUME)
+    assert whole.curve is not None
+    columns = {name: getattr(whole.curve, name)[4:] for name in ("travel", "energy", "volume")}
+    design = of(replace(whole, curve=replace(whole.curve, **columns)))
+    scene = resolve(design).scene()
+    curve, shape = scene.finger.law.curve, pressure(design).shape
+    assert curve is not None
+    fine = np.linspace(0.5, 2.0, 97) / scene.finger.dome_travel[0, 0]
+    limit = (curve(fine).slope / shape(fine).slope).argmax()
+    assert shape(fine[limit]).slope == pytest.approx(1.0, rel=1e-4)
+    first = areas(shape, design, np.array([0.0, 0.2, 0.5]))
+    assert first == pytest.approx(first[-1], rel=1e-3)
+
+
+def test_the_shipped_dome_has_one_limit_point() -> None:
+    """E' is not smooth there; over areas that keep to the pressures it rises all the way."""
+    scene = scene_of(read_spec(STUDY, ["finger.calibration=finite_elements", "pressure={}"]))
+    assert scene.pressure is not None
+    shape, curve = scene.pressure.shape, scene.finger.law.curve
+    assert shape is not None
+    assert curve is not None
+    travel = np.linspace(0.2, 1.86, 2000) / scene.finger.dome_travel[0, 0]
+    pressures = curve(travel).slope / shape(travel).slope
+    assert (np.diff(pressures) > 0.0).all()
+
+
+def test_a_second_curve_is_not_the_law_s() -> None:
+    files = (dome(), dome(snap_pressure=0.12), PUBLISHED)
+    assert source(replace(of(dome()), calibrations=files)).origin is Origin.ASSUMED
 
 
 def test_columns_that_say_nothing() -> None:
@@ -292,9 +362,35 @@ def test_what_pressures_rest_on(name: str) -> None:
     assert bool(trust.doubt) is (basis in (Basis.ASSUMED, Basis.EXTRAPOLATED))
 
 
+def test_reset_pressures_of_a_curve_with_a_gap_are_assumed() -> None:
+    for gaps, is_said in (((), False), ((GAP,), True)):
+        trusts = resolve(of(dome(*gaps, snap_pressure=0.12))).trusts
+        source = {t.output: t for t in trusts}[Output.PRESSURES].source
+        assert ("reset pressures are assumed" in source) is is_said
+
+
 def test_designs_of_a_space_differ_in_what_pressures_rest_on() -> None:
     heights = {"finger.geometry.dome_height_mm": np.array([6.5, 7.0, 9.0])}
     found: Resolution = resolve(of(dome(snap_pressure=0.12)).with_values(heights))
     kinds = found.kinds_of_trust(np.arange(3))
     bases = [{t.output: t for t in trusts}[Output.PRESSURES].basis for trusts, _ in kinds]
     assert sorted(bases) == ["extrapolated", "fitted", "fitted"]
+
+
+def test_designs_that_differ_in_nothing_else_are_kinds_of_their_own() -> None:
+    """The springs are given: only the snap pressure is scaled with the dome's thickness."""
+    given = {
+        "finger.lattice.bistable_stiffness_N_per_mm": np.array([90.0]),
+        "finger.lattice.segment_length_mm": np.array([13.5]),
+        "finger.geometry.dome_thickness_mm": np.array([0.75, 0.75, 1.2]),
+    }
+    design = of(dome(snap_pressure=0.12)).with_values(given)
+    design = replace(
+        design,
+        finger=replace(
+            design.finger,
+            geometry={**design.finger.geometry, "chamber_length_mm": np.array([9.0, 9.0, 8.1])},
+        ),
+    )
+    kinds = resolve(design).kinds_of_trust(np.arange(3))
+    assert sorted(count for _, count in kinds) == [1, 2]

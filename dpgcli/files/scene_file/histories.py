@@ -73,7 +73,8 @@ def read_history(source: Tabular, lines: Sequence[str]) -> dict[str, Array]:
         numbers = sheet.numbers(list(names))
     except SpecError as error:
         problems += error.problems
-    problems += _time_problems(sheet, numbers.get(TIME, np.zeros(0)))
+    for name in filter(lambda name: _line(name) == TIME, numbers):
+        problems += _time_problems(sheet, numbers[name])
     if problems:
         raise SpecError(in_order(problems))
     return {_line(name): values * _factor(sheet, name) for name, values in numbers.items()}

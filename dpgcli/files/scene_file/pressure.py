@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from dpgcli.design.dimensions import UNIT_RANGE, GivenPressure, Sizes, unit_range
+from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, GivenPressure, Sizes, unit_range
 from dpgcli.design.lines import HISTORY, LINES, NAME, TIME
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import Positive, Section
@@ -51,7 +51,7 @@ def _units(said: object) -> object:
     if not all(isinstance(part, int | str) and not isinstance(part, bool) for part in parts):
         raise ValueError("no units")
     texts = [text.strip() for part in parts for text in str(part).split(",")]
-    if not texts or not all(map(unit_range, texts)):
+    if not texts or not all(0 < len(unit_range(text)) <= MAX_UNITS for text in texts):
         raise ValueError("no units")
     return ",".join(text.replace(" ", "") for text in texts)
 

@@ -113,6 +113,11 @@ def test_a_snap_pressure_is_given_to_some_and_assumed_of_the_others() -> None:
     ]
 
 
+def test_an_override_that_says_nothing_changes_nothing() -> None:
+    given = "snap_pressure_MPa: 0.15, overrides: {2: {}, 3: null}"
+    assert pressure_of(given).snap_pressure.tolist() == [[0.15]]
+
+
 def test_areas_may_differ() -> None:
     given = "effective_area_mm2: 30, overrides: {1: {effective_area_mm2: 40}}"
     assert pressure_of(given).effective_area.ravel().tolist() == [40.0, 30.0, 30.0, 30.0, 30.0]
@@ -156,6 +161,7 @@ def test_what_says_the_same_is_the_same() -> None:
         ("lines: {A: 1-6}", "lines.A: expected units within 1-5, found 6"),
         ("lines: {A: 0-5}", "lines.A: expected units within 1-5, found 0"),
         ("lines: {A: 5-1}", 'lines.A: expected units such as 1-3, 4 or 1,3, found "5-1"'),
+        ("lines: {A: 1-9999}", 'lines.A: expected units such as 1-3, 4 or 1,3, found "1-9999"'),
         ("lines: {A: true}", "lines.A: expected units such as"),
         ("lines: {A: 1.5}", "lines.A: expected units such as"),
         ("lines: {A: []}", "lines.A: expected units such as"),

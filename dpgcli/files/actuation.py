@@ -1,0 +1,40 @@
+"""The path of a finger through pressures in a file, with its events and what it rests on."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.arrays import Columns
+from dpgcli.design.scene import Scene
+from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.scene_metadata import scene_metadata
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_table
+from dpgcli.files.trust import trust_metadata, with_bases
+from dpgcli.states.columns import Column
+from dpgcli.states.rows import as_text
+
+Rows = tuple[tuple[Column, ...], Columns]
+
+
+def write_path(path: Path, scene: Scene, spec_json: str, points: Rows, events: Rows) -> None:
+    """Write a row for each point to a Parquet file; the events are in its metadata, as JSON."""
+    columns, rows = points
+    metadata = {
+        "dpg.schema_version": str(SCHEMA_VERSION),
+        **scene_metadata(scene, spec_json),
+        **trust_metadata(scene.trusts, scene.warnings),
+        "dpg.events": json.dumps(_records(events)),
+        "dpg.versions": versions(),
+    }
+    described = with_bases(schema(columns), metadata)
+    write_table(path, described, [record_batch(columns, rows)], metadata)
+
+
+def _records(table: Rows) -> Sequence[dict[str, object]]:
+    """Rows as objects by name."""
+    columns, rows = table
+    texts = [np.asarray(as_text(column, rows[column.name])).tolist() for column in columns]
+    names = [column.name for column in columns]
+    return [dict(zip(names, row, strict=True)) for row in zip(*texts, strict=True)]
