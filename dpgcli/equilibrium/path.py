@@ -236,12 +236,12 @@ def _one_step(
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
     event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
-    event = _at_event(family, walk, trial, event_cell)
+    event, moved = _at_event(family, walk, trial, event_cell), accepted & landed
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
     if landed.any():
-        walk.coordinates = np.where(landed, event.coordinates, walk.coordinates)
-        walk.load = np.where(landed, event.load, walk.load)
+        walk.coordinates = np.where(moved, event.coordinates, walk.coordinates)
+        walk.load = np.where(moved, event.load, walk.load)
         walk.cell = np.where(landed, event_cell, walk.cell)
         ending[landed] = Outcome.EVENT
     ending[accepted & is_last] = Outcome.ARRIVED
@@ -330,11 +330,11 @@ class _Place(NamedTuple):
 def _at_event(
     family: Family[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, cell: Indices
 ) -> _Place:
-    """Where the margins of cells vanish, by secants through the points that were tried."""
+    """Where the margins of cells vanish, by secants: near to the points that were tried."""
     lanes = np.arange(len(cell))
     there, margin, before = trial.there, trial.margin[cell, lanes], walk.margin[cell, lanes]
-    is_between = np.isfinite(before) & (before != margin)
-    share = np.where(is_between, margin, 0.0) / np.where(is_between, before - margin, 1.0)
+    is_near = np.isfinite(before) & (before > 2.0 * np.abs(margin))
+    share = np.where(is_near, margin, 0.0) / np.where(is_near, before - margin, 1.0)
     followed = np.maximum(trial.cell, 0), lanes
     by_cell = (there.linear.measured.value - walk.values)[followed]
     rest = share * np.where(trial.cell >= 0, by_cell, there.load - walk.load)
