@@ -6,7 +6,7 @@ those of the threshold, against the fold in extended precision.
 
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from io import StringIO
 from itertools import pairwise
@@ -21,6 +21,7 @@ from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.benchmark.peers import springable_parts
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.folds import extended_fold
+from dpgcli.states.units import UnitSolutions
 
 HIGHEST = 1.3  # of the threshold: where ways end
 STEPS = 200  # of SciPy's way
@@ -52,6 +53,8 @@ class SnapCase:
         halted = _halted(pressed, _pressure_in_play(pressed), 1)
         if halted.reason[0] != Halt.FOLD:
             return cls(pressed, np.nan)
+        if pressed.finger.is_rigid and pressed.finger.n_units > 1:  # units do not feel each other
+            return cls(pressed, cls.of(_alone(pressed, int(halted.unit[0]))).threshold)
         pushes = (pressed.volumes.area * halted.shapes.pressure)[:, 0]
         coordinates, at = pressed.coordinates, halted.shapes.coordinates
         nodes = np.stack(coordinates.stations(at), axis=1).reshape(-1)
@@ -91,6 +94,14 @@ class SnapCase:
     def _package(self, n: int) -> Callable[[], Array]:
         end = HIGHEST * self.threshold
         return lambda: _halted(self.pressed, end, n).shapes.pressure[0]
+
+
+def _alone(pressed: Pressed, unit: int) -> Pressed:
+    """One unit of a finger."""
+    volumes = pressed.volumes
+    area = np.broadcast_to(volumes.area, (pressed.finger.n_units, 1))[[unit]]
+    finger = pressed.finger.with_units([unit])
+    return Pressed(UnitSolutions.of(finger), replace(volumes, area=area))
 
 
 def _pressure_in_play(pressed: Pressed) -> float:
