@@ -10,6 +10,9 @@ STROKE ?= 3.5
 DPG_VERSION := $(shell $(DPG) --version)
 export SPEC MESH STROKE DPG_VERSION
 
+# Make's own rules would write a spec `finger` anew from a `finger.sh` beside it.
+MAKEFLAGS += --no-builtin-rules
+
 .DELETE_ON_ERROR:
 .PHONY: all clean force
 all: $(OUT)/states.parquet

@@ -7,6 +7,7 @@ from typing import TypeAlias
 from dpgcli.api.inputs import SceneInput, path_of
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, Message, Problem, SpecError, UsageError
+from dpgcli.files.access import reading
 from dpgcli.files.calibration import Calibration, read_calibration
 from dpgcli.files.scene_file import checked, recalibrated, scene_of, with_files
 from dpgcli.files.scene_file.references import BUILT_IN, EXPECTED
@@ -36,7 +37,9 @@ def _calibration(given: CalibrationInput) -> Calibration | str:
     if isinstance(given, Calibration) or (isinstance(given, str) and given in BUILT_IN):
         return given
     path = path_of("calibration", given)
-    if not path.exists():
+    with reading(path):
+        is_there = path.exists()
+    if not is_there:
         raise UsageError(Field("calibration"), f" {given}: expected {EXPECTED}, found no such file")
     return read_calibration(path).model_copy(update={"file": path.name})
 

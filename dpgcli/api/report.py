@@ -5,6 +5,7 @@ from pathlib import Path
 
 from dpgcli.api.inputs import path_of
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.access import writing
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_reader import read_designs
@@ -63,7 +64,9 @@ def summarize(folder: Path, *, is_new: bool, strict: bool = False) -> tuple[Desi
     """
     space, text = page(folder, ".md")
     path = folder / REPORT
-    if is_new or not path.exists() or _is_outdated(path, text):
+    with writing(path):
+        is_there = path.exists()
+    if is_new or not is_there or _is_outdated(path, text):
         write_page(path, text)
     if strict:
         _check_ranking(space)

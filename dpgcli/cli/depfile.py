@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -14,11 +14,15 @@ SPECIAL = re.compile(r"([ #:*?[])")
 HERE = re.compile(r"^(\./+)+")  # Make drops it before it looks at the rest
 T = TypeVar("T")
 HEAD = "# dpg sweep: what its tables are made from"
+# Make's own rules make `finger` from a newer `finger.sh`, and hand names to a shell as they are. An
+# empty recipe for each file would stop them too, and with them a rule that makes a calibration.
+NO_BUILTIN_RULES = "MAKEFLAGS += --no-builtin-rules"
 
 
 def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> str:
     """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does.
 
+    Make's own rules are put aside, with which it would remake what was read.
     Make knows a target by its letters: `folder` is as it was typed, and the targets are in it
     as a rule has them that names `$(OUT)/states.parquet`, and as they are commonly spelled.
     Raises UsageError for a name that Make would read as something else than a name.
@@ -26,8 +30,10 @@ def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> s
     names = [f"{each}/{name}" for each in (folder, Path(folder)) for name in tables]
     targets = dict.fromkeys(map(_target, names))
     sources = [_plain(source) for source in files if source != Path("-")]
+    _check_members(sources)
     text = f"{HEAD}\n{' '.join(targets)}: {' '.join(map(_spelled, sources))}\n"
-    return text + "".join(f"\n{_target(source)}:\n" for source in sources)
+    text += "".join(f"\n{_target(source)}:\n" for source in sources)
+    return f"{text}\n{NO_BUILTIN_RULES}\n"
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,18 @@ def _plain(path: Path) -> str:
     plain = os.path.normpath(path)
     is_same = os.path.realpath(Path(plain).parent) == os.path.realpath(path.parent)
     return plain if is_same else os.fspath(path)
+
+
+def _check_members(names: Sequence[str]) -> None:
+    """Raise UsageError for names that together are members of an archive: lib(one two)."""
+    from dpgcli.errors import UsageError
+
+    last = max((place for place, name in enumerate(names) if name.endswith(")")), default=0)
+    opening = next((name for name in names[:last] if "(" in HERE.sub("", name)[1:]), None)
+    if opening is not None:
+        raise UsageError(
+            f"--depfile: Make cannot take the names {opening} … {names[last]} together"
+        )
 
 
 def _target(name: str) -> str:

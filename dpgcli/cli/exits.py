@@ -40,6 +40,7 @@ SOON = 0.01  # s
 MOST_ROWS = 10  # of data whose problems are shown
 # open files, disk, processes, memory
 EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOSPC, errno.EROFS, errno.EAGAIN, errno.ENOMEM)
+CLOSED = (errno.EACCES, errno.EPERM, errno.ELOOP, errno.ENAMETOOLONG)  # names
 REFUSALS = (  # of memory, by the loader of libraries and by those that start threads
     "failed to map segment",
     "annot allocate memory",
@@ -129,7 +130,7 @@ def _fail_if_refused(error: Exception) -> None:
     """End where it is no bug: the working folder was deleted, or the system has run out of it."""
     if isinstance(error, OSError) and working_folder_is_gone():
         fail(ExitCode.USAGE, "the working folder was deleted: change to one that is there")
-    if isinstance(error, OSError) and error.errno in EXHAUSTED:
+    if isinstance(error, OSError) and error.errno in (*EXHAUSTED, *CLOSED):
         fail(ExitCode.USAGE, f"the system refuses: {error}")
     if isinstance(error, MemoryError):  # of NumPy and pyarrow as well
         fail(ExitCode.USAGE, f"the system refuses more memory: {str(error) or 'there is no more'}")

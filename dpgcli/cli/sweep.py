@@ -1,6 +1,7 @@
 """`dpg sweep`: the design space, into two tables."""
 
 import math
+import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -191,8 +192,8 @@ def _described(study: "Study", output: str, depfile: Path) -> Depfile:
 def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: Path) -> None:
     """Workers' imports, once for all of them, while this process is busy with its own."""
     n_workers = jobs or cores().usable
-    if executor is not ExecutorName.PROCESSES or n_workers == 1 or folder.exists():
-        return
+    if executor is not ExecutorName.PROCESSES or n_workers == 1 or os.path.lexists(folder):
+        return  # in a folder that is there, there may be nothing to do
     from dpgcli.sweeps.pool import start_fork_server
 
     start_fork_server("dpgcli.studies.work", "filelock", "shapely")
@@ -201,16 +202,16 @@ def _start_fork_server_early(executor: ExecutorName, jobs: int | None, folder: P
 def _check_names(study: "Study", depfile: Path | None, summary_file: Path | None) -> None:
     """Files of their own, none of them one that is read, nor where parts are kept."""
     from dpgcli.errors import UsageError
-    from dpgcli.files.output import check_apart, check_appendable, check_not_read
+    from dpgcli.files.output import check_apart, check_appendable, check_not_read, real
     from dpgcli.studies.sweep import PARTS, outputs
 
     tables = [path for path, _ in outputs(study.folder)]
     own = [path for path in (depfile, summary_file) if path is not None]
     check_not_read(study.sweep.files, tables + own)
     check_apart(tables + own)
-    parts = (study.folder / PARTS).resolve()
+    parts = real(study.folder / PARTS)
     for path in own:
-        if path.resolve().is_relative_to(parts):
+        if real(path).is_relative_to(parts):
             raise UsageError(f"{path}: expected a name outside of {PARTS}, where parts are kept")
     if summary_file is not None:
         check_appendable(summary_file, study.sweep.files)
@@ -267,7 +268,6 @@ def _chosen(designs: "Columns") -> str:
 
 
 def _computed(study: "Study", place: "Place", part: "Shard | None", quiet: bool) -> "Progress":
-    workplace = place.workplace(say)
     line = ProgressLine(study.sweep.space.size, "designs", quiet=quiet)
 
     def watch(progress: "Progress") -> None:
@@ -276,7 +276,8 @@ def _computed(study: "Study", place: "Place", part: "Shard | None", quiet: bool)
         line.show(progress.n_done)
 
     try:
-        return study.compute(workplace, watch, part)
+        with place.workplace(say) as workplace:
+            return study.compute(workplace, watch, part)
     except (KeyboardInterrupt, Terminated) as stop:
         raise type(stop)("what is done is kept, and the same command goes on from there") from None
     finally:

@@ -11,6 +11,7 @@ from enum import Enum
 from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
+from dpgcli.files.access import reading, writing
 from dpgcli.files.seal import footer_size
 from dpgcli.temporary import lock, temporary_file
 from dpgcli.text import control_character
@@ -60,19 +61,16 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
     OutputError where the file cannot be written: no folder, no permission, no space, a file of
     somebody else.
     """
-    target = Path(os.path.realpath(path))
-    try:
-        with _beside(target) as temporary:
-            yield temporary
-            with _as_far_as_allowed():
-                _sync(temporary, os.O_RDWR)
-            _check_replaceable(target, mark)
-            temporary.replace(target)
-            with _as_far_as_allowed():
-                if OPENS_FOLDERS:
-                    _sync(target.parent, os.O_RDONLY)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    target = real(path)
+    with writing(path), _beside(target) as temporary:
+        yield temporary
+        with _as_far_as_allowed():
+            _sync(temporary, os.O_RDWR)
+        _check_replaceable(target, mark)
+        temporary.replace(target)
+        with _as_far_as_allowed():
+            if OPENS_FOLDERS:
+                _sync(target.parent, os.O_RDONLY)
 
 
 def is_own(path: Path, mark: Mark) -> bool:
@@ -105,11 +103,17 @@ def check_outputs(sources: Iterable[Path], *outputs: Output) -> None:
         check_writable(path, mark)
 
 
+def real(path: Path) -> Path:
+    """A path without links, as far as they lead somewhere; `Path.resolve` raises in a circle."""
+    return Path(os.path.realpath(path))
+
+
 def check_apart(paths: Iterable[Path]) -> None:
     """Raise UsageError for one file under two names, also where capitals do not count."""
     seen: dict[tuple[int, int] | str, Path] = {}
     for path in paths:
-        status = path.stat() if path.exists() else None
+        with writing(path):
+            status = path.stat() if path.exists() else None
         name = os.path.realpath(path).casefold()
         key = (status.st_dev, status.st_ino) if status else name
         if key in seen:
@@ -119,12 +123,17 @@ def check_apart(paths: Iterable[Path]) -> None:
 
 def check_not_read(sources: Iterable[Path], paths: Iterable[Path]) -> None:
     """Raise UsageError for a file to write that is one of those that are read, or would be next."""
-    read = [source for source in sources if source.exists()]
-    folders = [source.resolve() for source in read if source.is_dir()]
+    read: list[Path] = []
+    for source in sources:
+        with reading(source):
+            read += [source] if source.exists() else []
+    folders = [real(source) for source in read if source.is_dir()]
     for path in paths:
-        if path.exists() and any(path.samefile(source) for source in read):
+        with writing(path):
+            is_read = path.exists() and any(path.samefile(source) for source in read)
+        if is_read:
             raise UsageError(f"{path} is the spec or data that is read: give another name")
-        if any(path.resolve().is_relative_to(folder) for folder in folders):
+        if any(real(path).is_relative_to(folder) for folder in folders):
             raise UsageError(f"{path} would lie in a folder that is read: give another name")
 
 
@@ -150,14 +159,12 @@ def check_appendable(path: Path, sources: Iterable[Path]) -> None:
     if path.suffix.lower() in NO_TEXT:
         hint = "give a name such as summary.md"
         raise OutputError(f"cannot append to {path}: Markdown is no {path.suffix} file; {hint}")
-    try:
+    with writing(path):
         if path.is_fifo():  # it would be waited for
             raise OSError(None, "is a device or pipe, not a file")
         if path.is_file():
             _check_text(path)
         path.open("ab").close()
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}") from error
 
 
 def _check_text(path: Path) -> None:
@@ -177,12 +184,9 @@ def _check_text(path: Path) -> None:
 
 def check_writable(path: Path, mark: Mark = Mark.NONE) -> None:
     """Raise OutputError before the work rather than after it."""
-    target = Path(os.path.realpath(path))
-    try:
-        with _beside(target):
-            _check_replaceable(target, mark)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    target = real(path)
+    with writing(path), _beside(target):
+        _check_replaceable(target, mark)
 
 
 @contextmanager
@@ -194,14 +198,15 @@ def sole_use(folder: Path) -> Iterator[None]:
     """
     if control := control_character(str(folder)):
         raise OutputError(f"cannot write {folder}: {control} in it")
-    is_new = not folder.exists()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with writing(folder):
+        is_new = not folder.exists()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise OSError(None, "it is no folder") from None
+        except RecursionError:  # pathlib calls itself for each
+            raise OSError(None, "too many folders in one another") from None
         handle = _handle(folder)
-    except FileExistsError as error:
-        raise OutputError(f"cannot write {folder}: it is no folder") from error
-    except OSError as error:
-        raise OutputError(f"cannot write {folder}: {error.strerror}") from error
     is_free = True
     with suppress(OSError):  # a file system without locks
         is_free = lock(handle, blocking=False)
@@ -243,6 +248,8 @@ def _beside(path: Path) -> Iterator[Path]:
     """
     if control := control_character(str(path)):
         raise OSError(None, f"{control} in it")
+    if path.is_symlink():  # none is left in a real path
+        raise OSError(None, "its links lead in a circle")
     if path.is_dir():
         raise IsADirectoryError(None, "is a folder")
     if path.exists() and not path.is_file():

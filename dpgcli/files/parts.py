@@ -22,7 +22,7 @@ import numpy as np
 import pyarrow as pa
 
 from dpgcli.arrays import Columns
-from dpgcli.errors import OutputError, UsageError
+from dpgcli.files.access import inside, reading, writing
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.record_batches import record_batch, schema
@@ -100,13 +100,17 @@ class Part(NamedTuple):
     @contextmanager
     def _opened(self, which: int) -> Iterator[Any]:
         only = pa.ipc.IpcReadOptions(included_fields=[which])
-        with self.path.open("rb") as stream, pa.ipc.open_file(stream, options=only) as file:
+        with reading(self.path):
+            stream = self.path.open("rb")
+        with stream, pa.ipc.open_file(stream, options=only) as file:
             yield file
 
     @property
     def is_damaged(self) -> bool:
         """Whether its bytes and its sweep do not match its name."""
-        return not self.path.is_file() or _name(self.path, self.start, self.stop) != self.path.name
+        with reading(self.path):
+            is_there = self.path.is_file()
+            return not is_there or _name(self.path, self.start, self.stop) != self.path.name
 
 
 @dataclass(frozen=True)
@@ -119,31 +123,28 @@ class PartStore:
     def part(self, start: int, stop: int) -> Iterator[IO[bytes]]:
         """A file to write the bytes of a part to; stored whole or not at all."""
         place = self.folder / _range(start, stop)
-        try:
-            with temporary_file(place) as (scratch, _):
-                with scratch.open("wb") as file:
-                    yield file
-                with whole_file(self.folder / _name(scratch, start, stop), Mark.ANY) as temporary:
-                    scratch.replace(temporary)
-        except OSError as error:
-            raise OutputError(f"cannot write {place}: {error.strerror or error}") from error
+        with writing(place), temporary_file(place) as (scratch, _):
+            with scratch.open("wb") as file:
+                yield file
+            with whole_file(self.folder / _name(scratch, start, stop), Mark.ANY) as temporary:
+                scratch.replace(temporary)
 
     @property
     def is_own(self) -> bool:
         """Whether it is in the folder itself, and nobody else's description is in it."""
         said = self.folder / SAID
-        is_linked = self.folder.is_symlink() or self.folder.parent.is_symlink()
-        return not is_linked and (not os.path.lexists(said) or _is_description(said))
+        with reading(self.folder):
+            is_linked = self.folder.is_symlink() or self.folder.parent.is_symlink()
+            return not is_linked and (not os.path.lexists(said) or _is_description(said))
 
     def say(self, said: dict[str, str]) -> None:
         """Write the sweep's metadata (sweep.json) beside its parts, never through a link."""
         for folder in (self.folder.parent, self.folder):
-            if folder.is_symlink():
-                raise OutputError(f"cannot write {folder}: a link, and what it leads to may go")
-        try:
+            with writing(folder):
+                if folder.is_symlink():
+                    raise OSError(None, "a link, and what it leads to may go")
+        with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot write {self.folder}: {error.strerror}") from error
         if self.said() != said:
             with whole_file(self.folder / SAID, Mark.ANY) as temporary:
                 text = json.dumps({**said, SHA256: _sha256(said)}, indent=2)
@@ -155,15 +156,12 @@ class PartStore:
         Raises UsageError for what cannot be read.
         """
         path = self.folder / SAID
-        try:
-            with opened(path) as stream:
-                said = json.loads(stream.read(MOST_SAID))
-        except FileNotFoundError:
-            return {}
-        except OSError as error:
-            raise UsageError(f"cannot read {path}: {error.strerror}") from error
-        except (ValueError, RecursionError):
-            return {}
+        with reading(path):
+            try:
+                with opened(path) as stream:
+                    said = json.loads(stream.read(MOST_SAID))
+            except (FileNotFoundError, ValueError, RecursionError):
+                return {}
         if not _is_sweep(said):
             return {}
         is_whole = said.pop(SHA256, None) == _sha256(said)
@@ -186,8 +184,9 @@ class PartStore:
         A worker that is killed between storing its part and saying so leaves one of a chunk that
         may be halved afterwards.
         """
-        matches = ((NAME.fullmatch(path.name), path) for path in self.folder.glob("*.part"))
-        found = [Part(int(m[1]), int(m[2]), p) for m, p in matches if m and not p.is_dir()]
+        matches = [(NAME.fullmatch(path.name), path) for path in inside(self.folder)]
+        with reading(self.folder):
+            found = [Part(int(m[1]), int(m[2]), p) for m, p in matches if m and not p.is_dir()]
         found.sort(key=lambda part: (part.start, -part.stop, part.path))
         reached = accumulate((part.stop for part in found), max, initial=0)
         return [part for part, before in zip(found, reached, strict=False) if part.stop > before]

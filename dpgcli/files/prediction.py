@@ -8,6 +8,7 @@ from typing import Any
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import UsageError
+from dpgcli.files.access import reading
 from dpgcli.files.output import run_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_metadata import scene_metadata
@@ -63,7 +64,9 @@ def check_facts(table: Path) -> None:
         other = json.loads(beside.read_bytes())["table"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # nobody's
         return
-    if other != table.name and (table.parent / str(other)).is_file():
+    with reading(beside):
+        is_there = (table.parent / str(other)).is_file()
+    if other != table.name and is_there:
         raise UsageError(f"{beside} has the facts of {other}: give another name")
 
 

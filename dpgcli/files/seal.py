@@ -29,9 +29,9 @@ def seal(path: Path) -> None:
 
 def is_whole(path: Path) -> bool | None:
     """Whether a table is as it was sealed; None where there is none, or one without a seal."""
-    if not path.is_file():  # a pipe would be waited for
-        return None
     try:
+        if not path.is_file():  # a pipe would be waited for
+            return None
         with path.open("rb") as stream:
             return is_whole_in(stream)
     except OSError:

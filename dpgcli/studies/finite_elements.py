@@ -15,7 +15,8 @@ from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.finger import with_seconds
 from dpgcli.calibration.fe.models import Model
 from dpgcli.calibration.fe.results import displacements, reported_error, seconds, version
-from dpgcli.errors import Field, OutputError, SolverError, UsageError
+from dpgcli.errors import Field, SolverError, UsageError
+from dpgcli.files.access import writing
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.temporary import temporary_folder
 
@@ -58,12 +59,13 @@ def write_deck(model: Model, folder: Path) -> tuple[Path, ...]:
     Raises UsageError where files of these names are not of `dpg fe`.
     """
     deck = deck_path(model, folder)
-    _check_own(deck)
     outdated: tuple[Path, ...] = ()
-    if not deck.exists() or deck.read_bytes() != model.deck.encode():
-        outdated = tuple(path for path in files(deck) if path.exists() and path != deck)
-    for path in outdated:
-        path.unlink()
+    with writing(deck):
+        _check_own(deck)
+        if not deck.exists() or deck.read_bytes() != model.deck.encode():
+            outdated = tuple(path for path in files(deck) if path.exists() and path != deck)
+        for path in outdated:
+            path.unlink()
     _write(deck, model.deck)
     return outdated
 
@@ -205,9 +207,6 @@ def _failure(code: int, said: str, log: Path) -> str:
 @contextmanager
 def _scratch(deck: Path) -> Iterator[Path]:
     """A folder beside the deck with a copy of it, gone at the end."""
-    try:
-        with temporary_folder(deck) as scratch:
-            shutil.copy(deck, scratch)
-            yield scratch
-    except OSError as error:
-        raise OutputError(f"cannot write {deck.parent}: {error.strerror or error}") from error
+    with writing(deck.parent), temporary_folder(deck) as scratch:
+        shutil.copy(deck, scratch)
+        yield scratch

@@ -1,6 +1,7 @@
 """A sweep: every design of a space, evaluated at a workplace, resumable, into two tables."""
 
 import os
+import re
 import shlex
 import shutil
 from collections import Counter
@@ -13,6 +14,7 @@ from time import perf_counter
 
 from dpgcli.design.outputs import Trust, of_space
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.access import inside, reading, writing
 from dpgcli.files.output import Mark
 from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import scene_of, spelled
@@ -35,6 +37,7 @@ STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 STATES, DESIGNS = "states.parquet", "designs.parquet"
 RUN, REPORT = "run.json", "report.md"
 PARTS = ".parts"
+STORE = re.compile(r"[0-9a-f]{16}")  # how a fingerprint begins
 
 
 @dataclass(frozen=True)
@@ -247,7 +250,8 @@ class Study:
         check_workers(workplace)
         store.say(self.metadata)
         for damaged in store.damaged():
-            damaged.path.unlink()
+            with writing(damaged.path):
+                damaged.path.unlink()
         ranges = self.ranges(shard or Shard())
         missing = store.missing(ranges)
         n_designs = sum(stop - start for start, stop in ranges)
@@ -339,12 +343,15 @@ def drop_half_written(folder: Path) -> None:
 
 def stores(folder: Path) -> list[PartStore]:
     """The parts of unfinished sweeps in a folder."""
-    return [store for store in _stores(folder) if (store.folder / SAID).exists()]
+    with reading(folder):
+        return [store for store in _stores(folder) if (store.folder / SAID).exists()]
 
 
 def _stores(folder: Path) -> list[PartStore]:
     """Folders whose names are beginnings of fingerprints, and that nobody else uses."""
-    found = map(PartStore, sorted(folder.glob(f"{PARTS}/{'[0-9a-f]' * 16}/")))
+    named = [path for path in inside(folder / PARTS) if STORE.fullmatch(path.name)]
+    with reading(folder):
+        found = [PartStore(path) for path in named if path.is_dir()]
     return [store for store in found if store.is_own]
 
 
@@ -357,5 +364,5 @@ def _memory() -> int | None:
 
 def _existing(folder: Path) -> Path:
     """The folder, or the nearest above it that exists."""
-    folder = folder.absolute()
-    return folder if folder.exists() else _existing(folder.parent)
+    with writing(folder):
+        return next(place for place in (folder, *folder.absolute().parents) if place.exists())

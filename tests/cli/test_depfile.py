@@ -202,3 +202,82 @@ def test_a_name_with_a_control_character_is_refused_in_a_sweep(here: Path) -> No
     (here / "sweep.yaml").write_text(said, encoding="utf-8")
     with pytest.raises(Exception, match=r"table: expected .*, found .n in it"):
         read_sweep(here / "sweep.yaml")
+
+
+@needs_make
+@pytest.mark.parametrize(
+    "name", ["finger", "f`touch pwned`", "f$(touch pwned)", "f.o", "f'; touch pwned'"]
+)
+def test_make_s_own_rules_remake_nothing_that_was_read(here: Path, name: str) -> None:
+    """They write `finger` from `finger.sh` or RCS, and run what stands in the names."""
+    try:
+        depend("out", name)
+    except UsageError:
+        return
+    (here / name).write_text("finger: {}\n", encoding="utf-8")
+    (here / "RCS").mkdir()
+    for source in (f"{name}.sh", f"{name}.c", f"{Path(name).stem}.c", f"{name},v", f"RCS/{name},v"):
+        (here / source).write_text("other words\n", encoding="utf-8")
+    (here / "out" / "states.parquet").touch()
+    aged(here / name, OLD)
+    aged(here / "out" / "states.parquet", NEW)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    (here / name).unlink()
+    assert make() == "again\n"
+    assert not (here / name).exists()
+    assert not (here / "pwned").exists()
+
+
+@needs_make
+@pytest.mark.parametrize("rule", ["dome.yaml: dome.csv", "%.yaml: %.csv"])
+@pytest.mark.parametrize("is_first", [False, True])
+def test_a_rule_that_makes_what_was_read_stays_one(here: Path, rule: str, is_first: bool) -> None:
+    """A calibration that is fitted again when its data change, and then swept again."""
+    depend("out", "dome.yaml")
+    for name, seconds in (("dome.csv", OLD), ("dome.yaml", OLD), ("out/states.parquet", NEW)):
+        (here / name).touch()
+        aged(here / name, seconds)
+    first, last = ("include sweep.d\n", "") if is_first else ("", "include sweep.d\n")
+    rules = f"out/states.parquet:\n\t@echo swept; touch $@\n\n{rule}\n\t@echo fitted; touch $@\n"
+    Path("Makefile").write_text(f"all: out/states.parquet\n\n{first}{rules}{last}")
+    command = ["make", "--no-print-directory"]
+    assert b"Nothing" in subprocess.run(command, capture_output=True, check=True).stdout
+    aged(here / "dome.csv", CHANGED)
+    done = subprocess.run(command, capture_output=True, check=True)
+    assert (done.stdout, done.stderr) == (b"fitted\nswept\n", b"")
+
+
+PARENTHESES = [
+    *(
+        (names, True)
+        for names in ("a(b c)", "a( b)", "a(b x c)", "a(b)c d)", "a(b.csv (c)", "./a(b c)")
+    ),
+    *(
+        (names, False)
+        for names in ("(a b)", "c) a(b", "a(b.csv c)d", "ab d)", "(x)y d)", "./(a b)")
+    ),
+]
+
+
+@needs_make
+@pytest.mark.parametrize(("names", "is_archive"), PARENTHESES)
+def test_names_that_make_takes_for_members_of_an_archive(
+    here: Path, names: str, is_archive: bool
+) -> None:
+    """A parenthesis in one name and one that closes it at the end of a later one."""
+    files = names.split()
+    if is_archive:
+        with pytest.raises(UsageError, match=r"Make cannot take the names \S*a\("):
+            depend("out", *files)
+        return
+    for name in files:
+        (here / name).touch()
+        aged(here / name, OLD)
+    depend("out", *files)
+    (here / "out" / "states.parquet").touch()
+    aged(here / "out" / "states.parquet", NEW)
+    assert make() == "make: Nothing to be done for 'all'.\n"
+    for name in files:
+        aged(here / name, CHANGED)
+        assert make() == "again\n"
+        aged(here / name, OLD)

@@ -294,7 +294,9 @@ def test_a_working_folder_that_was_deleted_is_named(
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("code", [errno.EMFILE, errno.ENOSPC, errno.EROFS, errno.ENOMEM])
+@pytest.mark.parametrize(
+    "code", [errno.EMFILE, errno.ENOSPC, errno.EROFS, errno.ENOMEM, errno.EACCES, errno.ELOOP]
+)
 def test_a_system_that_has_no_more_is_no_bug(
     call: Call, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:

@@ -116,6 +116,22 @@ def test_other_code_judges_anew(checkout: Path) -> None:
     assert "dpg" not in make(checkout).stdout
 
 
+@pytest.mark.slow
+def test_a_part_that_is_new_in_an_inner_folder_is_judged(checkout: Path) -> None:
+    inner = checkout / "configs" / "sweeps" / "designs" / "a"
+    inner.mkdir(parents=True)
+    (inner / "p.csv").write_text("finger.geometry.dome_height_mm\n6.5\n", encoding="utf-8")
+    said = "base: ../three_unit.yaml\nspace: [{table: designs}]\n"
+    (checkout / "configs" / "sweeps" / "s.yaml").write_text(said, encoding="utf-8")
+    gate = ("SWEEP=../sweeps/s.yaml", "REQUIRE='reach_max_mm < 41'")
+    first = make(checkout, *gate)
+    assert first.returncode == 0, first.stderr
+    (inner / "q.csv").write_text("finger.geometry.unit_separation_mm\n4\n", encoding="utf-8")
+    changed = make(checkout, *gate)
+    assert changed.returncode == 2, changed.stdout
+    assert "other columns in q.csv" in changed.stderr
+
+
 def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     result = make(checkout, "REQUIRE='min_barrier_mJ > 1e6'")
     assert result.returncode == 2  # of make: a recipe failed
@@ -144,6 +160,28 @@ def test_another_sweep_is_no_longer_up_to_date(checkout: Path) -> None:
     out = checkout / "configs" / "pipeline" / "out"
     assert len(pd.read_parquet(out / "designs.parquet")) == 1
     assert "1 designs" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_script_beside_a_sweep_or_spec_of_its_name_replaces_neither(checkout: Path) -> None:
+    """As Make's own rules would have it, and the whole study would be lost."""
+    sweeps = checkout / "configs" / "sweeps"
+    said = "base: finger\nspace: [{key: finger.units, values: [3]}]\n"
+    (sweeps / "study").write_text(said, encoding="utf-8")
+    shutil.copy(checkout / "configs" / "three_unit.yaml", sweeps / "finger")
+    spec = (sweeps / "finger").read_bytes()
+    assert make(checkout, "SWEEP=../sweeps/study").returncode == 0
+    os.utime(sweeps / "study", (1e9, 1e9))
+    os.utime(sweeps / "finger", (1e9, 1e9))
+    for name in ("study.sh", "finger.sh"):
+        (sweeps / name).write_text("#!/bin/sh\n# newer\n", encoding="utf-8")
+    assert "dpg sweep" not in make(checkout, "SWEEP=../sweeps/study").stdout
+    assert (sweeps / "study").read_text(encoding="utf-8") == said
+    shell(
+        "make -f calibration.mk -k SPEC=../sweeps/finger DPG=true",
+        checkout,
+        sweeps.parent / "pipeline",
+    )
+    assert (sweeps / "finger").read_bytes() == spec
 
 
 def test_other_choices_make_a_calibration_anew(checkout: Path) -> None:

@@ -109,7 +109,7 @@ def sweep_in(
         space,
         tuple(rule for rule in rules if rule is not None),
         base_path,
-        (*base_files, *base.files, *reader.files),
+        tuple(dict.fromkeys((*base_files, *base.files, *reader.files, *reader.folders))),
         spec.model_dump(exclude_none=True, exclude={"base"}),
         tuple(reader.files.values()),
     )

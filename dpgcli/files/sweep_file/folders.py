@@ -1,7 +1,5 @@
 """Tables that are folders of files, as databases and Spark write them: their parts, in order."""
 
-from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 import pandas as pd
@@ -13,32 +11,29 @@ SUFFIXES = (".parquet", ".csv")
 MOST_PARTS = 10_000
 
 
-def parts_of(folder: Path) -> list[Path]:
-    """The files of a table that is a folder, by name; those that begin with . or _ are no parts.
+def parts_of(folder: Path) -> tuple[list[Path], list[Path]]:
+    """The files of a table that is a folder, by name, and the folders where they were looked for.
 
-    Raises NoTableError where there is none, or what may be one and lies elsewhere.
+    Those that begin with . or _ are no parts. Raises NoTableError where there is none, or what may
+    be one and lies elsewhere, or more than MOST_PARTS of them all.
     """
-    there = list(islice(_inside(folder), MOST_PARTS + 1))
-    if len(there) > MOST_PARTS:
-        raise NoTableError(f"a folder of more than {MOST_PARTS:,} files", "join them")
-    found = sorted(path for path in there if path.suffix in SUFFIXES)
+    folders: list[Path] = [folder]
+    files: list[Path] = []
+    for place in folders:  # which grows
+        for path in place.iterdir():
+            if path.name.startswith((".", "_")):
+                continue
+            if path.is_symlink():
+                raise NoTableError("a folder with links in it", "copy what they point to")
+            (folders if path.is_dir() else files).append(path)
+            if len(folders) + len(files) > MOST_PARTS:
+                raise NoTableError(f"a folder of more than {MOST_PARTS:,} files", "join them")
+    found = sorted(path for path in files if path.suffix in SUFFIXES)
     if not found:
         raise NoTableError("a folder without any .parquet or .csv file")
     if len({path.suffix for path in found}) > 1:
         raise NoTableError("a folder with .parquet and .csv files", "keep one kind of them")
-    return found
-
-
-def _inside(folder: Path) -> Iterator[Path]:
-    for path in folder.iterdir():
-        if path.name.startswith((".", "_")):
-            continue
-        if path.is_symlink():
-            raise NoTableError("a folder with links in it", "copy what they point to")
-        if path.is_dir():
-            yield from _inside(path)
-        else:
-            yield path
+    return found, sorted(folders)
 
 
 def joined(folder: Path, frames: dict[Path, pd.DataFrame]) -> pd.DataFrame:

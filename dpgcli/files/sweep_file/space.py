@@ -55,6 +55,7 @@ class SpaceReader:
     def __post_init__(self) -> None:
         self.problems: list[Problem] = []
         self.files: dict[Path, str] = {}  # tables with the SHA-256 of what was read
+        self.folders: list[Path] = []  # in which parts of tables were looked for
         self.keys: set[str] = set()
         self.n_numbers = self.n_keys = 0
 
@@ -172,7 +173,7 @@ class SpaceReader:
         from dpgcli.files.sweep_file.folders import joined, parts_of
         from dpgcli.files.sweep_file.tables import frame_in
 
-        parts = parts_of(file) if file.is_dir() else [file]
+        parts, folders = parts_of(file) if file.is_dir() else ([file], [])
         size = sum(part.stat().st_size for part in parts if part.is_file())
         if size > MOST_BYTES:
             expected = f"at most {MOST_BYTES // 2**20} MiB of CSV or Parquet"
@@ -191,6 +192,7 @@ class SpaceReader:
             return frames[file]
         names = "\n".join(part.relative_to(file).as_posix() for part in parts)
         self.files[file] = hashlib.sha256(os.fsencode(names)).hexdigest()  # one more is a change
+        self.folders += folders
         return joined(file, frames)
 
     def is_of_designs(self, path: KeyPath, frame: "pd.DataFrame") -> bool:

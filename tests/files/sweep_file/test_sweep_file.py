@@ -614,6 +614,35 @@ def test_values_in_the_names_of_folders_are_columns(read: Read, tmp_path: Path) 
     assert found["finger.units"].tolist() == [3] * 4
 
 
+def test_every_folder_that_was_looked_into_is_one_of_the_files(read: Read, tmp_path: Path) -> None:
+    """A part that is new in one of them changes the table: Make looks at the folder's time."""
+    for inner in ("a/b", "empty", "_left/out"):
+        (tmp_path / "d" / inner).mkdir(parents=True)
+    (tmp_path / "d" / "a" / "b" / "p.csv").write_text(f"{HEIGHT}\n6\n")
+    sweep = read("table: d")
+    found = [path.relative_to(tmp_path).as_posix() for path in sweep.files if "d" in path.parts]
+    assert sorted(found) == ["d", "d/a", "d/a/b", "d/a/b/p.csv", "d/empty"]
+    (tmp_path / "d" / "empty").rmdir()
+    assert read("table: d").digests == sweep.digests, "the designs are the same"
+
+
+@pytest.mark.slow
+def test_a_folder_however_deep_is_walked(
+    read: Read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = [tmp_path / "d" / "/".join("e" * depth) for depth in range(1500)]
+    for folder in folders:  # pathlib goes down by itself no further than Python calls
+        folder.mkdir()
+    part = folders[-1] / "p.csv"
+    part.write_text(f"{HEIGHT}\n6\n")
+    assert designs(read("table: d")) == {HEIGHT: [6]}
+    monkeypatch.setattr("dpgcli.files.sweep_file.folders.MOST_PARTS", 1000)
+    assert "a folder of more than 1,000 files" in problems(read, "table: d")[0]
+    part.unlink()
+    for folder in reversed(folders):
+        folder.rmdir()
+
+
 def test_what_is_wrong_with_a_folder(read: Read, folder: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert "a folder without any .parquet or .csv file" in problems(read, "table: empty")[0]
