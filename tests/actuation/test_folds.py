@@ -1,6 +1,7 @@
 """Folds and what comes after them, by SciPy in node coordinates: another way to both."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -122,14 +123,14 @@ def test_after_a_fold_scipy_goes_down_to_the_same_state(seed: int, pressed: Made
     halted = at_fold(under, pattern, direction)
     after, is_fine = under.after(halted)
     potential = by_nodes(under, halted.shapes.pressure)
-    found = minimize(
-        lambda x: float(potential.evaluate(x[:, None]).energy[0]),
-        nodes_of(under, halted.start)[:, 0],
-        jac=lambda x: derivatives(potential, x)[0],
-        hess=lambda x: derivatives(potential, x)[1],
-        method="trust-exact",
-        options={"initial_trust_radius": 1e-3, "max_trust_radius": 0.2, "gtol": 1e-7},
-    )
+    ways: dict[str, Any] = {
+        "jac": lambda x: derivatives(potential, x)[0],
+        "hess": lambda x: derivatives(potential, x)[1],
+        "method": "trust-exact",
+        "options": {"initial_trust_radius": 1e-3, "max_trust_radius": 0.2, "gtol": 1e-7},
+    }
+    start = nodes_of(under, halted.start)[:, 0]
+    found = minimize(lambda x: float(potential.evaluate(x[:, None]).energy[0]), start, **ways)
     assert is_fine.tolist() == [True]
     own = nodes_of(under, after.coordinates)[:, 0]
     np.testing.assert_allclose(found.x, own, atol=1e-5)
