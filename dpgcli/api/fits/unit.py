@@ -80,7 +80,7 @@ def fit_unit(
     base = unit_finger(known, height)
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
-    met = targets_of(known, target or _targets(known), with_walls=has_pushes)
+    met = targets_of(known, as_texts("target", target) or _targets(known), with_walls=has_pushes)
     errors = errors_of(error, met)
     study = FingerFit(base, known, Frame(), keys, met, weighted, loss_scale, errors)
     found = study.fit(bootstrap, seed)
