@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
     from dpgcli.api.landscape import landscape
+    from dpgcli.api.lookup import lookup
     from dpgcli.api.predict import predict
+    from dpgcli.api.pulses import pulses
     from dpgcli.api.report import report
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
@@ -67,8 +69,10 @@ __all__ = [
     "fit_hinge",
     "fit_unit",
     "landscape",
+    "lookup",
     "merge",
     "predict",
+    "pulses",
     "read_calibration",
     "report",
     "stress",
@@ -90,8 +94,10 @@ _HOMES = {
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
     "landscape": "api.landscape",
+    "lookup": "api.lookup",
     "merge": "api.sweep",
     "predict": "api.predict",
+    "pulses": "api.pulses",
     "read_calibration": "files.calibration",
     "report": "api.report",
     "stress": "api.stress",

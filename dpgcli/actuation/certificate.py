@@ -2,15 +2,11 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from dpgcli.actuation.pressed import LARGEST_RESIDUAL, Pressed, Shapes
 from dpgcli.actuation.readings import Readings
-from dpgcli.actuation.rest import at_rest
+from dpgcli.actuation.rest import at_rest, is_same
 from dpgcli.states.certify import MARGINAL_CURVATURE, Status
 from dpgcli.states.solved import ALONE
-
-NEAR = 1e-7  # of a stroke: openings of one state differ by less
 
 
 @dataclass(frozen=True)
@@ -31,6 +27,7 @@ def certificate(pressed: Pressed, shapes: Shapes) -> Certificate:
 
     Under pressure there is no such state to compare with: residual and curvature count.
 
+    >>> import numpy as np
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
     >>> from dpgcli.states.units import UnitSolutions
@@ -47,10 +44,9 @@ def certificate(pressed: Pressed, shapes: Shapes) -> Certificate:
     if not shapes.pressure.any():
         state, settled = at_rest(pressed, shapes.inverted)
         status = Status(settled.status[0])
-        apart = pressed.extensions(state.coordinates) - pressed.extensions(shapes.coordinates)
-        is_same = bool((np.abs(apart) <= NEAR * pressed.finger.stroke).all())
-        is_sound = is_sound and is_same and status is Status.STABLE
-        text = _at_rest(status, is_same=is_same)
+        is_that = bool(is_same(pressed, shapes, state)[0])
+        is_sound = is_sound and is_that and status is Status.STABLE
+        text = _at_rest(status, is_that=is_that)
     return Certificate(is_sound, text, residual, pivot)
 
 
@@ -62,9 +58,9 @@ def _under_pressure(is_balanced: bool, pivot: float) -> str:
     return "certified: a stable equilibrium under its pressures"
 
 
-def _at_rest(status: Status, *, is_same: bool) -> str:
+def _at_rest(status: Status, *, is_that: bool) -> str:
     if status is not Status.STABLE:
         return f"not certified: {status.text}, {status.meaning}"
-    if not is_same:
+    if not is_that:
         return "not certified: another shape than the stable state of its pattern"
     return "certified: the stable state of its pattern"

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.actuation.pressed import Pressed, Shapes
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.states.gripper import GripperPose, place_in_gripper
@@ -47,7 +47,7 @@ class Readings:
         """Energy of springs, hinges, walls and bars, mJ: without pressure that of the state."""
         pressed, domes = self.pressed, self.pressed.finger.domes
         swept = pressed.volumes.swept(self.travels - domes.contact, domes).volume
-        return np.asarray(self.potential_energy + (self.shapes.pressure * swept).sum(axis=0))
+        return np.asarray(self.potential_energy + total(self.shapes.pressure * swept))
 
     @cached_property
     def balance(self) -> Equilibrium:

@@ -35,6 +35,10 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
 def is_certified(pressed: Pressed, shapes: Shapes) -> Flags:
     """Which shapes without pressure are the certified stable states of their patterns, (batch,)."""
     rest, settled = at_rest(pressed, shapes.inverted)
-    away = np.abs(shapes.coordinates - rest.coordinates)
-    is_same = (away <= SAME_SHAPE * settled.potential.coordinates.step_cap).all(axis=0)
-    return np.asarray((settled.status == Status.STABLE) & is_same)
+    return np.asarray((settled.status == Status.STABLE) & is_same(pressed, shapes, rest))
+
+
+def is_same(pressed: Pressed, shapes: Shapes, others: Shapes) -> Flags:
+    """Which shapes are the same as others, (batch,)."""
+    away = np.abs(shapes.coordinates - others.coordinates)
+    return np.asarray((away <= SAME_SHAPE * pressed.coordinates.step_cap).all(axis=0))

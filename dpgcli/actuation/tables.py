@@ -1,11 +1,11 @@
 """Tables of a way through pressures: a row for each event, a row for each point."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from dpgcli.actuation.readings import Readings
-from dpgcli.actuation.travel import Event, Points, Travel
+from dpgcli.actuation.travel import Event, Points, Travel, joined
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.pressure import History, Pressure
@@ -114,6 +114,7 @@ def path_columns(
         ),
         Column("pattern", "", "activation pattern, unit 1 first", kind=Kind.PATTERN),
         Column("event", "", "event that it is before, then after; else 0", kind=Kind.COUNT),
+        Column("is_stable", "", "no point of a branch beyond the event's fold", kind=Kind.FLAG),
         *(
             Column(f"opening_{unit}_mm", "mm", f"opening of unit {unit}", outputs=SHAPES)
             for unit in units
@@ -131,9 +132,19 @@ def path_columns(
     )
 
 
-def path_rows(way: Travel, readings: Readings, pressure: Pressure, history: History) -> Columns:
-    """A row for each point of the path, both sides of each event among them."""
-    points, shapes = way.points, way.points.shapes
+def path_rows(
+    way: Travel,
+    branches: Mapping[int, Points],
+    readings: Readings,
+    pressure: Pressure,
+    history: History,
+) -> Columns:
+    """A row for each point of the path, both sides of each event among them, then of branches.
+
+    The readings are those of all these points.
+    """
+    points, shapes = joined([way.points, *branches.values()]), readings.shapes
+    events = [np.full(len(branch), number) for number, branch in branches.items()]
     first = [
         int(np.flatnonzero(pressure.line_of == line)[0]) for line in range(len(pressure.lines))
     ]
@@ -142,7 +153,11 @@ def path_rows(way: Travel, readings: Readings, pressure: Pressure, history: Hist
     if history.time is not None:
         rows["time_s"] = _times(points, history.time)
     rows |= {f"pressure_{line}_MPa": shapes.pressure[unit] for line, unit in by_line}
-    rows |= {"pattern": texts(shapes.inverted), "event": _sides(len(points), way.events)}
+    rows |= {
+        "pattern": texts(shapes.inverted),
+        "event": np.concatenate([_sides(len(way.points), way.events), *events]),
+        "is_stable": np.arange(len(points)) < len(way.points),
+    }
     for unit, (opening, travelled) in enumerate(
         zip(readings.openings, readings.travels, strict=True), start=1
     ):

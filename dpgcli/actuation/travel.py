@@ -160,7 +160,7 @@ class _Traveler:
     @property
     def travel(self) -> Travel:
         """What lies behind."""
-        points = _joined(self.behind)
+        points = joined(self.behind)
         return Travel(points, tuple(self.events), tuple(self.holds), self.reason, self.pressure)
 
     def begin(self) -> None:
@@ -280,7 +280,7 @@ class _Traveler:
         return beyond[:, 0]
 
 
-def _joined(parts: Sequence[Points]) -> Points:
+def joined(parts: Sequence[Points]) -> Points:
     """Points one after the other."""
     touching = [part.shapes.touching for part in parts if part.shapes.touching is not None]
     shapes = Shapes(

@@ -1,8 +1,8 @@
 """`actuate`: a finger followed through a history of pressures."""
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -13,11 +13,13 @@ from dpgcli.actuation.pressed import Halt, Shapes
 from dpgcli.actuation.readings import Drift, Readings, drift
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.tables import event_columns, event_rows, path_columns, path_rows
-from dpgcli.actuation.travel import Travel, travel
+from dpgcli.actuation.travel import Points, Travel, joined, travel
+from dpgcli.actuation.unstable import branches
 from dpgcli.api.histories import GivenHistory, PressureInput, history_input
 from dpgcli.api.inputs import (
     Settings,
     SpecInput,
+    check_flags,
     check_texts,
     check_whole,
     figure_path,
@@ -49,11 +51,13 @@ class ActuateResult:
     """What happened to a finger under pressure, and where it ended.
 
     `given` is the spec with its lines, `history` the pressures by step, `way` what was followed.
+    `branches` are the unstable ones by the number of the event, if they were asked for.
     """
 
     given: PressedInput
     history: GivenHistory
     way: Travel
+    branches: Mapping[int, Points] = field(default_factory=dict)
 
     @cached_property
     def table(self) -> Table:
@@ -62,7 +66,10 @@ class ActuateResult:
 
     @cached_property
     def path(self) -> Table:
-        """A row for each point of the path, both sides of each event among them."""
+        """A row for each point of the path, both sides of each event among them.
+
+        Those of unstable branches, if they were asked for, come last.
+        """
         return Table.of(*self._path)
 
     @property
@@ -93,10 +100,13 @@ class ActuateResult:
 
     @cached_property
     def readings(self) -> Readings:
-        """Quantities of all points."""
+        """Quantities of all points of the way."""
+        return self._read(self.way.points)
+
+    def _read(self, points: Points) -> Readings:
         scene = self.given.given.scene
         around = Surroundings(scene.gripper, scene.layer_thickness or 0.0)
-        return Readings(self.given.pressed, self.way.points.shapes, around)
+        return Readings(self.given.pressed, points.shapes, around)
 
     @cached_property
     def _path(self) -> tuple[tuple[Column, ...], Columns]:
@@ -105,7 +115,8 @@ class ActuateResult:
         columns = path_columns(
             pressure, scene.finger.n_units, history, is_gripper=scene.gripper is not None
         )
-        return columns, path_rows(self.way, self.readings, pressure, history)
+        readings = self._read(joined([self.way.points, *self.branches.values()]))
+        return columns, path_rows(self.way, self.branches, readings, pressure, history)
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -119,7 +130,7 @@ class ActuateResult:
             f"final pattern {self.pattern} at {self._pressures(self.way.final.pressure[:, 0])}, "
             f"{found.text} (residual {found.residual:.1e} N)"
         )
-        yield f"{counted(len(events), 'event')}, {lost:.5g} mJ lost in them"
+        yield counted(len(events), "event") + (f", {lost:.5g} mJ lost in them" if events else "")
         if n_tied := sum(bool(event.tied) for event in events):
             which = f"{n_tied:,} of {counted(len(events), 'event')}"
             yield f"ties in {which}: the model does not say which of the units goes first"
@@ -186,7 +197,8 @@ class ActuateResult:
         from dpgcli.reports.actuation import Drawing
 
         given = self.given
-        drawing = Drawing(self.way, self.readings, given.pressure, given.given.scene)
+        branches = [self._read(points) for points in self.branches.values()]
+        drawing = Drawing(self.way, self.readings, branches, given.pressure, given.given.scene)
         drawing.draw(figure_path(path))
 
 
@@ -196,13 +208,15 @@ def actuate(
     pressure: PressureInput | None = None,
     start: str = "",
     cycles: int = 1,
+    unstable: bool = False,
     settings: Settings = (),
 ) -> ActuateResult:
     """Follow a finger quasi-statically through pressures: what snaps, resets, meets, and when.
 
     `pressure` (MPa): a ramp such as "0:0.15:0", one such as "A=0:0.15:0" for each line, numbers,
     or a table with a column for each line; None takes that of the spec. `start` is the pattern
-    to start from, all units at rest without it. The history is run through `cycles` times.
+    to start from, all units at rest without it. The history is run through `cycles` times. With
+    `unstable` the path goes on beyond folds, along branches that no finger stays on.
     Raises SpecError for a wrong spec or history, UsageError for wrong choices, ActuationError where
     the finger folds onto itself or no equilibrium is found: its `result` has what happened before.
 
@@ -215,14 +229,15 @@ def actuate(
     """
     given = pressed_input(spec, settings)
     history = history_input(pressure, given.pressure)
-    return followed(given, history, start, cycles)
+    return followed(given, history, start, cycles, unstable=unstable)
 
 
 def followed(
-    given: PressedInput, history: GivenHistory, start: str = "", cycles: int = 1
+    given: PressedInput, history: GivenHistory, start: str, cycles: int, *, unstable: bool
 ) -> ActuateResult:
     """The same, of what was read before."""
     check_whole(cycles=cycles)
+    check_flags(unstable=unstable)
     if not 1 <= cycles <= MOST_CYCLES:
         raise UsageError(Field("cycles"), f" {cycles}: expected 1 to {MOST_CYCLES:,}")
     by_unit = history.history.pressure[:, given.pressure.line_of]
@@ -232,7 +247,7 @@ def followed(
         is_large = np.abs(by_unit).max() > LARGE
         hint = "; pressures are in MPa, of which 150 kPa are 0.15" if is_large else ""
         raise ActuationError(result, result.problem, hint)
-    return result
+    return replace(result, branches=branches(given.pressed, way)) if unstable else result
 
 
 def _start(given: PressedInput, pattern: str) -> Shapes:

@@ -1,7 +1,7 @@
 """`transitions`: what first happens to every stable state under pressure, and what is reached."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dpgcli.actuation.alone import REACH
+from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transition_table import COLUMNS, transition_rows
 from dpgcli.actuation.transitions import Outcome, StateGraph, state_graph
 from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
 from dpgcli.api.predict import check_drawable
 from dpgcli.api.pressure import PressedInput, pressed_input
+from dpgcli.api.scatter import Draws, ScatterInput, drawn_by
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_UNITS = 16  # minutes of work
+MOST_SCATTERED = 2_000_000  # thresholds: minutes of work, too
 MOST_NAMED = 16  # states in a line of the summary
 OF_STATES = ("pattern", "status", "energy_mJ", "tip_x_mm", "tip_y_mm", "tip_angle_rad")
 REACHABLE = Column("reachable", "", "whether pulses lead to it from rest", kind=Kind.FLAG)
@@ -38,21 +41,24 @@ REACHABLE = Column("reachable", "", "whether pulses lead to it from rest", kind=
 class TransitionsResult:
     """What first happens to every stable state on each line, up and down.
 
-    `given` is the spec with its lines, `graph` what was found.
+    `given` is the spec with its lines, `graph` what was found. `draws` are scattered fingers whose
+    thresholds are in `spread`, by column, if they were asked for.
     """
 
     given: PressedInput
     graph: StateGraph
+    draws: Draws | None = None
+    spread: Columns = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[Column, ...]:
         """The columns of transitions."""
-        return COLUMNS
+        return (*COLUMNS, *(SPREAD_COLUMNS if self.draws is not None else ()))
 
     @cached_property
     def rows(self) -> Columns:
         """Transitions by column."""
-        return transition_rows(self.graph.transitions, self.given.pressure)
+        return transition_rows(self.graph.transitions, self.given.pressure) | self.spread
 
     @cached_property
     def table(self) -> Table:
@@ -105,6 +111,8 @@ class TransitionsResult:
             yield f"ties in {tied}: the model does not say which of these units goes first"
         yield f"reachable from rest: {_listed(self.reachable)}"
         yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
+        if self.draws is not None:
+            yield from self.draws.lines
         yield from pressure_lines(self.given)
 
     def to_arrow(self) -> Any:
@@ -168,12 +176,23 @@ _COUNTED = {
 }
 
 
-def transitions(spec: SpecInput, *, settings: Settings = ()) -> TransitionsResult:
+def transitions(
+    spec: SpecInput,
+    *,
+    scatter: ScatterInput | None = None,
+    draws: int | None = None,
+    seed: int | None = None,
+    settings: Settings = (),
+) -> TransitionsResult:
     """For each stable state, line and direction: where it is left, and for which other one.
 
     Pressures of one line go up or down, the others stay at zero, up to twice the largest threshold
     of a unit by itself. A spec without a section on pressure has all units on one line.
-    Raises SpecError for a wrong spec, UsageError for wrong choices or more than 16 units.
+    `scatter`, such as "dome_thickness_mm=2%,dome_height_mm=0.1mm", are standard deviations of
+    values around those of the spec: so many `draws` of fingers, 1000 unless given, have thresholds
+    of their own.
+    Raises SpecError for a wrong spec or scatter, UsageError for wrong choices or more than 16
+    units.
 
     >>> found = transitions({"finger": {"units": 2, "lattice": {
     ...     "segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
@@ -183,14 +202,27 @@ def transitions(spec: SpecInput, *, settings: Settings = ()) -> TransitionsResul
     (['00', '00', '01', '01', '10', '10', '11', '11'], ('00', '11'))
     """
     given = pressed_input(spec, settings)
-    return transitions_of(given)
+    drawn = drawn_by(given, scatter, draws, seed)
+    return transitions_of(given, drawn)
 
 
-def transitions_of(given: PressedInput) -> TransitionsResult:
+def transitions_of(given: PressedInput, draws: Draws | None = None) -> TransitionsResult:
     """The same, of what was read before."""
     check_size(given)
     keep_freed_memory()
-    return TransitionsResult(given, state_graph(given.pressed, given.pressure.line_of))
+    line_of = given.pressure.line_of
+    graph = state_graph(given.pressed, line_of)
+    if draws is None:
+        return TransitionsResult(given, graph)
+    rows = graph.transitions
+    if (n := len(rows.code) * draws.n_draws) > MOST_SCATTERED:
+        raise UsageError(
+            f"{n:,} thresholds, of {len(rows.code):,} transitions of {draws.n_draws:,} draws: "
+            f"expected at most {MOST_SCATTERED:,}; give fewer ",
+            Field("draws"),
+        )
+    spread = spread_rows(draws.batches(), line_of, graph.reach, rows, draws.n_draws)
+    return TransitionsResult(given, graph, draws, spread)
 
 
 def check_size(given: PressedInput) -> None:

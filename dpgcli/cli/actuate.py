@@ -28,6 +28,9 @@ Start = Annotated[
 Cycles = Annotated[
     int, typer.Option("--cycles", metavar="N", help="Repeat the history, and report the drift")
 ]
+Unstable = Annotated[
+    bool, typer.Option("--unstable", help="Add the unstable branches to --output and --plot")
+]
 Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write the path to this Parquet file"),
@@ -43,6 +46,7 @@ def actuate(
     pressure: Pressures = None,
     start: Start = "",
     cycles: Cycles = 1,
+    unstable: Unstable = False,
     settings: Settings = None,
     printed_as: Annotated[
         Format, typer.Option("--format", help="How to print events")
@@ -55,19 +59,21 @@ def actuate(
     from dpgcli.api.actuate import followed
     from dpgcli.api.histories import history_input
     from dpgcli.api.pressure import pressed_input
-    from dpgcli.errors import ActuationError
+    from dpgcli.errors import ActuationError, UsageError
     from dpgcli.files.output import Mark, check_outputs
 
     if plot is not None:
         check_plot(plot)
     check_table_name(output)
+    if unstable and output is None and plot is None:
+        raise UsageError("--unstable adds points to --output and --plot: name a file")
     given = pressed_input(spec, settings or ())
     history = history_input(pressure, given.pressure)
     sources = (*given.given.files, *history.files)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE))
     try:
         with under_way("following the finger", quiet=quiet):
-            found = followed(given, history, start, cycles)
+            found = followed(given, history, start, cycles, unstable=unstable)
     except ActuationError as error:
         _print(error.result, printed_as)
         raise

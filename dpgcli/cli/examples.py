@@ -53,6 +53,11 @@ EXAMPLES = {
         "dpg landscape finger.yaml --from 000 --to 111",
         "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
+    "pulses": (
+        "dpg pulses finger.yaml --to 11111",
+        "dpg pulses finger.yaml --to 11100 --set 'pressure={lines: {A: 1-3, B: 4-5}}'",
+        "dpg pulses finger.yaml --table --from 11111 --format csv > pulses.csv",
+    ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",
         "dpg validate finger.yaml --format github",

@@ -75,6 +75,21 @@ TipOffset = Annotated[
 ]
 
 
+Scatter = Annotated[
+    str | None,
+    typer.Option(
+        "--scatter", metavar="LIST", help="Standard deviations: dome_height_mm=0.1mm,stroke_mm=2%"
+    ),
+]
+NumberOfDraws = Annotated[
+    int | None,
+    typer.Option("--draws", metavar="N", help="Fingers to draw by --scatter  [default: 1000]"),
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", metavar="N", help="Seed of the draws  [default: 1]")
+]
+
+
 class FormulationName(StrEnum):
     """The two formulations of one finger."""
 

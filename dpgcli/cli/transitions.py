@@ -6,7 +6,17 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.options import Quiet, Settings, SpecPath, TableFile, check_plot, check_table_name
+from dpgcli.cli.options import (
+    NumberOfDraws,
+    Quiet,
+    Scatter,
+    Seed,
+    Settings,
+    SpecPath,
+    TableFile,
+    check_plot,
+    check_table_name,
+)
 from dpgcli.cli.printing import ROWS_SHOWN, Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
@@ -23,6 +33,9 @@ Plot = Annotated[
 
 def transitions(
     spec: SpecPath,
+    scatter: Scatter = None,
+    draws: NumberOfDraws = None,
+    seed: Seed = None,
     settings: Settings = None,
     output: TableFile = None,
     printed_as: Annotated[
@@ -35,6 +48,7 @@ def transitions(
 ) -> None:
     """Find where pressure drives every stable state, and what can be reached from rest."""
     from dpgcli.api.pressure import pressed_input
+    from dpgcli.api.scatter import drawn_by
     from dpgcli.api.transitions import (
         check_drawable_graph,
         check_size,
@@ -45,6 +59,7 @@ def transitions(
 
     given = pressed_input(spec, settings or ())
     check_size(given)
+    drawn = drawn_by(given, scatter, draws, seed)
     if plot is not None:
         check_plot(plot)
         check_drawable_graph(given)
@@ -54,7 +69,7 @@ def transitions(
     outputs = (output, Mark.TABLE), (graph, Mark.GRAPH), (plot, Mark.FIGURE)
     check_outputs(given.given.files, *outputs)
     with under_way("following every state", quiet=quiet):
-        found = transitions_of(given)
+        found = transitions_of(given, drawn)
     if output is not None:
         found.save(output)
     if graph is not None:

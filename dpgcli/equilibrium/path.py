@@ -1,10 +1,7 @@
 """Paths of equilibria as a load changes, each lane on its own: to a load, to a fold or to an event.
 
 A path is followed by one of the family's scalars q, the one that moves most, or by the load where
-that is near its end: g(x, λ) = 0 with q = q* is solved by Newton's method on the bordered system.
-The cell that is followed is held by a spring of stiffness k, which adds k ∇q (∇q · δx − δq) = 0 to
-the first equation, so that the matrix stays positive definite through a fold (Rheinboldt,
-Numerical Analysis of Parametrized Nonlinear Equations, 1986, chapter 5; the spring is ours).
+that is near its end (`corrector`).
 
 Along the path dλ/dq falls to zero at a fold. It is approached from before, by secants on dλ/dq, so
 that cells which reach their folds at the same load do no harm: at a distance of τ scales λ is short
@@ -18,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices, total
-from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
-from dpgcli.equilibrium.family import Family, Linearized, LoadedLaw, along, spread
+from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, corrected, of_cell, slope_by
+from dpgcli.equilibrium.family import Family, LoadedLaw, along
 
 LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
@@ -29,9 +27,6 @@ FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
-TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
-SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
-MAX_CORRECTIONS = 8
 MAX_STEPS = 600
 
 Watch = Callable[[Indices, Array, Array], None]
@@ -60,17 +55,6 @@ class Ends:
     outcome: Indices
     cell: Indices
     onward: Array
-
-
-class _Corrected(NamedTuple):
-    """Points on paths, with derivatives there; `is_fine` says which belong to a stable path."""
-
-    coordinates: Array
-    load: Array
-    linear: Linearized
-    along_load: Array  # −H'⁻¹ ∂g/∂λ
-    by_hold: Array  # H'⁻¹ ∇q
-    is_fine: Flags
 
 
 @dataclass
@@ -166,7 +150,7 @@ def _begin(
     """Walks at their first points, and which of these are stable equilibria."""
     n, nothing = len(load), np.full(len(load), -1)
     free = np.zeros(n)
-    here = _corrected(family, coordinates, load, nothing, free, depth)
+    here = corrected(family, coordinates, load, nothing, free, depth)
     margin = _margin(family, here)
     walk = _Walk(
         here.coordinates, here.load, here.linear.measured.value, np.zeros_like(coordinates),
@@ -177,7 +161,7 @@ def _begin(
     return walk, here.is_fine
 
 
-def _margin(family: Family[Coordinates, LoadedLaw], here: _Corrected) -> Array:
+def _margin(family: Family[Coordinates, LoadedLaw], here: Corrected) -> Array:
     margin = family.law.margin(here.linear.measured.value, here.load)
     return np.full(here.linear.measured.value.shape, np.inf) if margin is None else margin
 
@@ -192,7 +176,7 @@ class _Trial(NamedTuple):
     step: Array
     cell: Indices
     is_last: Flags
-    there: _Corrected
+    there: Corrected
     slope: Array
     margin: Array
     is_fine: Flags
@@ -258,10 +242,10 @@ def _tried(
     place = np.maximum(walk.cell, 0), np.arange(len(end))
     scale = np.broadcast_to(family.scale, walk.values.shape)
     target = walk.values[place] + walk.sign * step * scale[place]
-    there = _corrected(family, guess, load, cell, target, depth)
+    there = corrected(family, guess, load, cell, target, depth)
     moved = np.abs((there.linear.measured.value - walk.values) / scale).max(axis=0)
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
-    slope = _slope(family, there, cell) * walk.sign * towards
+    slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
 
 
@@ -301,81 +285,10 @@ def _land(walk: _Walk, which: Flags, distance: Array, towards: Array) -> None:
     walk.load = walk.load + towards * 0.5 * walk.slope * rest
 
 
-@in_lanes
-def _corrected(
-    family: Family[Coordinates, LoadedLaw],
-    guess: Array,
-    load: Array,
-    cell: Indices,
-    target: Array,
-    depth: int,
-) -> _Corrected:
-    """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1."""
-    shape = family.measure(guess).value.shape
-    chosen = np.arange(shape[0])[:, None] == cell
-    is_held = cell >= 0
-    stiffness = np.where(chosen, np.broadcast_to(family.stiffness, shape), 0.0)
-    target = np.where(is_held, target, 0.0)
-    scale = np.where(chosen, np.broadcast_to(family.scale, shape), 0.0).sum(axis=0)
-    x, n = guess, len(load)
-    settled, done = np.zeros(n, bool), np.zeros(n, bool)
-    coordinates = family.coordinates
-    for count in range(MAX_CORRECTIONS + 1):
-        linear = family.linearized(x, load, stiffness, target, depth)
-        residual = np.abs(linear.gradient / coordinates.gradient_scale).max(axis=0)
-        away = np.where(chosen, linear.measured.value - target, 0.0).sum(axis=0)
-        is_there = (residual <= TOLERANCE) & (
-            np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
-        )
-        done |= is_there & settled
-        factors = factorize(linear.hessian, family.column_depths)
-        selector = spread(family.measure.rows, linear.measured, chosen.astype(float), x)
-        sides = np.stack((-linear.gradient, -linear.rate, selector), axis=1)
-        by_residual, by_load, by_hold = np.moveaxis(_solved(factors, sides), 1, 0)
-        if done.all() or count == MAX_CORRECTIONS:
-            break
-        change = (-away - total(selector * by_residual)) / total(selector * by_load)
-        change = np.where(is_held, change, 0.0)
-        step = np.where(done, 0.0, by_residual + change * by_load)
-        settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
-        x, load = coordinates.moved(x, step), np.where(done, load, load + change)
-    is_fine = done & (factors.pivots > 0.0).all(axis=0)
-    return _Corrected(x, load, linear, by_load, by_hold, is_fine)
-
-
-def _solved(factors: Factorization, sides: Array) -> Array:
-    """A⁻¹ b for right-hand sides (size, number, batch)."""
-    y = forward(factors, sides)
-    y /= factors.pivots[:, None]
-    return backward(factors, y)
-
-
-def _slope(family: Family[Coordinates, LoadedLaw], here: _Corrected, cell: Indices) -> Array:
-    """dλ per step of one scale of the cell; NaN where none is followed.
-
-    With H' = H + k ∇q∇qᵀ the motion per q is k H'⁻¹∇q + λ' z, z = −H'⁻¹ ∂g/∂λ, and ∇q · of it is 1.
-    """
-    stiffness, scale, chosen = _of_cell(family, here, cell)
-    rows, measured = family.measure.rows, here.linear.measured
-    by_hold = (chosen * along(rows, measured, here.by_hold)).sum(axis=0)
-    by_load = (chosen * along(rows, measured, here.along_load)).sum(axis=0)
-    return np.where(cell >= 0, (1.0 - stiffness * by_hold) / by_load * scale, np.nan)
-
-
-def _of_cell(
-    family: Family[Coordinates, LoadedLaw], here: _Corrected, cell: Indices
-) -> tuple[Array, Array, Array]:
-    """Stiffness and scale of a cell of each lane, (batch,), and where it is, (cell, batch)."""
-    shape = here.linear.measured.value.shape
-    chosen = (np.arange(shape[0])[:, None] == cell).astype(float)
-    stiffness = (chosen * family.stiffness).sum(axis=0)
-    return stiffness, (chosen * family.scale).sum(axis=0), chosen
-
-
 def _turn(
     family: Family[Coordinates, LoadedLaw],
     walk: _Walk,
-    here: _Corrected,
+    here: Corrected,
     cell: Indices,
     towards: Array,
 ) -> None:
@@ -383,8 +296,8 @@ def _turn(
 
     The cell that moves most; the one so far, unless another moves half as much again.
     """
-    stiffness, scale, _ = _of_cell(family, here, cell)
-    slope = _slope(family, here, cell) / scale  # dλ/dq of the cell so far
+    stiffness, scale, _ = of_cell(family, here, cell)
+    slope = slope_by(family, here, cell) / scale  # dλ/dq of the cell so far
     is_held = cell >= 0
     motion = np.where(is_held, stiffness * here.by_hold + slope * here.along_load, here.along_load)
     by = np.where(is_held, slope, 1.0)  # dλ along that motion

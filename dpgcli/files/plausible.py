@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.design.geometry import snap_pressure
+from dpgcli.design.geometry import REFERENCE, snap_pressure
 from dpgcli.errors import Field, Message, Problem
 from dpgcli.files.csv_file import Sheet
 from dpgcli.files.own_units import InOwnUnits
@@ -94,19 +94,31 @@ def other_springs(
 
 
 def _of_dome(geometry: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Largest values that a dome of this geometry may have.
+    """Largest values that a dome of this geometry may have, whatever its base.
 
-    Energy E t^2.8 h^1.75, from 68 mJ at h = 6.5 mm, t = 0.75 mm, E = 26 MPa: the finite-element
-    grid of configs/calibration.
+    Over a base of 16 mm its energy is E t^2.8 h^1.75, from 68 mJ at h = 6.5 mm, t = 0.75 mm,
+    E = 26 MPa: the finite-element grid of configs/calibration. Scaled copies of that dome have its
+    pressure and s³ times its energy: over a base that is larger as the dome is higher, 16/6.5 h,
+    energies are E t^2.8 h^0.2 and pressures E (t/h)^2.5.
     """
     height = geometry.get("dome_height_mm")
     if height is None:
         return {}
     ranges = {"travel": (0.05 * height, 20.0 * height)}
     if set(DOME) <= set(geometry):
-        _, thickness, modulus = dome = [geometry[key] for key in DOME]
-        energy = 68.0 * modulus / 26.0 * (thickness / 0.75) ** 2.8 * (height / 6.5) ** 1.75
-        pressure = snap_pressure(*dome)
-        usual = {"energy": energy, "force": energy / height, "pressure": pressure}
-        ranges |= {kind: (size / MARGIN, size * MARGIN) for kind, size in usual.items()}
+        fixed, similar = (_usual(geometry, s) for s in (1.0, height / REFERENCE.dome_height))
+        ranges |= {
+            kind: (min(size, similar[kind]) / MARGIN, max(size, similar[kind]) * MARGIN)
+            for kind, size in fixed.items()
+        }
     return ranges
+
+
+def _usual(geometry: Mapping[str, float], scale: float) -> dict[str, float]:
+    """Energy (mJ), force (N) and pressure (MPa) of a dome whose base is 16 mm times a scale."""
+    height, thickness, modulus = (geometry[key] for key in DOME)
+    height, thickness = height / scale, thickness / scale
+    energy = 68.0 * modulus / 26.0 * (thickness / 0.75) ** 2.8 * (height / 6.5) ** 1.75
+    pressure = snap_pressure(height, thickness, modulus)
+    force = energy / height
+    return {"energy": energy * scale**3, "force": force * scale**2, "pressure": pressure}

@@ -113,7 +113,7 @@ class Chain:
         coordinates = np.empty((finger.n_units, len(rows), batch))
         for place, row in enumerate(rows):
             coordinates[:, place] = row
-        return coordinates.reshape(-1, batch)
+        return coordinates.reshape(finger.n_units * len(rows), batch)
 
     def _shape(self, coordinates: Array) -> Internal:
         return internal(coordinates, self.finger.is_rigid)

@@ -120,7 +120,7 @@ class FingerCoordinates(Coordinates, Protocol):
         """Rows of an array (size, …) over the coordinates that are not walls'."""
 
     def openings(self, coordinates: Array) -> Array:
-        """Extension x of every bistable spring, mm, (unit, batch)."""
+        """Opening x of every unit, without what walls yield, mm, (unit, batch)."""
 
     def springs(self, coordinates: Array) -> Springs:
         """Extensions and levers of the bistable springs, and flags of impossible shapes."""

@@ -23,7 +23,7 @@ from dpgcli.reports.panels import Window
 from dpgcli.states.patterns import texts
 
 # of Okabe and Ito: told apart by color-blind readers; in gray by marks and dashes
-RISING, FALLING, JUMP = "#0072B2", "#D55E00", "0.45"
+RISING, FALLING, JUMP, UNSTABLE = "#0072B2", "#D55E00", "0.45", "#009E73"
 MARKS = {Kind.SNAP: "^", Kind.RESET: "v", Kind.CONTACT: "o", Kind.RELEASE: "s"}
 MOST_PANELS, IN_ROW = 12, 6
 LETTERS = "abcdefghijkl"
@@ -38,10 +38,11 @@ NEAR = (0.02, 0.04)  # of the axes: what is nearer shares a letter's place
 
 @dataclass(frozen=True)
 class Drawing:
-    """What is drawn: a way, the quantities of its points, and the finger that went it."""
+    """What is drawn: a way, the quantities of its points, unstable branches, and the finger."""
 
     way: Travel
     readings: Readings
+    branches: Sequence[Readings]
     pressure: Pressure
     scene: Scene
 
@@ -119,6 +120,9 @@ class Drawing:
             axes.add_collection(
                 LineCollection([*segments[which]], colors=color, linestyles=dashes, lw=1.6)
             )
+        for branch in self.branches:
+            own = branch.shapes.pressure[self._unit_of(line)], -branch.pose[1]
+            axes.plot(*own, color=UNSTABLE, lw=1.0, ls="--")
         self._mark_events(axes, line, points)
         axes.margins(x=0.12, y=0.08)
         axes.autoscale_view()
@@ -166,6 +170,8 @@ class Drawing:
             ),
             Line2D([], [], marker=".", color="black", lw=0, label="hold"),
         ]
+        if self.branches:
+            handles.append(Line2D([], [], color=UNSTABLE, lw=1.0, ls="--", label="unstable"))
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, 1.0 - 0.05 / page[1])}
         figure.legend(handles=handles, ncols=len(handles), frameon=False, fontsize=8, **place)
 

@@ -95,6 +95,8 @@ class Landscape:
 
     def stretches(self) -> tuple[Stretch, ...]:
         """The energy on the way of each flip, with the dome that flips held wherever it is."""
+        if not len(self.flips.unit):
+            return ()
         travel, energy = self._from_ground()
         snaps = self.states.inverted[self.flips.unit, np.arange(1, len(self.energy))]
         found = []

@@ -226,7 +226,7 @@ def _opening(unit: int) -> Quantity:
     return _shape(
         f"opening_{unit + 1}_mm",
         "mm",
-        f"extension x of unit {unit + 1}'s spring",
+        f"opening of unit {unit + 1} at its dome's axis, with what walls yield",
         lambda s: s.openings[unit],
         Group.OPENINGS,
     )

@@ -23,6 +23,7 @@ from dpgcli.equilibrium.banded import backward
 from dpgcli.equilibrium.family import Holding
 from dpgcli.equilibrium.newton import Equilibrium, minimize, stationary
 from dpgcli.mechanics.coordinates import FingerPotential
+from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled, Status
 from dpgcli.states.guess import geometric_guess
@@ -33,6 +34,8 @@ from dpgcli.states.units import UnitSolutions
 
 Value = TypeVar("Value", bound=np.generic)
 
+NEAR = 1e-3  # of the step cap: two searches that end as near have found the same state
+PLACES = 1024  # of a dome's travel before its top, at which it is looked at for ripples
 HELD_AT = 32  # openings between two states at which a saddle that was missed is looked for
 DOWNHILL_STEP = 0.25  # of the step cap: no valley of a steep curve is stepped over
 ASIDE = 0.1  # of the step cap: from a saddle to where downhill is told from level
@@ -190,8 +193,18 @@ def _alone(flips: Flips) -> tuple[Saddles, Indices]:
         return Saddles.none(len(start), 0), lanes
     few = flips.take(lanes)
     energy = ground.equilibrium.energy + flips.own_energy(top)
-    is_fine = is_state(ground)[lanes] & is_state(few.settled_from(few.upper, start))
+    is_fine = _are_same(few.settled_from(few.upper, start), few.settled(few.upper))
+    is_fine &= is_state(ground)[lanes] & _has_one_top(finger)
     return _judged(energy[lanes], start, is_fine, is_apart=True), lanes
+
+
+def _has_one_top(finger: Finger) -> bool:
+    """Whether domes by themselves go from their tops to their two rests, and to no ripple."""
+    curve = finger.law.curve
+    if curve is None:
+        return True
+    before = np.linspace(0.0, curve.rests[0], PLACES)[1:-1]
+    return len(curve.branches) == 1 and bool((curve(before).slope > 0.0).all())
 
 
 def _judged(energy: Array, coordinates: Array, is_fine: Flags, *, is_apart: bool) -> Saddles:
@@ -239,6 +252,7 @@ def _certified(flips: Flips, start: Array) -> Saddles:
     is_saddle &= np.abs(pivots).min(axis=0) > MARGINAL_CURVATURE
     is_saddle &= there.relative_residual <= flips.tolerance
     is_saddle &= ~flips.potential.coordinates.springs(there.coordinates).is_folded
+    is_saddle &= pulls(flips.units.finger) or _has_one_top(flips.units.finger)
     lanes = np.flatnonzero(is_saddle)
     is_saddle[lanes] = _parts(flips.take(lanes), there, lanes)
     return _judged(there.energy, there.coordinates, is_saddle, is_apart=False)
@@ -262,7 +276,14 @@ def _parts(flips: Flips, there: Equilibrium, lanes: Indices) -> Flags:
     both = flips.take(np.tile(np.arange(len(lanes)), 2))
     patterns = np.concatenate((flips.lower, flips.upper), axis=1)
     ends = both.settled_from(patterns, np.concatenate((low, high), axis=1), DOWNHILL_STEP)
-    return np.asarray(is_state(ends).reshape(2, -1).all(axis=0))
+    return np.asarray(_are_same(ends, both.settled(patterns)).reshape(2, -1).all(axis=0))
+
+
+def _are_same(ends: Settled, states: Settled) -> Flags:
+    """Whether searches ended in the states of their patterns, and not in ripples beside them."""
+    away = ends.equilibrium.coordinates - states.equilibrium.coordinates
+    is_near = np.abs(away / states.potential.coordinates.step_cap).max(axis=0) <= NEAR
+    return np.asarray(is_state(ends) & is_state(states) & is_near)
 
 
 def _searched_again(flips: Flips, found: Saddles) -> Saddles:

@@ -117,9 +117,9 @@ class SolvedFingers(SolvedStates):
 
     @cached_property
     def openings(self) -> Array:
-        """Extensions of the bistable springs, mm, (unit, state)."""
+        """Openings at the domes' axis with what walls yield, mm, (unit, state)."""
         coordinates = self.settled.potential.coordinates
-        return coordinates.openings(self.settled.equilibrium.coordinates)
+        return coordinates.springs(self.settled.equilibrium.coordinates).extension
 
     @cached_property
     def nodes(self) -> Stations:

@@ -3,26 +3,25 @@
 A metric is written here and nowhere else: tables, metadata and the manual follow.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Columns, Flags, Indices, distinct
+from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.pressure import Pressure
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers
-from dpgcli.sweeps.pressures import PressedDesigns
+from dpgcli.sweeps.tips import TIPS_PER_LENGTH, DistinctTips, hulls_of, joined
 
-TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
-CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
-CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
+if TYPE_CHECKING:
+    from dpgcli.sweeps.pressures import PressedDesigns
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Metrics:
         self.n_stable = np.zeros(self.n_designs, np.int64)
         self.length = np.broadcast_to(self.units.finger.straight_length, self.n_designs)
         self.hulls: list[tuple[Indices, Any]] = []
-        self.tips = _Distinct()
+        self.tips = DistinctTips()
 
     def add(self, rows: Columns) -> None:
         """Count a block's states in."""
@@ -78,8 +77,10 @@ class Metrics:
         return {m.name: m.of(self) for m in known if has_pressure or not m.needs_pressure}
 
     @cached_property
-    def pressed(self) -> PressedDesigns:
+    def pressed(self) -> "PressedDesigns":
         """What pressure does to the designs, which have it."""
+        from dpgcli.sweeps.pressures import PressedDesigns
+
         assert self.pressure is not None, "no metric that needs pressure is asked for"
         return PressedDesigns(self.units, self.pressure, self.n_designs)
 
@@ -97,7 +98,7 @@ class Metrics:
 
         area = np.zeros(self.n_designs)
         if self.hulls:
-            designs, hulls = self.hulls[0] if len(self.hulls) == 1 else _joined(self.hulls)
+            designs, hulls = self.hulls[0] if len(self.hulls) == 1 else joined(self.hulls)
             found, around = shapely.area(hulls), shapely.length(hulls)
             rounding = 8.0 * np.finfo(float).eps * self.length[designs] * around
             area[designs] = np.where(found > rounding, found, 0.0)
@@ -159,7 +160,7 @@ def _under_pressure(
     name: str,
     unit: str,
     description: str,
-    of: Callable[[PressedDesigns], NDArray[Any]],
+    of: Callable[["PressedDesigns"], NDArray[Any]],
     kind: Kind = Kind.NUMBER,
 ) -> Metric:
     def of_pressed(metrics: Metrics) -> NDArray[Any]:
@@ -281,66 +282,3 @@ METRICS = (
         "max_numerical_error_mm", "mm", "largest numerical error of any tip", "numerical_error_mm"
     ),
 )
-
-
-@dataclass
-class _Distinct:
-    """Cells of a grid that tips lie in, by design, without what repeats."""
-
-    known: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
-
-    def __post_init__(self) -> None:
-        self.waiting: list[Indices] = []
-
-    def add(self, owner: Indices, tips: Array) -> None:
-        """Tips (tip, 2) in steps of the grid, and the design of each."""
-        most = 2.0 ** (CELL_BITS - 1) - 1
-        x, y = np.clip(np.rint(tips.T), -most, most).astype(np.int64) + int(most)
-        self.waiting.append(distinct((((owner << CELL_BITS) | x) << CELL_BITS) | y))
-        if sum(map(len, self.waiting)) > max(CELLS_AT_ONCE, len(self.known)):
-            self._join()
-
-    def counts(self, n_designs: int) -> Indices:
-        """How many cells each design's tips lie in."""
-        self._join()
-        return np.bincount(self.known >> (2 * CELL_BITS), minlength=n_designs)
-
-    def _join(self) -> None:
-        parts = [part for part in (self.known, *self.waiting) if len(part)]
-        if parts:
-            self.known = parts[0] if len(parts) == 1 else distinct(np.concatenate(parts))
-        self.waiting.clear()
-
-
-def hulls_of(owner: Indices, points: Array) -> tuple[Indices, Any]:
-    """The owners and the convex hull of each one's points (point, 2), at least one point in all.
-
-    Polygons, lines or points, whatever a hull comes to.
-
-    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
-    >>> owners, hulls = hulls_of(np.full(5, 7), square)
-    >>> owners.tolist(), hulls[0].area, len(hulls[0].exterior.coords) - 1
-    ([7], 1.0, 4)
-    """
-    import shapely
-
-    order = np.arange(len(owner))
-    if (owner[1:] < owner[:-1]).any():
-        order = np.argsort(owner, kind="stable")
-        owner = owner[order]
-    is_first = np.concatenate(([True], owner[1:] != owner[:-1]))
-    place = np.repeat(np.cumsum(is_first) - 1, 2)  # a line needs two points
-    lines = shapely.linestrings(points[np.repeat(order, 2)], indices=place)
-    return owner[is_first], shapely.convex_hull(lines)
-
-
-def _joined(parts: Sequence[tuple[Indices, Any]]) -> tuple[Indices, Any]:
-    """The hulls of what lies in hulls of the same owners."""
-    import shapely
-
-    owners, points = [], []
-    for designs, hulls in parts:
-        corners, index = shapely.get_coordinates(hulls, return_index=True)
-        owners.append(designs[index])
-        points.append(corners)
-    return hulls_of(np.concatenate(owners), np.concatenate(points))

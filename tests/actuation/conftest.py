@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
@@ -33,6 +34,28 @@ def pressed() -> Callable[..., Pressed]:
         return Pressed(UnitSolutions.of(finger), DomeVolumes(np.array([[area]])))
 
     return made
+
+
+@pytest.fixture
+def closed_form() -> Callable[[float], tuple[float, float]]:
+    """The largest and the smallest force of the study's unit between rigid bars, by its stroke."""
+
+    def limits(stroke: float) -> tuple[float, float]:
+        """Largest and smallest slope of e(x) = E(x) + ½ k_θ φ², x = 2H sin(φ/2), N; by SciPy."""
+        k, alpha, hinge, height = 12.84, 0.043, 24.2, 10.75
+
+        def slope(x: float) -> float:
+            u = x / stroke
+            turn = 2.0 * np.arcsin(x / (2.0 * height))
+            spring = k * x * (1.0 + (1.0 - alpha) * (2.0 * u * u - 3.0 * u))
+            return float(spring + hinge * turn / (height * np.cos(turn / 2.0)))
+
+        ways = {"method": "bounded", "options": {"xatol": 1e-12}}
+        snap = minimize_scalar(lambda x: -slope(x), bounds=(0.0, 0.5 * stroke), **ways)
+        reset = minimize_scalar(slope, bounds=(0.5 * stroke, stroke), **ways)
+        return -float(snap.fun), float(reset.fun)
+
+    return limits
 
 
 State = tuple[bool, ...]

@@ -122,6 +122,14 @@ def test_a_tie_says_nothing_of_the_pulses_before_it(study: Study, pressed: Made)
     assert from_rest.is_tie.tolist() == [False, True]
 
 
+def test_what_comes_after_a_tie_on_the_way_rests_on_it(study: Study, pressed: Made) -> None:
+    own = pressed(study(3, np.inf).changed(stroke=np.array([[3.5], [3.5], [4.5]])))
+    found = reachable(own, np.zeros(3, np.int64), thresholds_alone(own).reach)
+    from_rest = found.pulses.take(np.flatnonzero(found.pulses.source == 0))
+    assert from_rest.target.tolist() == [0b110, 0b111]
+    assert from_rest.is_tie.tolist() == [True, True]
+
+
 def both(one: Array, other: Array) -> Array:
     return np.concatenate((one, other), axis=1)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest
@@ -16,6 +16,7 @@ from dpgcli.states.patterns import inverted_units
 
 Study = Callable[..., Finger]
 Made = Callable[..., Pressed]
+Limits = Callable[[float], tuple[float, float]]
 AREA = 4.7261788958 / 0.1495
 
 
@@ -30,23 +31,9 @@ def events_of(pressed: Pressed, *targets: float, largest_step: float = 0.1) -> I
         shapes = way.shapes
 
 
-def closed_form(stroke: float) -> tuple[float, float]:
-    """Largest and smallest slope of e(x) = E(x) + ½ k_θ φ², x = 2H sin(φ/2), N; by SciPy."""
-    k, alpha, hinge, height = 12.84, 0.043, 24.2, 10.75
-
-    def slope(x: float) -> float:
-        u = x / stroke
-        turn = 2.0 * np.arcsin(x / (2.0 * height))
-        spring = k * x * (1.0 + (1.0 - alpha) * (2.0 * u * u - 3.0 * u))
-        return float(spring + hinge * turn / (height * np.cos(turn / 2.0)))
-
-    ways = {"method": "bounded", "options": {"xatol": 1e-12}}
-    snap = minimize_scalar(lambda x: -slope(x), bounds=(0.0, 0.5 * stroke), **ways)
-    reset = minimize_scalar(slope, bounds=(0.5 * stroke, stroke), **ways)
-    return -float(snap.fun), float(reset.fun)
-
-
-def test_one_unit_snaps_and_resets_where_its_force_turns(study: Study, pressed: Made) -> None:
+def test_one_unit_snaps_and_resets_where_its_force_turns(
+    study: Study, pressed: Made, closed_form: Limits
+) -> None:
     snap, reset = events_of(pressed(study(1, np.inf)), 0.3, -0.3)
     expected = closed_form(3.5)
     assert expected == pytest.approx((4.72618, -2.054675), abs=1e-5)  # the reference's numbers
@@ -69,7 +56,9 @@ def test_half_the_step_changes_nothing(study: Study, pressed: Made) -> None:
             np.testing.assert_allclose(event.after.coordinates, first.after.coordinates, atol=1e-9)
 
 
-def test_units_between_rigid_bars_do_not_feel_each_other(study: Study, pressed: Made) -> None:
+def test_units_between_rigid_bars_do_not_feel_each_other(
+    study: Study, pressed: Made, closed_form: Limits
+) -> None:
     """Each has its own two thresholds, whatever the others do."""
     strokes = np.array([3.5, 3.4, 3.6, 3.7])
     own = np.array([closed_form(stroke) for stroke in strokes]) / AREA
@@ -125,7 +114,7 @@ def test_a_cycle_closes(study: Study, pressed: Made) -> None:
 
 
 def test_a_dome_that_only_pushes_leaves_its_neighbor_when_sucked_back(
-    study: Study, pressed: Made
+    study: Study, pressed: Made, closed_form: Limits
 ) -> None:
     """Published energies: in touch from the start, so snap and reset are those of the spring."""
     finger = study(1, np.inf)

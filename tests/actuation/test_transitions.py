@@ -120,6 +120,21 @@ def test_a_finger_without_any_well_stays(study: Study, pressed: Made) -> None:
     assert found.is_reached.tolist() == [True, False, False, False]
 
 
+def test_a_unit_that_does_not_stay_inverted_comes_back(study: Study, pressed: Made) -> None:
+    """The dome has a second well by itself (α < 1/9), not with its hinge (α > 0.096)."""
+    own = pressed(study(1, np.inf).changed(force_linearity=np.array([[0.1]])))
+    line = np.zeros(1, np.int64)
+    found = state_graph(own, line)
+    rows = table(found, line)
+    assert rows["pattern"].tolist() == ["0", "0"]
+    assert rows["reached_at_pressure"].tolist() == ["1", ""]
+    assert rows["pattern_after"].tolist() == ["0", ""]
+    alone = thresholds_alone(own)
+    assert rows["pressure_MPa"][0] == pytest.approx(alone.snap[0, 0], rel=1e-12)
+    assert np.isnan(alone.reset).all()
+    assert len(reachable(own, line, alone.reach).pulses.start) == 0
+
+
 def test_a_finger_with_no_stable_state_has_no_rows(study: Study, pressed: Made) -> None:
     """A dome that only pushes does not hold a unit without a hinge."""
     finger = study(1).changed(hinge_stiffness=np.zeros((1, 1)))

@@ -244,3 +244,18 @@ def test_no_file_that_is_read_is_written(tmp_path: Path) -> None:
         found.save(tmp_path / "missing" / "path.parquet")
     with pytest.raises(UsageError, match=r"ends in \.parquet"):
         found.save(tmp_path / "path.csv")
+
+
+def test_unstable_branches_are_points_that_say_so(tmp_path: Path) -> None:
+    found = dpg.actuate(GRADED, pressure="0:0.2", unstable=True)
+    plain = dpg.actuate(GRADED, pressure="0:0.2")
+    path = found.path
+    n = len(plain.path)
+    assert path["is_stable"].tolist() == [True] * n + [False] * (len(path) - n)
+    assert path["event"][n:].tolist() == sorted(path["event"][n:].tolist())
+    assert {*path["event"][n:].tolist()} == {1, 2}
+    assert path["smallest_pivot"][n:].max() < 0.0
+    assert path.to_pandas()[:n].equals(plain.path.to_pandas())
+    assert found.table.to_pandas().equals(plain.table.to_pandas())
+    with pytest.raises(UsageError, match="unstable"):
+        dpg.actuate(GRADED, pressure="0:0.2", unstable="yes")  # type: ignore[arg-type]

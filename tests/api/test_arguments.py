@@ -130,7 +130,7 @@ def fit(**given: Any) -> Any:
         (lambda: dpg.bench(FINGER, repeats=None), "repeats None: expected from 1 to"),
         (lambda: dpg.predict(FINGER, settings=pd.NA), "settings <NA>: expected a text"),
         (lambda: dpg.stress(settings=pd.NA), "settings <NA>: expected a text"),
-        (lambda: dpg.landscape(FINGER, None, "11"), "start None: expected 2 digits"),
+        (lambda: dpg.landscape(FINGER, start=None, end="11"), "start None: expected 2 digits"),
         (lambda: dpg.check(memoryview(b"ab"), "a > 1"), "expected a table, columns of one length"),
     ],
 )

@@ -133,7 +133,7 @@ def test_the_table_says_what_it_is_of(two_lines: TransitionsResult, tmp_path: Pa
     pd.testing.assert_frame_equal(written.to_pandas(), two_lines.to_pandas())
     metadata = written.schema.metadata
     assert float(metadata[b"dpg.largest_pressure_MPa"]) == two_lines.graph.reach
-    assert b'"lines":{"A":"1-2","B":3}' in metadata[b"dpg.spec"].replace(b" ", b"")
+    assert b'"lines":{"A":"1-2","B":"3"}' in metadata[b"dpg.spec"].replace(b" ", b"")
     pressure = written.schema.field("pressure_MPa").metadata
     assert (pressure[b"unit"], pressure[b"basis"]) == (b"MPa", b"assumed")
 
@@ -200,9 +200,12 @@ def test_half_the_area_takes_twice_the_pressure() -> None:
 
 
 def test_soft_bars_let_units_pull_each_other_along() -> None:
-    """At 3 N/mm a state is left for one that differs in several units, or that comes back."""
+    """At 3 N/mm one unit takes others with it, and these are no ties."""
     settings = {"finger.linear_stiffness_N_per_mm": 3.0}
     found = dpg.transitions(CONFIGS / "three_unit.yaml", settings=settings)
+    first = row(found, "000", "A", "+")
+    assert (first["unit"], first["reached_at_pressure"], first["tie"]) == ("2,1,3", "111", "")
+    assert row(found, "001", "A", "+")["pressure_MPa"] < first["pressure_MPa"]
     frame = found.to_pandas()
     leads = frame[frame["pattern_after"] != ""]
     flips = [
@@ -210,5 +213,32 @@ def test_soft_bars_let_units_pull_each_other_along() -> None:
         for before, at in zip(leads["pattern"], leads["reached_at_pressure"], strict=True)
     ]
     assert flips == [len(unit.split(",")) for unit in leads["unit"]]
-    stable = set(frame["pattern"])
-    assert set(leads["pattern_after"]) <= stable
+    assert max(flips) == 3
+    assert found.reachable == ("000", "011", "111")
+
+
+def test_scatter_adds_the_spread_of_thresholds() -> None:
+    """Of the material alone: 2 % of the modulus are 2 % of every threshold."""
+    plain = dpg.transitions(GRADED).table
+    found = dpg.transitions(GRADED, scatter="elastic_modulus_MPa=2%", draws=200)
+    table = found.table
+    assert list(table.names) == [
+        *plain.names,
+        *("share_leaving", "share_same_unit", "pressure_mean_MPa", "pressure_deviation_MPa"),
+        *("pressure_low_MPa", "pressure_high_MPa"),
+    ]
+    leaves = ~np.isnan(plain["pressure_MPa"])
+    assert np.array_equal(table["share_leaving"], leaves)
+    nominal = plain["pressure_MPa"][leaves]
+    ratio = table["pressure_deviation_MPa"][leaves] / np.abs(nominal)
+    np.testing.assert_allclose(ratio, 0.02, rtol=0.15)
+    np.testing.assert_allclose(table["pressure_mean_MPa"][leaves], nominal, rtol=0.005)
+    assert (table["share_same_unit"][leaves] == 1.0).all()
+    assert any("200 fingers drawn, seed 1" in line for line in found.summary)
+
+
+def test_too_many_scattered_thresholds_are_refused() -> None:
+    with pytest.raises(UsageError, match="give fewer draws"):
+        dpg.transitions(GRADED, scatter="stroke_mm=1%", draws=100_000)
+    with pytest.raises(UsageError, match="draws goes with scatter"):
+        dpg.transitions(GRADED, draws=5)

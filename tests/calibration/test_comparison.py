@@ -11,6 +11,8 @@ from dpgcli.calibration.comparison import compare, distances
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly
+from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 
 Fingers = Callable[..., Finger]
@@ -143,3 +145,25 @@ def test_lattice_states_are_those_of_predict(reference_finger: Fingers) -> None:
     assert np.array_equal(own.pose[0], rows["tip_x_mm"])
     assert np.array_equal(own.angles[-1], rows["tip_angle_rad"])
     assert np.array_equal(own.openings[1], rows["opening_2_mm"])
+
+
+@pytest.mark.parametrize("law", [PUBLISHED, PushOnly(PUBLISHED)], ids=lambda law: law.description)
+def test_openings_of_predict_and_of_comparisons_are_alike_beside_walls(
+    reference_finger: Fingers, law: DomeLaw
+) -> None:
+    """What is measured at the dome's axis: the lattice's opening and what the wall yields."""
+    compliance = 0.5
+    finger = reference_finger(2, 1e4).changed(wall_compliance=np.full((2, 1), compliance))
+    finger = replace(finger, law=law)
+    rows = predict(Scene(finger, ()), Request(columns=("openings", "nodes"))).arrays()
+    own = lattice_states(finger, ALL, Frame())
+    assert np.isfinite(own.openings).all()
+    for unit in (1, 2):
+        opening = rows[f"opening_{unit}_mm"]
+        assert np.array_equal(own.openings[unit - 1], opening)
+        apart = np.hypot(
+            *(rows[f"T{unit}_{axis}_mm"] - rows[f"T{unit - 1}_{axis}_mm"] for axis in "xy")
+        )
+        yielded = opening - (apart - finger.segment_length[0, 0])
+        assert yielded == pytest.approx(compliance * own.pushes[unit - 1], abs=1e-9)
+    assert np.abs(own.pushes).max() > 0.1

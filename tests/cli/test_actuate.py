@@ -75,6 +75,13 @@ def test_a_file_of_pressures(call: Any, folder: Path, graded: str) -> None:
     assert "history.csv:4: A: expected a number" in wrong.stderr
 
 
+def test_a_spec_on_standard_input(call: Any, folder: Path, graded: str) -> None:
+    text = (folder / graded).read_text(encoding="utf-8")
+    piped = call("actuate", "-", "--pressure", "0:0.16:0", text=text)
+    assert piped.exit_code == ExitCode.DONE
+    assert piped.stdout == call("actuate", graded, "--pressure", "0:0.16:0").stdout
+
+
 def test_that_of_the_spec_is_the_default(call: Any, graded: str) -> None:
     own = ("-s", "pressure.history={A: 0:0.16:0}")
     assert "final pattern 11100" in call("actuate", graded, *own).stderr
@@ -94,6 +101,17 @@ def test_a_figure(call: Any, folder: Path, graded: str, name: str) -> None:
     assert len(first) > 10_000
     assert call(*arguments).exit_code == ExitCode.DONE
     assert (folder / name).read_bytes() == first
+
+
+def test_unstable_branches_go_into_files(call: Any, folder: Path, graded: str) -> None:
+    arguments = ("actuate", graded, "--pressure", "0:0.2", "--unstable")
+    assert call(*arguments).exit_code == ExitCode.USAGE
+    result = call(*arguments, "-o", "path.parquet", "--plot", "path.svg")
+    assert result.exit_code == ExitCode.DONE
+    is_stable = pq.read_table(folder / "path.parquet")["is_stable"].to_pylist()
+    assert True in is_stable
+    assert False in is_stable
+    assert "unstable" in (folder / "path.svg").read_text(encoding="utf-8")
 
 
 REFUSED = {

@@ -3,7 +3,14 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from scipy.optimize import brentq
+
+import dpgcli as dpg
+from dpgcli.calibration.choices import HINGES, LEVER, WALLS
+from dpgcli.errors import FitError, SpecError
 
 EXAMPLES = Path(__file__).parents[2] / "configs" / "calibration"
 SPEC = EXAMPLES.parent / "three_unit.yaml"
@@ -50,6 +57,8 @@ def test_what_is_fitted_is_compared_and_used(call: Any, folder: Path) -> None:
             "openings > 0",
         ),
         (HEAD + GROUND + INVERTED.replace("0.8601", "860.1").replace("0.4778", "477.8"), "push_N"),
+        (HEAD + GROUND.replace("0.08", "4.6") + INVERTED.replace("-0.", "-15."), "degrees?"),
+        (HEAD + "ground,2.5,-0.08,0.00083,0\nground,-2.5,0.08,-0.00083,0\n", "moments in N mm"),
     ],
 )
 def test_what_is_refused(call: Any, folder: Path, text: str, said: str) -> None:
@@ -58,6 +67,55 @@ def test_what_is_refused(call: Any, folder: Path, text: str, said: str) -> None:
     assert result.exit_code == 2
     assert said in result.stderr and "Traceback" not in result.stderr
     assert not (folder / "unit.yaml").exists()
+
+
+@pytest.mark.parametrize("has_geometry", [True, False])
+@pytest.mark.parametrize("scale", [1e-3, 0.02, 0.1, 1.0, 10.0, 50.0, 1e3])
+def test_a_scaled_copy_has_the_scaled_values(scale: float, has_geometry: bool) -> None:
+    """All lengths times s at one modulus: k_θ s³, c_w/s, H s; exact data of the same equations."""
+    given = {"chamber_width_mm": 20, "limiting_layer_thickness_mm": 1.5, "channel_width_mm": 10}
+    given = {key: scale * size for key, size in given.items()}
+    given |= {"unit_separation_mm": 3.0 * scale, "elastic_modulus_MPa": 26.0}
+    found = dpg.fit_unit(exact_unit(scale), geometry=given if has_geometry else None).values
+    assert found[HINGES] == pytest.approx(30.9154 * scale**3, rel=1e-7)
+    assert found[WALLS] == pytest.approx(0.930485 / scale, rel=1e-7)
+    assert found[LEVER] == pytest.approx(10.2552 * scale, rel=1e-7)
+
+
+@pytest.mark.parametrize("scale", [0.02, 1.0, 50.0])
+def test_a_scaled_copy_at_rest_or_in_other_units(scale: float) -> None:
+    table = exact_unit(scale)
+    rest = table[table.unit == "ground"]
+    assert dpg.fit_unit(rest).values[HINGES] == pytest.approx(30.9154 * scale**3, rel=1e-9)
+    for column in ("moment_N_mm", "push_N", "opening_mm"):
+        for factor in (1e-3, 1e3):
+            with pytest.raises((SpecError, FitError)):
+                dpg.fit_unit(table.assign(**{column: table[column] * factor}))
+
+
+def exact_unit(scale: float) -> pd.DataFrame:
+    """A unit of the study's size times a scale under moments, pushed by a spring of 50 N/mm."""
+    lever, stroke, push = 10.2552 * scale, 3.5 * scale, 50.0 * scale
+    hinge, walls = 30.9154 * scale**3, 0.930485 / scale
+
+    def pushed(turn: float) -> float:
+        return push * (stroke - 2.0 * lever * np.sin(turn / 2)) / (1.0 + push * walls)
+
+    rows = []
+    for unit, is_pushed in (("ground", 0.0), ("inverted", 1.0)):
+        for moment in np.array([0.0, 2.5, 5.0, -2.5, -5.0]) * scale**3:
+            turn = brentq(
+                lambda t, m=moment, i=is_pushed: (
+                    hinge * t - m - i * pushed(t) * lever * np.cos(t / 2)
+                ),
+                -0.8,
+                1.2,
+                xtol=1e-16,
+            )
+            force = is_pushed * pushed(turn)
+            opening = 2.0 * lever * np.sin(turn / 2) + walls * force
+            rows.append((unit, moment, -turn, opening, force))
+    return pd.DataFrame(rows, columns=HEAD.strip().split(","))
 
 
 def test_a_table_of_one_unit_beside_a_finger_of_three(call: Any) -> None:

@@ -47,7 +47,7 @@ def test_the_manual_loads_no_numerics(loaded: Loaded, arguments: tuple[str, ...]
     assert loaded("help", *arguments) & (AT_START - {"pydantic"}) == set()
 
 
-@pytest.mark.parametrize("name", ["predict", "validate", "init"])
+@pytest.mark.parametrize("name", ["predict", "validate", "init", "transitions"])
 def test_help_of_a_command_loads_no_numerics(loaded: Loaded, name: str) -> None:
     assert loaded(name, "--help") & (AT_START - {"pydantic"}) == set()
 
@@ -71,6 +71,18 @@ def test_predicting_loads_neither_tables_nor_figures(
     loaded: Loaded, arguments: tuple[str, ...]
 ) -> None:
     assert loaded(*arguments) & PREDICTING == set()
+
+
+def test_transitions_load_neither_tables_nor_figures_nor_graphs(loaded: Loaded) -> None:
+    found = loaded("transitions", str(CONFIGS / "three_unit.yaml"), "--format", "csv")
+    assert found & (PREDICTING | {"networkx"}) == set()
+
+
+def test_without_pressure_nothing_of_it_is_loaded(loaded: Loaded, tmp_path: Path) -> None:
+    sweep = str(CONFIGS / "sweeps" / "height_separation.yaml")
+    found = loaded("sweep", sweep, "-o", str(tmp_path / "out"), "-j", "1")
+    found |= loaded("predict", str(CONFIGS / "three_unit.yaml"))
+    assert not [name for name in found if name.startswith("dpgcli.actuation")]
 
 
 def test_comparing_loads_no_scipy(loaded: Loaded, tmp_path: Path) -> None:

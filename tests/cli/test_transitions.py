@@ -48,6 +48,18 @@ def test_the_summary_is_no_data(call: Any) -> None:
     assert "reachable" not in result.stdout
 
 
+def test_scatter_comes_with_draws_and_a_seed(call: Any) -> None:
+    scatter = ("--scatter", "stroke_mm=1%", "--draws", "20", "--format", "csv")
+    first, again, other = (
+        call("transitions", "three_unit.yaml", *scatter, "--seed", seed).stdout for seed in "112"
+    )
+    assert first == again != other
+    assert first.splitlines()[0].endswith(",pressure_low_MPa,pressure_high_MPa")
+    refused = call("transitions", "three_unit.yaml", "--draws", "20")
+    assert refused.exit_code == ExitCode.USAGE
+    assert "--draws goes with --scatter" in refused.stderr
+
+
 def test_files(call: Any, folder: Path) -> None:
     files = ("-o", "t.parquet", "--graph", "g.graphml", "--plot", "p.png")
     result = call("transitions", "three_unit.yaml", *files)

@@ -203,6 +203,33 @@ def test_another_unit_is_suspected(
     assert said in problems(error)[0]
 
 
+SIZES = {"energy_mJ": (68.0, 3), "force_N": (68.0 / 6.5, 2), "pressure_MPa": (0.1495, 0)}
+
+
+@pytest.mark.parametrize("column", SIZES)
+@pytest.mark.parametrize("scale", [1e-3, 0.02, 0.1, 1.0, 30.0, 1e3])
+def test_a_scaled_copy_of_a_dome_is_no_mistake(path: Path, column: str, scale: float) -> None:
+    """Travel s, force s², energy s³ and the pressure the same, up to rims ten times as stiff."""
+    size, power = SIZES[column]
+    geometry = {key: v * scale if key.endswith("_mm") else v for key, v in DOME.items()}
+    for factor in (0.1, 1.0, 10.0):
+        largest = factor * size * scale**power
+        path.write_text(f"travel_mm,{column}\n0,0\n{14 * scale},{largest}\n", encoding="utf-8")
+        assert read_curve(path, geometry).curve.largest_travel == 14 * scale
+
+
+@pytest.mark.parametrize("column", SIZES)
+@pytest.mark.parametrize("height", [4.5, 6.5, 7.5])
+def test_a_thousand_times_as_much_is_one_at_usual_sizes(
+    path: Path, column: str, height: float
+) -> None:
+    size, _ = SIZES[column]
+    for factor in (1e-3, 1e3):
+        path.write_text(f"travel_mm,{column}\n0,0\n14,{factor * size}\n", encoding="utf-8")
+        with pytest.raises(SpecError, match=column):
+            read_curve(path, {**DOME, "dome_height_mm": height})
+
+
 def test_a_small_dome_is_no_mistake_where_the_geometry_says_so(path: Path) -> None:
     path.write_text("travel_mm,force_N\n0,0\n0.06,1\n", encoding="utf-8")
     assert read_curve(path, {"dome_height_mm": 0.03}).curve.largest_travel == 0.06

@@ -182,6 +182,9 @@ KNOWN = {
         b"<?xml version='1.0'?>\n<svg>\n<dc:title>drawn by dpg</dc:title>" + LONG,
         b"\x89PNG\r\n\x1a\n....IHDR....tEXtSoftware\x00drawn by dpg" + LONG,
     ],
+    Mark.GRAPH: [
+        b"<?xml version='1.0' encoding='utf-8'?>\n<!-- written by dpg -->\n<graphml " + LONG,
+    ],
     Mark.CALIBRATION: [b"calibration_version: 1\nmade_by: dpg 0.1.0, numpy 2" + LONG],
     Mark.DEPFILE: [b"# dpg sweep: what\na/states.parquet a/designs.parquet: b.yaml\n"],
     Mark.DECK: [b"** dpg fe hinge" + LONG],

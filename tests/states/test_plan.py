@@ -27,9 +27,9 @@ def lanes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Numbers of lanes of every minimization from now on."""
     counted: list[int] = []
 
-    def counting(potential: Any, guess: Array, *options: Any) -> newton.Equilibrium:
+    def counting(potential: Any, guess: Array, *options: Any, **named: Any) -> newton.Equilibrium:
         counted.append(guess.shape[1])
-        return newton.minimize(potential, guess, *options)
+        return newton.minimize(potential, guess, *options, **named)
 
     monkeypatch.setattr(settle_module, "minimize", counting)
     return counted
@@ -135,7 +135,7 @@ def test_64_units_with_one_pattern(
 ) -> None:
     pattern = 16 * "0100"  # more of them would turn the finger round into itself
     scene = Scene(graded_finger(64, 81, linear_stiffness), ())
-    rows = predict(scene, Request((pattern,), ("all",))).arrays()
+    rows = predict(scene, Request((pattern,), ("default", "nodes"))).arrays()
     assert lanes == [1]
     assert rows["status"].tolist() == ["stable"]
     assert rows["reached_pattern"].tolist() == [pattern]

@@ -13,7 +13,7 @@ from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
-from dpgcli.states.barriers import barriers
+from dpgcli.states.barriers import Barriers, barriers
 from dpgcli.states.saddles import Flips, Saddles, SaddleStatus, saddles
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
@@ -184,11 +184,9 @@ def highest_held(finger: Finger, flips: Flips, lane: int) -> float:
         alone = finger.law.pulling.response(np.array(travel), finger.domes).energy
         return float(found.fun) + float(np.broadcast_to(alone, (finger.n_units, 1))[own.unit[0], 0])
 
-    top = float(
-        np.broadcast_to(finger.law.rests(finger.domes).top, (finger.n_units, 1))[own.unit[0], 0]
-    )
-    stroke = float(np.broadcast_to(finger.stroke, (finger.n_units, 1))[own.unit[0], 0])
-    bounds = (top - 0.1 * stroke, top + 0.15 * stroke)
+    rests = finger.law.rests(finger.domes)
+    top, well = (float(own.of_unit(rest)[0]) for rest in rests)
+    bounds = (top - 0.2 * (well - top), well)
     options = {"xatol": 1e-4}
     return -float(
         minimize_scalar(lambda t: -least(t), bounds=bounds, method="bounded", options=options).fun
@@ -343,3 +341,63 @@ def test_stiff_bars_change_nothing_but_the_last_digits(
         found: Saddles = saddles(every_flip(finger, all_patterns))
         assert (found.status == SaddleStatus.CERTIFIED).all()
         np.testing.assert_allclose(found.energy, rigid, rtol=0.05 / ratio + 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("place", "depth", "width"), [(0.25, 0.08, 0.05), (0.62, 0.03, 0.03), (0.86, 0.03, 0.03)]
+)
+@pytest.mark.parametrize("is_attached", [True, False])
+def test_a_curve_with_ripples_has_no_barrier_that_is_not_certified(
+    place: float,
+    depth: float,
+    width: float,
+    is_attached: bool,
+    all_patterns: Callable[[int], Flags],
+) -> None:
+    """Down from its highest top it goes to a ripple, before or behind: said, not made up."""
+    u = np.arange(0.0, 1.16, 0.02)
+    smooth = 4.0 * u**2 * (1.0 - u) ** 2 + 0.04 * u**2 * (3.0 - 2.0 * u)
+    curve = spline(tuple(u), tuple(smooth - depth * np.exp(-(((u - place) / width) ** 2))))
+    before = np.linspace(0.01, curve.rests[0] - 0.01, 500)
+    assert (curve(before).slope.min() < 0.0) == (place < 0.5)
+    assert len(curve.branches) == 1 + (place > 0.5)
+    finger = uniform_finger(2, **STUDY, linear_stiffness=1e4)
+    if is_attached:
+        finger = replace(finger, law=Tabulated(curve))
+    else:
+        finger = replace(finger, law=PushOnly(Tabulated(curve)))
+        finger = finger.changed(dome_travel=np.array([[13.0]]))
+    flips = every_flip(finger, all_patterns)
+    found = saddles(flips)
+    assert (found.status == SaddleStatus.NOT_FOUND).all()
+    assert np.isnan(found.energy).all()
+    states = settle(flips.units, chain_potential, all_patterns(2), 1e-12)
+    table = barriers(flips.units, chain_potential, states, 1e-12)
+    assert table.n_not_found.tolist() == [2] * 4
+    assert np.isnan(table.least).all()
+    assert table.least_robust.tolist() == [""] * 4
+
+
+@pytest.mark.parametrize("law", LAWS[2:], ids=lambda law: law.description)
+def test_saddles_between_soft_bars_are_found_from_the_held_path_too(
+    all_patterns: Callable[[int], Flags], law: DomeLaw
+) -> None:
+    """Bars a sixth as stiff as domes: from barriers between rigid bars six and more are missed."""
+    random = np.random.default_rng(2)
+    values = {name: value * random.uniform(0.5, 1.5, (3, 1)) for name, value in STUDY.items()}
+    values["segment_height"] = values["segment_height"][:1]
+    finger = Finger(3, **values, linear_stiffness=np.array([[2.0]]), law=law)
+    flips = every_flip(finger, all_patterns)
+    found = saddles(flips)
+    assert (found.status == SaddleStatus.CERTIFIED).all()
+    for lane in (1, 2, 5, 7):
+        assert found.energy[lane] == pytest.approx(highest_held(finger, flips, lane), rel=1e-6)
+
+
+def test_no_unit_is_the_least_robust_where_a_barrier_is_not_known() -> None:
+    energy = np.array([[2.0, 2.0, np.nan], [3.0, np.nan, np.nan]])
+    status = np.array([[0, 0, 1], [0, 2, 1]], np.uint8)  # the second unit's saddle is not found
+    found = Barriers(energy, status)
+    assert found.least[0] == 2.0
+    assert np.isnan(found.least[1:]).all()
+    assert found.least_robust.tolist() == ["1", "", ""]

@@ -12,7 +12,7 @@ import pytest
 from dpgcli.cli.options import LONG
 from dpgcli.errors import UsageError
 from dpgcli.studies import sweep as studies
-from dpgcli.sweeps import designs, metrics
+from dpgcli.sweeps import designs, tips
 from dpgcli.sweeps.executors import serial
 from dpgcli.sweeps.extent import MOST_CHUNKS, PROCESS_BYTES
 
@@ -107,7 +107,7 @@ def test_one_long_design_takes_the_memory_of_a_block(
 ) -> None:
     """Four times the states in the same blocks: not even half as much again."""
     monkeypatch.setattr(designs, "ROWS_AT_ONCE", 2**9)
-    monkeypatch.setattr(metrics, "CELLS_AT_ONCE", 2**9)
+    monkeypatch.setattr(tips, "CELLS_AT_ONCE", 2**9)
     peaks = []
     for n_units in (11, 13):
         made = study(f"{{key: finger.units, values: [{n_units}]}}", folder=f"of_{n_units}")
@@ -125,7 +125,7 @@ def test_a_design_is_the_same_however_its_states_are_cut(
     axes = (HEIGHTS, "{key: finger.units, values: [9]}")
     whole = tables(study(*axes, base=base, folder="whole"))
     monkeypatch.setattr(designs, "ROWS_AT_ONCE", rows)
-    monkeypatch.setattr(metrics, "CELLS_AT_ONCE", 50)
+    monkeypatch.setattr(tips, "CELLS_AT_ONCE", 50)
     made = study(*axes, base=base, folder="cut")
     made.compute(serial(), lambda _: None)
     batches = [batch.num_rows for part in made.store.parts() for batch in part.batches(0)]

@@ -14,7 +14,8 @@ from dpgcli.states.columns import Group
 from dpgcli.states.quantities import declared
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import Block, design_states
-from dpgcli.sweeps.metrics import CELL_BITS, TIPS_PER_LENGTH, Metrics
+from dpgcli.sweeps.metrics import Metrics
+from dpgcli.sweeps.tips import CELL_BITS, TIPS_PER_LENGTH
 
 Fingers = Callable[..., Finger]
 QUANTITIES = tuple(q for q in declared(1, (), False) if q.group in {Group.STATES, Group.STIFFNESS})

@@ -22,14 +22,14 @@ from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.known import Frame, KnownStates
-from dpgcli.calibration.unit import unit_finger
+from dpgcli.calibration.unit import lever_of, study_unit, unit_finger
 from dpgcli.design import geometry as rules
 from dpgcli.design.dimensions import without_unit
 from dpgcli.design.rules import HINGE_STIFFNESS
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
-from dpgcli.files.known_states import check_loads, read_states
+from dpgcli.files.known_states import check_loads, check_scale, read_states
 from dpgcli.files.sections import Geometry
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 from dpgcli.reports.fit_figures import draw_turns
@@ -73,13 +73,14 @@ def fit_unit(
     check_loss(weighted, loss_scale)
     at = geometry_from(geometry, spec)
     known = read_states(curve, 1)
-    lever = _lever(at)
-    height = lever or STUDY["segment_height"]
-    expected = {**STUDY, "segment_height": height, "hinge_stiffness": _hinge(at)}
-    check_loads(curve, known, uniform_finger(1, **expected))
-    base = unit_finger(known, height)
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
+    lever = _lever(at)
+    size = lever or lever_of(known) or STUDY["segment_height"]
+    expected = uniform_finger(1, **study_unit(size) | {"hinge_stiffness": _hinge(at, size)})
+    check_scale(curve, known, float(expected.straight_length[0]))
+    check_loads(curve, known, expected)
+    base = unit_finger(known, size if lever or LEVER in keys else STUDY["segment_height"])
     met = targets_of(known, as_texts("target", target) or _targets(known), with_walls=has_pushes)
     errors = errors_of(error, met)
     study = FingerFit(base, known, Frame(), keys, met, weighted, loss_scale, errors)
@@ -100,16 +101,24 @@ def fit_unit(
 
 
 def _targets(known: KnownStates) -> tuple[Target, ...]:
-    """Angles, and openings where the data have them."""
-    has_openings = np.isfinite(known.openings).any()
+    """Angles, and openings of inverted units where the data have them.
+
+    What a unit at rest opens by says where its hinge is, and that is not fitted to it alone.
+    """
+    has_openings = np.isfinite(known.openings[known.patterns]).any()
     return (Target.ANGLES, Target.OPENINGS) if has_openings else (Target.ANGLES,)
 
 
-def _hinge(at: Geometry | None) -> float:
-    """The hinge stiffness (N mm/rad) that the inferred rule expects; the study's by default."""
+def _hinge(at: Geometry | None, segment_height: float) -> float:
+    """The hinge stiffness (N mm/rad) that the inferred rule expects.
+
+    What the geometry lacks is the study's, lengths scaled to the segment height (mm).
+    """
     given, needs = sizes(at), HINGE_STIFFNESS.needs
+    scale = segment_height / STUDY["segment_height"]
     study = {need: getattr(rules.REFERENCE, without_unit(need)) for need in needs}
-    return float(rules.hinge_stiffness(*(given.get(need, study[need]) for need in needs)))
+    usual = {k: v * scale if k.endswith("_mm") else v for k, v in study.items()}
+    return float(rules.hinge_stiffness(*(given.get(need, usual[need]) for need in needs)))
 
 
 def _lever(at: Geometry | None) -> float | None:

@@ -1,0 +1,162 @@
+"""What scatter does to pulses and thresholds: of many draws of a finger, a lane each."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.actuation.directions import Directions, Rows
+from dpgcli.actuation.pressed import Halt, Pressed
+from dpgcli.actuation.pulses import WHOLE, Pulse, intervals
+from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.staircase import driven, released
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import codes_of, inverted_units
+from dpgcli.states.settle import lanes_at_once
+
+
+@dataclass(frozen=True)
+class Ranges(Rows):
+    """Sizes of peaks, MPa, that lead a draw from the source of a pulse to its target, (range,).
+
+    Up to below `high`, which is infinite where no event ends the range.
+    """
+
+    pulse: Indices
+    draw: Indices
+    low: Array
+    high: Array
+
+
+def ranges_of(pressed: Pressed, line_of: Indices, reach: float, pulses: Sequence[Pulse]) -> Ranges:
+    """The ranges of draws for pulses; of those whose source is no stable state there are none."""
+    n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
+    pulse = np.arange(len(pulses)).repeat(n_draws)
+    columns = [(one.source, one.target, one.line, np.sign(one.peak)) for one in pulses]
+    source, target, line, sign = np.array(columns, np.int64)[pulse].T
+    draws = Directions(
+        np.tile(np.arange(n_draws), len(pulses)), source.astype(np.uint64), line, sign
+    )
+    size, parts = lanes_at_once(n_units), [_no_ranges()]
+    for first in range(0, len(pulse), size):
+        lanes = np.arange(first, min(first + size, len(pulse)))
+        lanes = lanes[_are_stable(pressed, draws.take(lanes))]
+        if not len(lanes):
+            continue
+        found = intervals(pressed, line_of, np.full(n_draws, reach), draws.take(lanes))
+        lane = lanes[found.lane]
+        high = np.abs(found.high)
+        high = np.where(high >= (1.0 - WHOLE) * reach, np.inf, high)
+        own = Ranges(pulse[lane], draws.design[lane], np.abs(found.low), high)
+        parts.append(own.take(np.flatnonzero(found.after == target[lane])))
+    return Ranges.joined(parts)
+
+
+def _no_ranges() -> Ranges:
+    places, free = np.zeros(0, np.int64), np.zeros(0)
+    return Ranges(places, places, free, free)
+
+
+def _are_stable(pressed: Pressed, draws: Directions) -> Flags:
+    """Whether the states of draws are stable."""
+    inverted = inverted_units(draws.code, pressed.finger.n_units)
+    _, settled = at_rest(pressed.take_lanes(draws.design), inverted)
+    return np.asarray(settled.status == Status.STABLE)
+
+
+def window(low: Array, high: Array, n_needed: float) -> tuple[float, float]:
+    """The widest interval that lies in so many ranges from low up to high; NaN if there is none.
+
+    >>> low, high = np.array([1.0, 1.2, 1.1]), np.array([2.0, 1.9, np.inf])
+    >>> window(low, high, 3), window(low, high, 2), window(low, high, 4)
+    ((1.2, 1.9), (1.1, 2.0), (nan, nan))
+    """
+    ends = np.concatenate([low, high[np.isfinite(high)]])
+    steps = np.concatenate([np.ones(len(low)), -np.ones(len(ends) - len(low))])
+    order = np.argsort(ends)
+    is_last = np.append(np.diff(ends[order]) > 0.0, True)[: len(ends)]  # of those at one place
+    ends, count = ends[order][is_last], np.cumsum(steps[order])[is_last]
+    is_inside = count >= n_needed
+    begins = np.flatnonzero(is_inside & ~np.append(False, is_inside[:-1]))
+    stops = np.flatnonzero(~is_inside & np.append(False, is_inside[:-1]))
+    highs = np.append(ends[stops], np.inf)[: len(begins)]
+    widths = highs - ends[begins]
+    if not len(begins) or not (widths > 0.0).any():
+        return float("nan"), float("nan")
+    widest = int(widths.argmax())
+    return float(ends[begins[widest]]), float(highs[widest])
+
+
+def are_led(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges: Ranges) -> Flags:
+    """Which draws are in the target of each pulse after all up to it, (pulse, draw).
+
+    Those in which a pulse before the last does not lead from its source to its target are followed:
+    a later one may make up for it.
+    """
+    does = np.zeros((len(pulses), pressed.finger.n_designs), bool)
+    peak = np.abs([pulse.peak for pulse in pulses])[ranges.pulse]
+    is_inside = (ranges.low <= peak) & (peak < ranges.high)
+    does[ranges.pulse[is_inside], ranges.draw[is_inside]] = True
+    others = np.flatnonzero(~does[:-1].all(axis=0))
+    if len(others):
+        does[:, others] = followed(pressed.take_lanes(others), line_of, pulses)
+    return does
+
+
+def followed(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse]) -> Flags:
+    """The same, by following all draws from rest through the pulses, there and back."""
+    n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
+    found = np.zeros((len(pulses), n_draws), bool)
+    start = inverted_units(np.full(n_draws, pulses[0].source, np.uint64), n_units)
+    shapes, settled = at_rest(pressed, start)
+    draws = np.flatnonzero(settled.status == Status.STABLE)
+    own, shapes = pressed.take_lanes(draws), shapes.take_lanes(draws)
+    for place, pulse in enumerate(pulses if len(draws) else ()):
+        peak = np.where(line_of[:, None] == pulse.line, pulse.peak, np.zeros(len(draws)))
+        there = driven(own, shapes, peak)
+        back = released(own, there.shapes)
+        arrived = (there.reason == Halt.ARRIVED) & (back.reason == Halt.ARRIVED)
+        kept = np.flatnonzero(arrived)
+        own, shapes, draws = own.take_lanes(kept), back.shapes.take_lanes(kept), draws[kept]
+        if len(draws):
+            is_there = (codes_of(shapes.inverted) == pulse.target) & is_certified(own, shapes)
+            found[place, draws] = is_there
+    return found
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """What scatter does to a sequence of pulses.
+
+    `n_led` (pulse,) draws of `n_draws` are in the pattern after each pulse; `windows` (pulse, 2)
+    are the sizes of peaks, MPa, between which so many draws do it as are asked for: the second is
+    infinite where no event ends them, both are NaN where there are none.
+    """
+
+    n_draws: int
+    n_led: Indices
+    windows: Array
+
+
+def reliability(
+    batches: Iterable[tuple[Indices, Pressed]],
+    line_of: Indices,
+    reach: float,
+    pulses: Sequence[Pulse],
+    n_draws: int,
+    share: float,
+) -> Reliability:
+    """Follow draws through pulses; those in no batch are no fingers, and do none of it."""
+    does = np.zeros((len(pulses), n_draws), bool)
+    parts = [_no_ranges()]
+    for draws, pressed in batches:
+        found = ranges_of(pressed, line_of, reach, pulses)
+        does[:, draws] = are_led(pressed, line_of, pulses, found)
+        parts.append(replace(found, draw=draws[found.draw]))
+    ranges = Ranges.joined(parts)
+    windows = []
+    for place in range(len(pulses)):
+        own = ranges.take(np.flatnonzero(ranges.pulse == place))
+        windows.append(window(own.low, own.high, share * n_draws))
+    return Reliability(n_draws, does.sum(axis=1), np.array(windows).reshape(-1, 2))

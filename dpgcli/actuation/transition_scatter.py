@@ -1,0 +1,109 @@
+"""What scatter does to transitions: thresholds of many draws of a finger, a lane each."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from dpgcli.actuation.directions import Directions, on_line
+from dpgcli.actuation.pressed import Pressed
+from dpgcli.actuation.rest import at_rest
+from dpgcli.actuation.staircase import MOST_EVENTS, Journey
+from dpgcli.actuation.transitions import Transitions
+from dpgcli.arrays import Array, Columns, Indices
+from dpgcli.design.outputs import Output
+from dpgcli.states.certify import Status
+from dpgcli.states.columns import Column
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.settle import lanes_at_once
+
+TAIL = 2.5  # % of draws on each side
+PRESSURES = (Output.PRESSURES,)
+SPREAD_COLUMNS = (
+    Column("share_leaving", "", "share of draws that leave the state at some pressure"),
+    Column("share_same_unit", "", "share in which the same unit leaves, or one tied with it"),
+    Column("pressure_mean_MPa", "MPa", "mean of the thresholds of draws", outputs=PRESSURES),
+    Column("pressure_deviation_MPa", "MPa", "their standard deviation", outputs=PRESSURES),
+    Column("pressure_low_MPa", "MPa", "2.5 % of them are below", outputs=PRESSURES),
+    Column("pressure_high_MPa", "MPa", "2.5 % of them are above", outputs=PRESSURES),
+)
+
+
+def spread_rows(
+    batches: Iterable[tuple[Indices, Pressed]],
+    line_of: Indices,
+    reach: float,
+    rows: Transitions,
+    n_draws: int,
+) -> Columns:
+    """How the thresholds of transitions scatter, by column; draws in no batch leave nothing."""
+    pressure = np.full((len(rows.code), n_draws), np.nan)
+    unit = np.full((len(rows.code), n_draws), -1)
+    for draws, pressed in batches:
+        found = _first_flips(pressed, line_of, reach, rows)
+        pressure[:, draws], unit[:, draws] = found
+    leaves = ~np.isnan(pressure)
+    alike = inverted_units(rows.tied, len(line_of))  # (unit, row)
+    alike[np.maximum(rows.unit, 0), np.arange(len(rows.unit))] |= rows.unit >= 0
+    is_same = (unit >= 0) & alike[unit, np.arange(len(unit))[:, None]]
+    columns = np.array([_statistics(own[has]) for own, has in zip(pressure, leaves, strict=True)])
+    shares = np.stack([leaves.mean(axis=1), is_same.mean(axis=1)], axis=1)
+    table = np.concatenate([shares, columns.reshape(len(shares), 4)], axis=1)
+    return dict(zip((column.name for column in SPREAD_COLUMNS), table.T, strict=True))
+
+
+def _statistics(pressures: Array) -> tuple[float, float, float, float]:
+    """Mean, standard deviation, and what 95 % lie between; NaN for too few."""
+    if not len(pressures):
+        return (float("nan"),) * 4
+    low, high = np.percentile(pressures, [TAIL, 100.0 - TAIL])
+    deviation = pressures.std(ddof=1) if len(pressures) > 1 else float("nan")
+    return float(pressures.mean()), float(deviation), float(low), float(high)
+
+
+def _first_flips(
+    pressed: Pressed, line_of: Indices, reach: float, rows: Transitions
+) -> tuple[Array, Indices]:
+    """Pressures at which draws first flip in the directions of rows, and by which unit.
+
+    Both (row, draw); NaN and −1 where they do not, or the state is none.
+    """
+    n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
+    n = len(rows.code) * n_draws
+    directions = Directions(
+        np.tile(np.arange(n_draws), len(rows.code)),
+        rows.code.repeat(n_draws),
+        rows.line.repeat(n_draws),
+        rows.sign.repeat(n_draws),
+    )
+    pressure, unit = np.full(n, np.nan), np.full(n, -1)
+    size = lanes_at_once(n_units)
+    for first in range(0, n, size):
+        lanes = np.arange(first, min(first + size, n))
+        few = directions.take(lanes)
+        pressure[lanes], unit[lanes] = _flips(pressed, line_of, reach, few)
+    return pressure.reshape(-1, n_draws), unit.reshape(-1, n_draws)
+
+
+def _flips(
+    pressed: Pressed, line_of: Indices, reach: float, directions: Directions
+) -> tuple[Array, Indices]:
+    """The same of some directions, (lane,)."""
+    pressure, unit = np.full(len(directions), np.nan), np.full(len(directions), -1)
+    own = pressed.take_lanes(directions.design)
+    shapes, settled = at_rest(own, inverted_units(directions.code, pressed.finger.n_units))
+    states = np.flatnonzero(settled.status == Status.STABLE)
+    line = directions.line[states]
+    target = np.where(line_of[:, None] == line, directions.sign[states] * reach, 0.0)
+    journey = Journey(own.take_lanes(states), shapes.take_lanes(states), target)
+    for _ in range(MOST_EVENTS * pressed.finger.n_units):
+        found = journey.next_events()
+        if found is None:
+            break
+        events = found[1]
+        is_flip = events.flipped.any(axis=0) & events.is_fine
+        flips = np.flatnonzero(is_flip)
+        which, halted = events.lanes[flips], events.halted.take_lanes(flips)
+        pressure[states[which]] = on_line(halted.shapes, line_of, line[which])
+        unit[states[which]] = halted.unit
+        journey.go_on(~is_flip[events.is_fine])
+    return pressure, unit
