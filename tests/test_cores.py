@@ -96,6 +96,7 @@ def test_a_sweep_takes_the_cores_that_it_may_use(
     monkeypatch: pytest.MonkeyPatch, usable: int, name: str
 ) -> None:
     monkeypatch.setattr("dpgcli.api.sweep.cores", lambda: Cores(64, 64, float(usable)))
-    found = Place().workplace(lambda _: None)
-    assert (found.name, found.n_workers) == (name, usable)
-    assert Place(jobs=2).workplace(lambda _: None).n_workers == 2, "what is asked for is given"
+    with Place().workplace(lambda _: None) as found:
+        assert (found.name, found.n_workers) == (name, usable)
+    with Place(jobs=2).workplace(lambda _: None) as found:
+        assert found.n_workers == 2, "what is asked for is given"

@@ -159,7 +159,7 @@ def sweep(
             is_new = run(
                 study,
                 part,
-                lambda: study.compute(place.workplace(silent), watch, part),
+                lambda: _computed(study, place, watch, part),
                 restart=restart,
                 force=force,
                 is_sent=place.is_sent,
@@ -171,6 +171,13 @@ def sweep(
         if output is None:
             _ = result.designs, result.states  # before their folder goes
     return result
+
+
+def _computed(
+    study: Study, place: "Place", watch: Callable[[Progress], None], part: Shard | None
+) -> Progress:
+    with place.workplace(silent) as workplace:
+        return study.compute(workplace, watch, part)
 
 
 @contextmanager
@@ -297,8 +304,17 @@ class Place:
         """Whether designs are sent to other machines."""
         return self.executor == "dask"
 
-    def workplace(self, say: Say) -> Backend:
-        """The workers, found or about to be started; `say` hears of those that are waited for."""
+    @contextmanager
+    def workplace(self, say: Say) -> Iterator[Backend]:
+        """The workers, for as long as they are needed; `say` hears of those that are waited for."""
+        found = self._found(say)
+        try:
+            yield found
+        finally:
+            found.close()
+
+    def _found(self, say: Say) -> Backend:
+        """The workers, found or about to be started."""
         if self.scheduler is not None:
             return self._cluster(self.scheduler, say)
         n_workers = self.jobs or cores().usable

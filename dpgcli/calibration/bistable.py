@@ -22,7 +22,7 @@ from dpgcli.calibration.choices import (
     Quantity,
     Rule,
 )
-from dpgcli.calibration.fits import Fit, Parameter, fit
+from dpgcli.calibration.fits import Fit, Parameter, fit, mean_errors
 from dpgcli.calibration.opening import Opening
 from dpgcli.calibration.record import (
     Record,
@@ -50,6 +50,10 @@ HIGH_AUTOCORRELATION = 0.5  # correlation of neighboring residuals; above it, a 
 STROKE_BOUNDS = (0.01, 100.0)  # of the largest opening: bounds of the stroke
 
 
+ADDED_UP = (
+    "bootstrap: errors of a work add up along the curve, and intervals from points that are drawn "
+    "one by one are too narrow: take the standard errors"
+)
 UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
 
 
@@ -161,7 +165,8 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     curve, observed = ordered.points(kept), observed[kept]
     well = inverted_well(curve)
     factor = _factor(choice.opening, well)
-    found = _fitted(factor * curve.travel, observed, factor, choice)
+    along = _along(curve, choice)
+    found = _fitted(factor * curve.travel, observed, factor, choice, along)
     if choice.branches not in (Branches.LOADING, Branches.UNLOADING):
         found, differing = _with_hysteresis(
             found, curve if choice.is_quasi_static else record, choice, factor
@@ -185,7 +190,7 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
         _beside(curve),
         snapped_at,
     )
-    return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result)))
+    return replace(result, warnings=(*found.warnings, *warnings, *_judgments(result, along)))
 
 
 def _by_travel(record: Record) -> Record:
@@ -209,7 +214,8 @@ def _with_hysteresis(
 def _alone(choice: BistableOptions, factor: float, branch: Record) -> Fit:
     """The fit to a part of a record, with the mapping of the whole."""
     record, _ = in_order(_by_travel(branch))
-    return _fitted(factor * record.travel, _observed(record, choice), factor, choice)
+    observed, along = _observed(record, choice), _along(record, choice)
+    return _fitted(factor * record.travel, observed, factor, choice, along)
 
 
 def _observed(record: Record, choice: BistableOptions) -> Array:
@@ -220,6 +226,13 @@ def _observed(record: Record, choice: BistableOptions) -> Array:
     if column is None:
         raise FitError(f"no {choice.quantity.value} in the curve")
     return np.asarray(column * choice.area if choice.quantity is Quantity.PRESSURE else column)
+
+
+def _along(record: Record, choice: BistableOptions) -> Array | None:
+    """What work is the integral over, whose errors add up along it; None of other quantities."""
+    if choice.quantity is not Quantity.WORK:
+        return None
+    return record.volume if record.force is None else record.travel
 
 
 def _factor(opening: Opening, well: float | None) -> float:
@@ -233,7 +246,9 @@ def _factor(opening: Opening, well: float | None) -> float:
     return opening.amount / well
 
 
-def _fitted(opening: Array, observed: Array, factor: float, choice: BistableOptions) -> Fit:
+def _fitted(
+    opening: Array, observed: Array, factor: float, choice: BistableOptions, along: Array | None
+) -> Fit:
     size = 1.0 if UNITS[choice.quantity] == "mJ" else factor
     return fit(
         _parameters(opening, observed / size, choice),
@@ -244,6 +259,7 @@ def _fitted(opening: Array, observed: Array, factor: float, choice: BistableOpti
         loss_scale=choice.loss_scale,
         resamples=choice.resamples,
         seed=choice.seed,
+        along=along,
     )
 
 
@@ -307,7 +323,7 @@ def _beside(record: Record) -> dict[str, Array]:
     }
 
 
-def _judgments(found: BistableFit) -> Iterator[str]:
+def _judgments(found: BistableFit, along: Array | None) -> Iterator[str]:
     """Warnings about the fitted values."""
     linearity = float(found.fit.values[1])
     hinge = "the hinge takes another 8/9 k_theta/(k_b H^2) off that limit"
@@ -318,7 +334,13 @@ def _judgments(found: BistableFit) -> Iterator[str]:
     yield from _unsampled_points(found)
     if found.fit.r_squared < LOW_R_SQUARED:
         yield f"the law does not follow the curve: R^2 = {found.fit.r_squared:.3f}"
-    rho = lag1_autocorrelation(found.fit.residuals[np.argsort(found.travel, kind="stable")])
+    if along is None:
+        errors = found.fit.residuals[np.argsort(found.travel, kind="stable")]
+    else:
+        errors = mean_errors(found.fit.residuals, along)[::2]  # neighbors share an error
+        if found.fit.intervals is not None:
+            yield ADDED_UP
+    rho = lag1_autocorrelation(errors)
     if rho > HIGH_AUTOCORRELATION and found.fit.rms > 1e-6 * np.abs(found.observed).max():
         factor = np.sqrt((1.0 + rho) / (1.0 - rho))
         yield (

@@ -7,7 +7,9 @@ covariance of the values is
     Σψ²/(m−n) H⁻¹ JᵀJ H⁻¹,    for plain least squares s² (JᵀJ)⁻¹
 
 (Huber and Ronchetti, Robust Statistics, 2009, section 7.6). It holds for independent errors of
-equal size; a curve that the model cannot follow has neither.
+equal size; a curve that the model cannot follow has neither. Residuals that are integrals of such
+errors e (point,), r = T e with T the trapezoids, have s² S Sᵀ with S = H⁻¹ Jᵀ diag(ψ') T, and s²
+from their increments, which are means of two errors times a step (our derivation).
 """
 
 from collections.abc import Sequence
@@ -79,6 +81,7 @@ def fit(
     loss_scale: float | None = None,
     resamples: int = 0,
     seed: int = 0,
+    along: Array | None = None,
 ) -> Fit:
     """Fit the free parameters so that the residuals become small.
 
@@ -87,7 +90,8 @@ def fit(
     (point, n). `loss_scale` is the size from which a residual counts less; by default a multiple
     of the median residual.
     `resamples` asks for bootstrap intervals: points drawn anew with replacement, each time
-    fitted again; the same `seed` gives the same intervals.
+    fitted again; the same `seed` gives the same intervals. `along` (point,) says that observations
+    are integrals over it, whose errors add up; it changes no value, only standard errors.
 
     Raises FitError if there are fewer points than free parameters, if some of them cannot be
     told apart, or if the search does not converge; ValueError for a start outside its bounds.
@@ -106,7 +110,7 @@ def fit(
     _check_points(observed, int(free.sum()))
     values, scale = search.scaled(start, free, loss_scale)
     values, still_free = search.solved(values, free, scale)
-    found = _judged(search, values, still_free, scale, observed)
+    found = _judged(search, values, still_free, scale, observed, along)
     found = replace(found, at_bound=free & ~still_free)
     found = replace(found, warnings=_warnings(found))
     return _bootstrapped(search, found, free, resamples, seed) if resamples else found
@@ -137,12 +141,19 @@ def _check_points(observed: Array, n_free: int) -> None:
         raise FitError(f"{points} for {n_free} free values: give more, or fix some")
 
 
-def _judged(search: Search, values: Array, free: Flags, scale: float, observed: Array) -> Fit:
+def _judged(
+    search: Search,
+    values: Array,
+    free: Flags,
+    scale: float,
+    observed: Array,
+    along: Array | None,
+) -> Fit:
     """Errors of values at a minimum."""
     residuals = search.residual(values)
     covariance = np.zeros((len(values), len(values)))
     if free.any():
-        block = _covariance(search, values, free, scale)
+        block = _covariance(search, values, free, scale, along)
         covariance[np.ix_(free, free)] = block
     spread = float(((observed - observed.mean()) ** 2).sum())
     squares = float((residuals**2).sum())
@@ -161,10 +172,13 @@ def _judged(search: Search, values: Array, free: Flags, scale: float, observed: 
     )
 
 
-def _covariance(search: Search, values: Array, free: Flags, scale: float) -> Array:
+def _covariance(
+    search: Search, values: Array, free: Flags, scale: float, along: Array | None
+) -> Array:
     """Covariance of the free values; NaN without spare points or positive curvature."""
     slopes = search.jacobian(values)[:, free]
-    pull, curvature = influence(search.loss, search.residual(values), scale)
+    residuals = search.residual(values)
+    pull, curvature = influence(search.loss, residuals, scale)
     n_spare = len(pull) - slopes.shape[1]
     size = np.array([p.size for p in search.parameters])[free]
     slopes = slopes * size  # of order one in every direction, so that nothing is lost in H
@@ -173,7 +187,28 @@ def _covariance(search: Search, values: Array, free: Flags, scale: float) -> Arr
     if n_spare <= 0 or np.linalg.eigvalsh(hessian)[0] <= 0.0:
         return unknown
     spread = np.linalg.solve(hessian, slopes.T)
+    if along is not None:
+        pull = np.sqrt(2.0) * mean_errors(residuals, along)  # of two errors each
+        spread = _of_errors(spread * curvature, along)
     return np.asarray((pull**2).sum() / n_spare * (spread @ spread.T) * np.outer(size, size))
+
+
+def mean_errors(residuals: Array, along: Array) -> Array:
+    """Errors whose integral residuals are, as means between neighbors, (step,).
+
+    >>> mean_errors(np.array([0.0, 1.0, 1.0, 4.0]), np.array([0.0, 2.0, 2.0, 3.0])).tolist()
+    [0.5, 3.0]
+    """
+    steps = np.diff(along)
+    return np.asarray(np.diff(residuals)[steps != 0.0] / steps[steps != 0.0])
+
+
+def _of_errors(weights: Array, along: Array) -> Array:
+    """Weights (n, point) of integrals, by trapezoids, as weights of what is integrated."""
+    later = np.cumsum(weights[:, :0:-1], axis=1)[:, ::-1]  # of all points from each step's end on
+    halves = 0.5 * np.diff(along) * later
+    none = np.zeros((len(weights), 1))
+    return np.concatenate((halves, none), axis=1) + np.concatenate((none, halves), axis=1)
 
 
 def _warnings(found: Fit) -> tuple[str, ...]:

@@ -185,8 +185,10 @@ def _margins(finger: "Finger") -> list[dict[str, str]]:
 
 
 def _to_the_end(value: float, end: float) -> str:
-    """A value, and the one at which the second well goes."""
-    return f"{value:.6g} (goes at {end:.6g})" if end > -math.inf else f"{value:.6g} (none)"
+    """A value, and the one at which the second well goes; none has one, or no value loses it."""
+    if math.isfinite(end):
+        return f"{value:.6g} (goes at {end:.6g})"
+    return f"{value:.6g} ({'never goes' if end > 0.0 else 'none'})"
 
 
 def _rounded(value: float) -> str:

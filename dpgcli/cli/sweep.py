@@ -268,7 +268,6 @@ def _chosen(designs: "Columns") -> str:
 
 
 def _computed(study: "Study", place: "Place", part: "Shard | None", quiet: bool) -> "Progress":
-    workplace = place.workplace(say)
     line = ProgressLine(study.sweep.space.size, "designs", quiet=quiet)
 
     def watch(progress: "Progress") -> None:
@@ -277,7 +276,8 @@ def _computed(study: "Study", place: "Place", part: "Shard | None", quiet: bool)
         line.show(progress.n_done)
 
     try:
-        return study.compute(workplace, watch, part)
+        with place.workplace(say) as workplace:
+            return study.compute(workplace, watch, part)
     except (KeyboardInterrupt, Terminated) as stop:
         raise type(stop)("what is done is kept, and the same command goes on from there") from None
     finally:

@@ -31,6 +31,9 @@ DAMAGED = (
     "damaged: its bytes are not those of its SHA-256, or it has none any more; "
     "make it again, or, if you edited it, take its dpg.* metadata away"
 )
+PLAIN = frozenset(("PLAIN", "PLAIN_DICTIONARY", "RLE_DICTIONARY", "RLE", "BIT_PACKED"))
+NOT_YET = "Not yet implemented"  # of pyarrow
+ROWS_AT_ONCE = 1000  # of texts in full
 NO_ROOM = "it takes more memory than there is"
 
 
@@ -100,17 +103,43 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
                 _check_room(path, file.metadata, names)
                 is_text = {f.name: f.name in TEXTS and _is_text(f.type) for f in file.schema_arrow}
                 texts = [name for name in names if is_text[name] and chosen is not _all]
-                options = {"page_checksum_verification": True, "metadata": file.metadata}
-                return pq.ParquetFile(stream, read_dictionary=texts, **options).read(names)
+                return _with_dictionaries(stream, file, names, texts)
     except MemoryError as error:  # before those of pyarrow, of which some are this too
         raise UsageError(f"cannot read {path}: {NO_ROOM}") from error
     except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror or 'damaged'}") from error
+        why = error.strerror or (str(error) if NOT_YET in str(error) else "damaged")
+        raise UsageError(f"cannot read {path}: {why}") from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
-        is_of_system = type(error) is pa.ArrowException  # such as no more threads
+        # such as no more threads, or a page that pyarrow has no decoder for
+        is_of_system = type(error) is pa.ArrowException or NOT_YET in str(error)
         why = str(error).lower() if is_of_system else "not a Parquet file"
         raise UsageError(f"cannot read {path}: {why}") from error
     raise UsageError(f"{path} is {DAMAGED}")
+
+
+def _with_dictionaries(stream: BinaryIO, file: Any, names: list[str], texts: list[str]) -> Any:
+    """Columns of a file, some texts as dictionaries: pyarrow reads those of some encodings so.
+
+    Of the others not more than some rows are there in full: a text that repeats takes no room.
+    """
+    metadata = file.metadata
+    by_hand = [name for name in texts if not _is_read_as_dictionary(metadata, name)]
+    options = {"page_checksum_verification": True, "metadata": metadata}
+    read = pq.ParquetFile(stream, read_dictionary=[t for t in texts if t not in by_hand], **options)
+    table = read.read([name for name in names if name not in by_hand])
+    for name in by_hand:
+        blocks = file.iter_batches(ROWS_AT_ONCE, columns=[name])
+        kind = pa.dictionary(pa.int32(), file.schema_arrow.field(name).type)
+        parts = [block.column(0).dictionary_encode() for block in blocks]
+        field = file.schema_arrow.field(name).with_type(kind)
+        table = table.append_column(field, pa.chunked_array(parts, kind))
+    return table.select(names)
+
+
+def _is_read_as_dictionary(metadata: Any, name: str) -> bool:
+    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+    columns = (group.column(place) for group in groups for place in range(group.num_columns))
+    return all(PLAIN.issuperset(c.encodings) for c in columns if c.path_in_schema == name)
 
 
 def undamaged(stream: BinaryIO) -> Any:

@@ -233,7 +233,7 @@ def _fold(base: Finger) -> Iterator[Variant]:
 def _approach(bars: str, finger: Finger, name: str, limit: float) -> Iterator[Variant]:
     """Variants with a value near its limit, on both sides; none without a limit."""
     for distance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, -1e-12, -1e-7, -1e-2):
-        if limit > 0.0:
+        if 0.0 < limit < np.inf:
             at = changed(finger, **{name: limit * (1.0 - distance)})
             side = f"fold − {distance:g}" if distance > 0.0 else f"fold + {-distance:g}"
             yield Variant(f"{FOLD_SYMBOLS[name]} at {side}, {bars}", at, ("1",))

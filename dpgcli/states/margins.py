@@ -3,7 +3,8 @@
 With rigid bars a unit has one exactly where r(u) < 0 for some u (see `states.wells`). At each
 such u, r grows with α, with k_θ, and with d through φ/sin φ. So each of the three has a limit, a
 fold r = r' = 0, that it must stay below, and none of them loses the well by falling (our
-derivation). Elastic bars make room for the dome: with them the limits are a little higher.
+derivation). Elastic bars make room for the dome: with them the limits are a little higher. Walls
+that give way, and a dome's own curve, may keep the well at any k_θ or d; α is no value of a curve.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from dpgcli.states.rigid_unit import single_units
 from dpgcli.states.wells import inverted_wells
 
 BISECTIONS = 60
+WIDENINGS = 20  # each by a factor of 4: no value that is a trillion times as large is a limit
 SHORTEST = 1e-9  # strokes in heights: the hinge then turns as good as not at all
 
 NAMES = ("force_linearity", "hinge_stiffness", "stroke")
@@ -27,7 +29,8 @@ class Margins:
     """Of each unit's α (1), k_θ (N mm/rad) and d (mm), arrays of shape (unit,).
 
     The limits below which there is a second well, or how far the unit's own values are below
-    them: negative where they would have to fall, −∞ where even that would not help.
+    them: negative where they would have to fall, −∞ where even that would not help; ∞ where no
+    value loses the well.
     """
 
     force_linearity: Array
@@ -71,8 +74,20 @@ def limits(finger: Finger) -> Margins:
     def are_bistable(values: Array) -> Flags:
         return _are_bistable(units, values)
 
-    last = np.where(are_bistable(low), last_where(are_bistable, low, high), -np.inf)
+    bounds = _wide(are_bistable, low, high)
+    last = np.where(are_bistable(low), last_where(are_bistable, *bounds), -np.inf)
     return Margins(*np.broadcast_to(last, (len(last), finger.n_units)))
+
+
+def _wide(hold: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
+    """Bounds (value, unit) of limits, widened where the second well is not lost; α ends at 1."""
+    wider = np.array([[1.0], [4.0], [4.0]])
+    for _ in range(WIDENINGS):
+        held = hold(high)
+        if not held[1:].any():
+            break
+        low, high = np.where(held, high, low), np.where(held, high * wider, high)
+    return low, high
 
 
 def _are_bistable(units: Finger, values: Array) -> Flags:
@@ -90,13 +105,16 @@ def _are_bistable(units: Finger, values: Array) -> Flags:
 
 
 def last_where(hold: Callable[[Array], Flags], low: Array, high: Array) -> Array:
-    """The last values at which something holds that does not hold at `high`, by bisection.
+    """The last values between `low` and `high` at which something holds, by bisection.
 
-    >>> float(last_where(lambda x: x * x < 2.0, np.array(0.0), np.array(2.0)).round(12))
-    1.414213562373
+    Infinite where it holds at `high`, too.
+
+    >>> last_where(lambda x: x * x < 2.0, np.zeros(2), np.array([2.0, 1.0])).round(12).tolist()
+    [1.414213562373, inf]
     """
+    is_endless = hold(high)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         held = hold(middle)
         low, high = np.where(held, middle, low), np.where(held, high, middle)
-    return low
+    return np.where(is_endless, np.inf, low)

@@ -4,6 +4,7 @@ import logging
 import re
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Future
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from socket import getaddrinfo
 from threading import Thread
@@ -93,18 +94,23 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Ba
     _check_reachable(scheduler)
     client = _client(scheduler)
     watch = Watch(name, lambda: len(_threads(client)), limit, say)
-    while not _threads(client):
-        watch(0.0)
-        sleep(PERIOD)
+    with ExitStack() as opened:
+        opened.callback(client.close)
+        while not _threads(client):
+            watch(0.0)
+            sleep(PERIOD)
+        n_workers = sum(_threads(client).values())
+        opened.pop_all()  # whoever has the workers closes it
     return Backend(
         name,
         lambda _: client.get_executor(pure=False),
-        sum(_threads(client).values()),
+        n_workers,
         is_local=False,
         broken=(BrokenExecutor, KilledWorker),
         lost=(CancelledError, CommClosedError),
         ask=lambda question: _answers(client, question),
         watch=watch,
+        close=client.close,
     )
 
 

@@ -195,7 +195,7 @@ class Backend:
     when a worker dies, `lost` when there is nobody left to ask. `ask` puts a question to each
     worker that may be of another installation: what it returns or raises, by the worker's name.
     `watch` is called with the seconds for which nothing has come back, and may raise
-    WorkplaceError.
+    WorkplaceError. `close` ends what was opened to reach the workers.
     """
 
     name: str
@@ -206,6 +206,7 @@ class Backend:
     lost: tuple[type[BaseException], ...] = ()
     ask: Callable[[Callable[[], Any]], dict[str, Any]] = lambda _: {}
     watch: Callable[[float], None] = lambda _: None
+    close: Callable[[], object] = lambda: None
 
 
 def serial() -> Backend:

@@ -15,7 +15,7 @@ from dpgcli.calibration.bistable import (
     rests,
     slopes,
 )
-from dpgcli.calibration.choices import Branches, Quantity, Rule
+from dpgcli.calibration.choices import Branches, Loss, Quantity, Rule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 from dpgcli.files.measured import read_curve
@@ -161,6 +161,36 @@ def test_a_law_without_second_well_is_said(linearity: float, said: str) -> None:
     bistable = [text for text in found.warnings if "bistable" in text]
     assert bool(bistable) == bool(said)
     assert all(text.startswith(said) and "the hinge takes" in text for text in bistable)
+
+
+@pytest.mark.parametrize("loss", [Loss.LINEAR, Loss.HUBER])
+@pytest.mark.parametrize("by", ["force", "pressure"])
+def test_standard_errors_of_a_work_are_those_of_its_errors_added_up(by: str, loss: Loss) -> None:
+    """Drawn at random: forces, or pressures, have independent errors, and work has their sums."""
+    random, area = np.random.default_rng(1), 30.0
+    travel = np.linspace(0.0, 4.2, 101)
+    force = law(travel, TRUE, Quantity.FORCE)
+    deviations = []
+    for _ in range(40):
+        push = force + random.normal(0.0, 0.005 * force.max(), len(travel))
+        record = (
+            Record(travel, force=push)
+            if by == "force"
+            else Record(travel, pressure=push / area, volume=area * travel)
+        )
+        found = fitted(record, Quantity.WORK, loss=loss)
+        assert not warned(found, "neighboring residuals"), "noise that is added up is no misfit"
+        deviations.append((found.fit.values - TRUE) / found.fit.standard_errors)
+    spread = np.sqrt((np.array(deviations) ** 2).mean(axis=0))
+    assert (spread > 0.7).all() and (spread < 1.4).all(), spread
+
+
+def test_another_shape_of_a_work_is_said_and_intervals_are_too_narrow() -> None:
+    force = law(TRAVEL, TRUE, Quantity.FORCE) + 5.0 * np.sin(2.0 * TRAVEL)
+    found = fitted(Record(TRAVEL, force=force), Quantity.WORK, resamples=20)
+    assert warned(found, "neighboring residuals are alike")
+    assert warned(found, "bootstrap: errors of a work add up")
+    assert not warned(fitted(curve(Quantity.ENERGY, 0), resamples=20), "bootstrap: errors")
 
 
 def test_a_value_at_its_bound_is_said() -> None:

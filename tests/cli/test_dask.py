@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -111,6 +112,22 @@ def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, n_killed: int)
     assert serial.communicate(timeout=60) == ("", "")
     assert tables(sweep / "out") == tables(sweep / "serial")
     assert len(tables(sweep / "out")) == 2
+
+
+@pytest.mark.slow
+def test_python_leaves_nothing_open(cluster: Cluster, sweep: Path) -> None:
+    """Neither sockets nor threads, however often a program sweeps, and whatever comes of it."""
+    address, _ = cluster
+    space = [{"key": "finger.units", "values": [1, 2]}]
+    data = {"base": str(sweep / "three_unit.yaml"), "space": space}
+
+    def left() -> tuple[int, int]:
+        dpgcli.sweep(data, executor="dask", scheduler=address)
+        return len(os.listdir("/proc/self/fd")), threading.active_count()  # noqa: PTH208  names
+
+    left()  # what is opened once for all
+    first = left()
+    assert [left() for _ in range(3)] == [first] * 3
 
 
 @pytest.mark.slow

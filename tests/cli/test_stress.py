@@ -64,6 +64,15 @@ def test_the_users_finger_comes_first_and_its_margins_last(call: Call) -> None:
     assert "0.0964682)" in tables[-1][1], "where the reference unit loses its second well"
 
 
+def test_values_that_lose_no_well_have_no_limit(call: Call) -> None:
+    """The search for limits ends somewhere; beside soft walls there is none to be found."""
+    walls = ("--set", "finger.wall_compliance_mm_per_N=5", "--set", "finger.units=1")
+    result = call("stress", "three_unit.yaml", "--only", "patterns", *walls, "-q")
+    last = result.stdout.rstrip().splitlines()[-1]
+    assert "24.2 (never goes)" in last and "3.5 (never goes)" in last
+    assert "(goes at 0.104" in last
+
+
 def test_graded_units_have_lines_of_their_own(call: Call) -> None:
     setting = "finger.overrides.2.geometry.dome_height_mm=7.0"
     result = call("stress", "three_unit.yaml", "--only", "patterns", "-s", setting, "-q")

@@ -194,6 +194,9 @@ def test_a_file_that_cannot_be_written_is_not_begun(path: Path) -> None:
         ("- [1.0, -0.93]\n", "", "8:1: correlation: expected 2 rows of as many numbers"),
         ("- [1.0, -0.93]", "- [1.0, 0.93]", "correlation: expected a symmetric matrix"),
         ("0.93", "1.93", "correlation: expected a matrix without negative eigenvalue"),
+        ("- [1.0, -0.93]", "- [0.99999, -0.93]", "correlation: expected a symmetric matrix with 1"),
+        ("- [1.0, -0.93]", "- [1.0, -0.93001]", "correlation: expected a symmetric matrix"),
+        ("- [1.0, -0.93]", "- [.nan, -0.93]", "correlation"),
         ("dome_height_mm: 6.5", "dome_hight_mm: 6.5", "did you mean dome_height_mm?"),
         ("[0, 1, 14]", "[0, 14, 1]", "13:22: curve.travel_mm.2: expected more than 14, found 1"),
         ("[0, 1, 14]", "[0, 1, true]", "13:21: curve.travel_mm.2: expected numbers in mm"),
@@ -333,6 +336,23 @@ def test_mistakes_beside_a_curve(path: Path, before: str, after: str, said: str)
     assert before in MEASURED
     (problem,) = problems(path, with_measured(MEASURED.replace(before, after)))
     assert said in problem
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "[0.9999999999999998, -0.93]\n- [-0.93, 1.0000000000000002]",
+        "[1, -0.9299999999999999]\n- [-0.93, 1]",
+        "[1, -1.0000000000000002]\n- [-1, 1]",
+    ],
+)
+def test_a_correlation_is_one_up_to_rounding(path: Path, rows: str) -> None:
+    """What np.corrcoef gives, written by hand."""
+    path.write_text(WHOLE.replace("[1.0, -0.93]\n- [-0.93, 1.0]", rows), encoding="utf-8")
+    found = read_calibration(path).known
+    keys = ("bistable_stiffness_N_per_mm", "force_linearity")
+    assert found.correlation_of(*keys) == pytest.approx(-0.93, abs=0.0701)
+    assert found.correlation_of(keys[0], keys[0]) == 1.0
 
 
 def test_a_correlation_needs_the_order_of_its_values(path: Path) -> None:

@@ -2,6 +2,8 @@
 
 import datetime
 import io
+import subprocess
+import sys
 import tracemalloc
 from decimal import Decimal
 from pathlib import Path
@@ -157,6 +159,60 @@ def test_a_text_that_repeats_takes_no_room(tmp_path: Path) -> None:
     assert peak + pa.default_memory_pool().max_memory() - before < 1e9
     assert designs["reason"][-1] == "x" * 1000
     assert "note" not in designs
+
+
+ENCODINGS = ("PLAIN", "DELTA_BYTE_ARRAY", "DELTA_LENGTH_BYTE_ARRAY")
+
+
+@pytest.mark.parametrize("kind", [pa.string(), pa.large_string()])
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_text_however_it_is_encoded(
+    tmp_path: Path, encoding: str, kind: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of some encodings pyarrow makes no dictionaries, and they are read by hand."""
+    monkeypatch.setattr("dpgcli.files.table_reader.ROWS_AT_ONCE", 3)
+    texts = {name: pa.array(COLUMNS[name], kind) for name in ("calibration", "status")}
+    reasons = pa.array(["", None, "", "no such finger"], kind)
+    table = pa.table({**COLUMNS, **texts, "reason": reasons})
+    encodings = dict.fromkeys(("calibration", "status", "reason"), encoding)
+    options: dict[str, Any] = {"use_dictionary": False, "column_encoding": encodings}
+    pq.write_table(table, tmp_path / "t.parquet", row_group_size=2, **options)
+    columns = read_designs(tmp_path / "t.parquet").columns
+    for name in ("calibration", "status", "reason"):
+        assert columns[name].tolist() == COLUMNS[name], name
+    assert list(columns) == list(COLUMNS)
+    pq.write_table(table.slice(0, 0), tmp_path / "t.parquet", **options)
+    assert len(read_designs(tmp_path / "t.parquet").columns["status"]) == 0
+
+
+def test_a_text_that_repeats_in_another_encoding_takes_no_room(tmp_path: Path) -> None:
+    """40 MB in each column; the memory is looked at in a process that has not had more before."""
+    n_rows, texts = 40_000, ("calibration", "status", "reason")
+    columns: dict[str, Any] = dict.fromkeys(COLUMNS, pa.array(np.zeros(n_rows, np.int8)))
+    columns |= dict.fromkeys(texts, pa.array(["x" * 1000] * n_rows))
+    options: dict[str, Any] = {"column_encoding": dict.fromkeys(texts, "DELTA_BYTE_ARRAY")}
+    pq.write_table(pa.table(columns), tmp_path / "t.parquet", use_dictionary=False, **options)
+    program = (
+        "import pyarrow, sys; from pathlib import Path; "
+        "from dpgcli.files.table_reader import read_designs; "
+        "assert read_designs(Path(sys.argv[1])).columns['reason'][-1] == 'x' * 1000; "
+        "print(pyarrow.default_memory_pool().max_memory())"
+    )
+    peak = subprocess.check_output([sys.executable, "-c", program, tmp_path / "t.parquet"])
+    assert int(peak) < 1e7
+
+
+def test_what_pyarrow_cannot_decode_is_not_called_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for error in (OSError, pa.ArrowNotImplementedError):
+
+        def reading(*_: Any, error: type[Exception] = error, **__: Any) -> None:
+            raise error("Not yet implemented: such an encoding")
+
+        monkeypatch.setattr(pq.ParquetFile, "read", reading)
+        with pytest.raises(UsageError, match=r"(?i)t\.parquet: not yet implemented: such an enc"):
+            read(tmp_path)
 
 
 def test_what_memory_cannot_hold_is_not_read(

@@ -49,6 +49,9 @@ def test_numbers_of_a_row_without_a_state_are_nan(graded_finger: Fingers) -> Non
     assert fallen.sum() == 4
     kept = {"pattern", "status", "reached_pattern", "residual_N"}
     assert rows.keys() > kept
+    never = rows.pop("barrier_2_mJ")  # a unit with one well has nothing to flip to
+    assert np.isnan(never).all()
+    assert ((rows.pop("least_robust_unit") == "") == fallen).all()
     for name, values in rows.items():
         if name not in kept:
             assert (np.isnan(values.astype(float)) == fallen).all(), name

@@ -1,6 +1,7 @@
 """How far a unit is from losing its second well: closed forms, other computations, the solver."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import mpmath
@@ -8,8 +9,10 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
+from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.finger import Finger, uniform_finger
+from dpgcli.mechanics.laws import Tabulated
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.margins import NAMES, Margins, limits, margins
@@ -149,6 +152,42 @@ def test_beyond_the_limit_margins_are_negative_or_hopeless() -> None:
     assert -3.5 < margins(unit(hinge_stiffness=113.0)).stroke[0] < 0.0
     assert margins(unit(force_linearity=0.2)).hinge_stiffness[0] == -np.inf
     assert margins(unit(hinge_stiffness=200.0)).force_linearity[0] == -np.inf
+
+
+def with_walls(compliance: float, **changes: float) -> Finger:
+    return unit(**changes).changed(wall_compliance=np.array([[compliance]]))
+
+
+def test_walls_that_hold_a_well_by_themselves_lose_it_to_no_hinge_and_no_stroke() -> None:
+    """k_θ → ∞, x → 0: the wall stands for the hinge, κ = 1/(k_b c_w), α < 1 − 8/9 (1 + κ)."""
+    holding = 1.0 / (12.84 * (9.0 / 8.0 * (1.0 - 0.043) - 1.0))
+    softer, stiffer = (limits(with_walls(f * holding)) for f in (1.02, 0.98))
+    assert softer.hinge_stiffness[0] == np.inf
+    assert 112.6 < stiffer.hinge_stiffness[0] < np.inf
+    assert margins(with_walls(1.02 * holding)).hinge_stiffness[0] == np.inf
+    alone = 1.0 - 8.0 / 9.0 * (1.0 + 1.0 / (12.84 * holding))
+    assert alone == pytest.approx(0.043)
+    assert limits(with_walls(5.0)).stroke[0] == np.inf
+    assert softer.force_linearity[0] < 1.0, "a straight line has one well, whatever the walls"
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("compliance", [0.5, 1.0])
+def test_limits_beside_walls_are_where_the_well_goes(name: str, compliance: float) -> None:
+    """Also beyond 4 H and k_b H², where limits without walls end."""
+    limit = float(limit_of(limits(with_walls(compliance)), name)[0])
+    for factor, exists in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+        assert inverted_wells(with_walls(compliance, **{name: factor * limit})).exists[0] == exists
+    assert limit > {"stroke": 43.0, "hinge_stiffness": 150.0}.get(name, FOLD)
+
+
+def test_a_value_that_a_law_does_not_have_loses_no_well() -> None:
+    places = np.linspace(0.0, 1.5, 31)
+    energies = 0.5 * places**2 * (1.0 + 0.957 * (places**2 - 2.0 * places))
+    curve = spline(tuple(places), tuple(energies))
+    found = limits(replace(unit(), law=Tabulated(curve)))
+    assert found.force_linearity[0] == np.inf
+    assert 0.0 < found.hinge_stiffness[0] < np.inf
 
 
 def test_several_designs_are_refused() -> None:

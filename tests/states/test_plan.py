@@ -135,7 +135,7 @@ def test_64_units_with_one_pattern(
 ) -> None:
     pattern = 16 * "0100"  # more of them would turn the finger round into itself
     scene = Scene(graded_finger(64, 81, linear_stiffness), ())
-    rows = predict(scene, Request((pattern,), ("all",))).arrays()
+    rows = predict(scene, Request((pattern,), ("default", "nodes"))).arrays()
     assert lanes == [1]
     assert rows["status"].tolist() == ["stable"]
     assert rows["reached_pattern"].tolist() == [pattern]

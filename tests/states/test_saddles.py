@@ -13,7 +13,7 @@ from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
-from dpgcli.states.barriers import barriers
+from dpgcli.states.barriers import Barriers, barriers
 from dpgcli.states.saddles import Flips, Saddles, SaddleStatus, saddles
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
@@ -184,11 +184,9 @@ def highest_held(finger: Finger, flips: Flips, lane: int) -> float:
         alone = finger.law.pulling.response(np.array(travel), finger.domes).energy
         return float(found.fun) + float(np.broadcast_to(alone, (finger.n_units, 1))[own.unit[0], 0])
 
-    top = float(
-        np.broadcast_to(finger.law.rests(finger.domes).top, (finger.n_units, 1))[own.unit[0], 0]
-    )
-    stroke = float(np.broadcast_to(finger.stroke, (finger.n_units, 1))[own.unit[0], 0])
-    bounds = (top - 0.1 * stroke, top + 0.15 * stroke)
+    rests = finger.law.rests(finger.domes)
+    top, well = (float(own.of_unit(rest)[0]) for rest in rests)
+    bounds = (top - 0.2 * (well - top), well)
     options = {"xatol": 1e-4}
     return -float(
         minimize_scalar(lambda t: -least(t), bounds=bounds, method="bounded", options=options).fun
@@ -382,12 +380,24 @@ def test_a_curve_with_ripples_has_no_barrier_that_is_not_certified(
 
 @pytest.mark.parametrize("law", LAWS[2:], ids=lambda law: law.description)
 def test_saddles_between_soft_bars_are_found_from_the_held_path_too(
-    graded_finger: Fingers, all_patterns: Callable[[int], Flags], law: DomeLaw
+    all_patterns: Callable[[int], Flags], law: DomeLaw
 ) -> None:
-    """Bars as soft as a quarter of a dome's spring: barriers between rigid bars lead astray."""
-    finger = replace(graded_finger(3, 4, 3.0), law=law)
+    """Bars a sixth as stiff as domes: from barriers between rigid bars six and more are missed."""
+    random = np.random.default_rng(2)
+    values = {name: value * random.uniform(0.5, 1.5, (3, 1)) for name, value in STUDY.items()}
+    values["segment_height"] = values["segment_height"][:1]
+    finger = Finger(3, **values, linear_stiffness=np.array([[2.0]]), law=law)
     flips = every_flip(finger, all_patterns)
     found = saddles(flips)
     assert (found.status == SaddleStatus.CERTIFIED).all()
-    for lane in (0, 5, 10):
+    for lane in (1, 2, 5, 7):
         assert found.energy[lane] == pytest.approx(highest_held(finger, flips, lane), rel=1e-6)
+
+
+def test_no_unit_is_the_least_robust_where_a_barrier_is_not_known() -> None:
+    energy = np.array([[2.0, 2.0, np.nan], [3.0, np.nan, np.nan]])
+    status = np.array([[0, 0, 1], [0, 2, 1]], np.uint8)  # the second unit's saddle is not found
+    found = Barriers(energy, status)
+    assert found.least[0] == 2.0
+    assert np.isnan(found.least[1:]).all()
+    assert found.least_robust.tolist() == ["1", "", ""]

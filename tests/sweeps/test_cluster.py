@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from dpgcli.api.sweep import Place
 from dpgcli.errors import NoWorkerError, UsageError
 from dpgcli.sweeps import cluster
 from dpgcli.sweeps.cluster import Watch, check_address, dask_cluster
@@ -125,3 +126,33 @@ def test_a_host_without_an_address_is_not_waited_for() -> None:
     with pytest.raises(OSError, match=r"\[Errno"):
         dask_cluster("tcp://nohost.invalid:8786", 1.0, print)
     assert time.monotonic() - began < cluster.PATIENCE
+
+
+class Client:
+    """A client of Dask whose scheduler has so many workers of two threads."""
+
+    def __init__(self, n_workers: int) -> None:
+        self.n_workers, self.is_closed = n_workers, False
+
+    def nthreads(self, **_: float) -> dict[str, int]:
+        return {str(place): 2 for place in range(self.n_workers)}
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+@pytest.mark.parametrize("n_workers", [0, 3])
+def test_a_client_is_closed_however_it_ends(
+    monkeypatch: pytest.MonkeyPatch, n_workers: int
+) -> None:
+    pytest.importorskip("distributed")
+    client = Client(n_workers)
+    monkeypatch.setattr(cluster, "_client", lambda _: client)
+    monkeypatch.setattr(cluster, "PERIOD", 0.001)
+    place = Place("dask", scheduler="tcp://127.0.0.1:8786", wait=0.01)
+    error = RuntimeError if n_workers else NoWorkerError
+    with pytest.raises(error), place.workplace(print) as found:
+        assert found.n_workers == 2 * n_workers
+        assert not client.is_closed
+        raise RuntimeError
+    assert client.is_closed

@@ -72,6 +72,7 @@ NO_SEAL = (
     "cut off or edited: make it again; an edited one does not say in made_by that it has the line",
 )
 MEASURED = ("pressure_MPa", "volume_mm3")  # of a curve, each null where it was not
+ROUNDING = 1e-9  # of a correlation: of one that other programs computed, or that was written down
 SMALLEST_STEP = 1e-12  # of a curve's travels: below it two points are one
 Issue = tuple[KeyPath, str, str]  # key, expected, found
 
@@ -235,9 +236,10 @@ def _correlation_issues(rows: list[list[float]], keys: list[str]) -> Iterator[Is
         yield path, expected, f"rows of {', '.join(str(len(row)) for row in rows)}"
         return
     matrix = np.array(rows).reshape(len(keys), len(keys))
-    if (np.diag(matrix) != 1.0).any() or (matrix != matrix.T).any():
+    off = max(np.ptp([matrix, matrix.T], axis=0).max(initial=0.0), np.ptp([*np.diag(matrix), 1.0]))
+    if not off <= ROUNDING:
         yield path, "a symmetric matrix with 1 on its diagonal", "another"
-    elif len(keys) and np.linalg.eigvalsh(matrix)[0] < -1e-9:
+    elif len(keys) and np.linalg.eigvalsh(matrix)[0] < -ROUNDING:
         yield path, "a matrix without negative eigenvalue", "one with"
 
 
