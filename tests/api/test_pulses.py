@@ -84,7 +84,7 @@ def test_why_there_are_no_pulses(missed: PulsesResult) -> None:
     assert order == (
         "line A: each of units 1,3-4 must snap before each of units 2,5, or reset after that"
     )
-    assert tie.startswith("units 1 and 2 are a tie: both snap at 0.1495 MPa, reset at -0.06499")
+    assert tie.startswith("units 1 and 2 are a tie: both snap at 0.1495 MPa, reset at -0.064995")
 
 
 def test_the_nearest_heights_lead_there_in_a_spec_that_has_them(missed: PulsesResult) -> None:
