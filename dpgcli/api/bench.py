@@ -111,7 +111,7 @@ def bench(
     """
     check_installed("dpg bench", "mpmath")
     check_whole(repeats=repeats)
-    if not 1 <= repeats <= MOST_REPEATS:
+    if repeats is None or not 1 <= repeats <= MOST_REPEATS:
         raise UsageError(Field("repeats"), f" {repeats}: expected from 1 to {MOST_REPEATS:,}")
     check_numbers(target_error=target_error)
     given = scene_input(spec, settings)

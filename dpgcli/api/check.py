@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from dpgcli.api.inputs import as_texts, path_of
+from dpgcli.api.inputs import as_texts, check_flags, path_of
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.frames import frame_of
@@ -32,6 +32,7 @@ def check(
     >>> verdict.is_met, [failure.design for failure in verdict.failures()]
     (False, [0])
     """
+    check_flags(strict=strict)
     requirements = as_texts("require", require)
     if not requirements:
         raise UsageError(Field("require"), ": expected one requirement or more")

@@ -87,7 +87,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
     3
     """
     if isinstance(spec, SceneInput | Scene | Finger):
-        if settings:
+        if setting_texts(settings):
             raise UsageError(Field("settings"), " change a spec, not a finger's values")
         if isinstance(spec, SceneInput):
             return spec

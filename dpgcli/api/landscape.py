@@ -175,7 +175,7 @@ def _check(named: Sequence[tuple[str, str]], n_units: int) -> None:
             f"{2**MOST_UNITS:,} states and {MOST_UNITS * 2**MOST_UNITS:,} barriers"
         )
     for field, pattern in named:
-        if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
+        if not re.fullmatch(f"[01]{{{n_units}}}", str(pattern)):  # None is no text that is wrong
             raise UsageError(Field(field), f" {pattern}: expected {n_units} digits, 0 or 1")
 
 

@@ -11,6 +11,7 @@ from dpgcli.api.inputs import (
     Settings,
     SpecInput,
     as_texts,
+    check_flags,
     check_numbers,
     check_texts,
     figure_path,
@@ -97,6 +98,7 @@ class PredictResult:
 
         A panel for each, those with fewer inverted units first, or all in one picture.
         """
+        check_flags(overlay=overlay)
         check_drawable(self.plan.n_states)
         draw(self.given.scene, self.plan.request.patterns, figure_path(path), overlay=overlay)
 

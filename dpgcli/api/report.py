@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from dpgcli.api.inputs import path_of
+from dpgcli.api.inputs import check_flags, path_of
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.access import writing
 from dpgcli.files.content import opened
@@ -37,7 +37,8 @@ def report(folder: str | Path, *, format: str = "md", strict: bool = False) -> s
         ...
     dpgcli.errors.UsageError: cannot read nowhere/designs.parquet: No such file or directory
     """
-    if f".{format}" not in PAGES:
+    check_flags(strict=strict)
+    if not isinstance(format, str) or f".{format}" not in PAGES:
         raise UsageError(Field("format"), f" {format!r}: expected md or html")
     return page(path_of("folder", folder), f".{format}", strict=strict)[1]
 

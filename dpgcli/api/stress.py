@@ -11,6 +11,7 @@ from dpgcli.api.inputs import (
     as_texts,
     check_installed,
     scene_input,
+    setting_texts,
     table_path,
 )
 from dpgcli.api.tables import Table
@@ -95,7 +96,7 @@ def hard_cases(
 ) -> HardCases:
     """The cases of `stress`, before any work."""
     check_installed("dpg stress", "mpmath")
-    if spec is None and settings:
+    if spec is None and setting_texts(settings):
         raise UsageError(Field("settings"), " changes a spec: give one")
     given = None if spec is None else scene_input(spec, settings)
     check_families(only)

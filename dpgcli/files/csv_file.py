@@ -3,6 +3,7 @@
 import hashlib
 import io
 import math
+import re
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +30,7 @@ from dpgcli.files.layout import (
     rows_in,
     separator_of,
 )
-from dpgcli.files.places import Location, in_order, located, shown
+from dpgcli.files.places import Location, few, in_order, located, shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +40,8 @@ Tabular: TypeAlias = Union[str, Path, "pd.DataFrame", Mapping[str, Any]]
 
 FRAME = "data frame"
 MAX_BYTES = 64 * 1024 * 1024
+MOST_NAMED = 100  # columns
+MOST_LINES, MOST_CELLS = 1_000_000, 2_000_000  # in 600 MB of memory
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # its marks
 FOREIGN = {
     b"PK\x03\x04": "an Excel workbook or an archive",
@@ -134,10 +137,13 @@ class Sheet:
             for name in names
         }
         problems = [
-            self.problem(row, name, *self._no_number(cells[name][row]))
+            problem
             for name, values in columns.items()
-            for row, value in enumerate(values)
-            if value is None
+            for problem in few(
+                self.problem(row, name, *self._no_number(cells[name][row]))
+                for row, value in enumerate(values)
+                if value is None
+            )
         ]
         if problems:
             raise SpecError(in_order(problems))
@@ -177,7 +183,9 @@ class Sheet:
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else hint
         expected = f"a column {' or '.join(wanted)}"
-        found = ", ".join(self.titles.get(name, name) for name in self.names if name)
+        names = [self.titles.get(name, name) for name in self.names if name]
+        more = f" and {len(names) - MOST_NAMED:,} more" if len(names) > MOST_NAMED else ""
+        found = ", ".join(names[:MOST_NAMED]) + more
         return located(Location(self.file), "header", expected, found, hint)
 
 
@@ -237,6 +245,7 @@ def read_sheet(
     file, content = _content(source)
     is_file = isinstance(source, str | Path)
     text = text_of(content, Location(file)) if is_file else content.decode()
+    _check_size(text, file)
     lines = list(io.StringIO(text, newline=None))
     lines[: choice.skip or 0] = ["\n"] * min(choice.skip or 0, len(lines))
     separator = separator_of(lines) if is_file else ","
@@ -249,7 +258,7 @@ def read_sheet(
     head = headed(rows, wanted, choice.columns, is_first=is_first, may_be_longer=is_parted_by_tabs)
     line = head.line
     below = [row for row in head.rows if is_file or row.line > 1]  # names that are numbers are none
-    problems = [problem for problem in problems if (problem.line or 0) > line]
+    problems = list(few(problem for problem in problems if (problem.line or 0) > line))
     sheet = Sheet(
         file,
         head.names,
@@ -270,6 +279,20 @@ def read_sheet(
     if problems:
         raise SpecError(in_order(problems))
     return sheet
+
+
+def _check_size(text: str, file: str) -> None:
+    """Raise SpecError for more lines or cells than a curve has: each is an object in memory."""
+    n_lines = max(text.count("\n"), text.count("\r"))
+    n_blanks = text.count(" ")
+    if n_lines + n_blanks > MOST_CELLS:
+        n_blanks = sum(1 for _ in re.finditer(" +", text))
+    n_cells = n_lines + max(n_blanks, *map(text.count, ",;\t|"))
+    for most, what, found in ((MOST_LINES, "lines", n_lines), (MOST_CELLS, "cells", n_cells)):
+        if found > most:
+            expected, hint = f"at most {most:,} {what}", "keep every tenth row"
+            problem = located(Location(file), "file", expected, f"about {found:,}", hint)
+            raise SpecError((problem,))
 
 
 def _asked(sheet: Sheet, row: int) -> Problem:
@@ -314,12 +337,16 @@ def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
         expected = f"{longest} titles, as many as cells below"
         yield located(top, "header", expected, str(len(sheet.names)), CUT)
         return
+    yield from few(_row_problems(sheet))
+    if not sheet.rows:
+        yield located(top, "file", "rows below the header", "none")
+
+
+def _row_problems(sheet: Sheet) -> Iterator[Problem]:
     for row, cells in enumerate(sheet.rows):
         if len(cells) != len(sheet.names):
             hint = TO_COMMENT if cells[0].startswith("#") else ""
             yield sheet.problem(row, "row", f"{len(sheet.names)} cells", str(len(cells)), hint)
-    if not sheet.rows:
-        yield located(top, "file", "rows below the header", "none")
 
 
 def _number(cell: str, may_lack: bool) -> float | None:

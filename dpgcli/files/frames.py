@@ -22,7 +22,7 @@ def frame_of(source: Any) -> "pd.DataFrame":
 
     convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
     try:
-        frame = convert() if convert is not None else pd.DataFrame(source)
+        frame = pd.DataFrame(source if convert is None else convert())  # an array's is a series
         return with_index(frame)
     except (ValueError, TypeError, AttributeError) as error:
         raise UsageError(f"expected a table, columns of one length: {error}") from error

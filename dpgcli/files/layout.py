@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 from dpgcli.errors import Problem
-from dpgcli.files.places import Location, located
+from dpgcli.files.places import MOST_ALIKE, Location, located
 from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
@@ -119,6 +119,7 @@ def rows_in(
             return rows, problems
         except csv.Error as error:
             place = Location(file, before + 1)
+            del problems[MOST_ALIKE:]  # the first are kept and the last, as some may be no rows
             problems.append(located(place, "row", "cells of a CSV", str(error)))
             continue
         if cells and (any(cells) or not has_comments):

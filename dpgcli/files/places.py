@@ -2,11 +2,13 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from dpgcli.errors import Problem
 from dpgcli.text import MAX_SHOWN, shortened
+
+MOST_ALIKE = 100  # problems of one kind: each takes a hundred times the room of its cell
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,21 @@ def in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
         return p.line is None, files.index(p.file), p.line or 0, p.column or 0
 
     return tuple(sorted(first.values(), key=order))
+
+
+def few(problems: Iterable[Problem]) -> Iterator[Problem]:
+    """The first problems of one kind in data, and a word where there are more of them.
+
+    >>> here = located(Location("t.csv", 3), "x_mm", "a number", '"a"')
+    >>> [str(problem) for problem in few([here] * 2_000)][MOST_ALIKE:]
+    ['t.csv: x_mm: expected a number, found something else in more than 100 places']
+    """
+    for number, problem in enumerate(problems):
+        if number == MOST_ALIKE:
+            found = f"something else in more than {MOST_ALIKE} places"
+            yield located(Location(problem.file), problem.key, problem.expected, found)
+            return
+        yield problem
 
 
 def shown(value: object) -> str:

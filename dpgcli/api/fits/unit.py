@@ -81,7 +81,7 @@ def fit_unit(
     check_scale(curve, known, float(expected.straight_length[0]))
     check_loads(curve, known, expected)
     base = unit_finger(known, size if lever or LEVER in keys else STUDY["segment_height"])
-    met = targets_of(known, target or _targets(known), with_walls=has_pushes)
+    met = targets_of(known, as_texts("target", target) or _targets(known), with_walls=has_pushes)
     errors = errors_of(error, met)
     study = FingerFit(base, known, Frame(), keys, met, weighted, loss_scale, errors)
     found = study.fit(bootstrap, seed)

@@ -11,7 +11,7 @@ from dpgcli.design.lines import DEFAULT_LINE, HISTORY, LINES, TIME
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import beside
 from dpgcli.files.csv_file import Sheet, Tabular, read_sheet
-from dpgcli.files.places import in_order, shown
+from dpgcli.files.places import few, in_order, shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.units import OWN, factor_of, listed, name_and_unit
 from dpgcli.files.yaml_file import MAX_NODES, Document
@@ -67,14 +67,14 @@ def read_history(source: Tabular, lines: Sequence[str]) -> dict[str, Array]:
     if not any(_line(name) in lines for name in names):
         expected = f"a column for a line: {', '.join(lines)}"
         raise SpecError((sheet.problem(None, "header", expected, "none"),))
-    problems = [*_header_problems(sheet, names, lines)]
+    problems = [*few(_header_problems(sheet, names, lines))]
     numbers: dict[str, Array] = {}
     try:
         numbers = sheet.numbers(list(names))
     except SpecError as error:
         problems += error.problems
     for name in filter(lambda name: _line(name) == TIME, numbers):
-        problems += _time_problems(sheet, numbers[name])
+        problems += few(_time_problems(sheet, numbers[name]))
     if problems:
         raise SpecError(in_order(problems))
     return {_line(name): values * _factor(sheet, name) for name, values in numbers.items()}
