@@ -34,6 +34,7 @@ from dpgcli.states.wells import inverted_wells
 
 TIE = 1e-6  # of the pressure: thresholds as near are not told apart
 LEFT = 0.05  # of a stroke: what has moved further has left its place
+SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 TOLERANCE = 1e-12  # of the forces in play
 LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
@@ -211,6 +212,12 @@ class Pressed:
         """Energy less the work of the pressures, mJ, (batch,)."""
         return self.potential(shapes.pressure, shapes.inverted).evaluate(shapes.coordinates).energy
 
+    @property
+    def _downhill_step(self) -> float:
+        """Of the step cap: shorter where curves bend often, or barriers end where domes let go."""
+        is_plain = self.limits is None and self.finger.law.curve is None
+        return 1.0 if is_plain else SHORT_STEP
+
     def relaxed(self, shapes: Shapes) -> tuple[Shapes, Flags]:
         """Go downhill from shapes at their pressures to the next minima; which have arrived.
 
@@ -221,7 +228,9 @@ class Pressed:
             inverted = kept_places(self.limits, shapes.pressure, inverted)
         for _ in range(self.finger.n_units + 1):
             law = self.domes(shapes.pressure, inverted)
-            there = minimize(self._with(law), coordinates, TOLERANCE)
+            there = minimize(
+                self._with(law), coordinates, TOLERANCE, largest_step=self._downhill_step
+            )
             coordinates = there.coordinates
             extension = self.extensions(coordinates)
             if not isinstance(law, PushingDomes):

@@ -166,3 +166,25 @@ def test_a_ground_dome_meets_its_neighbor_where_it_has_crossed_the_gap(
         assert event[1] == pytest.approx(meets, rel=1e-11)
     assert snap[1] == pytest.approx(first_top(unit.touching, 0.0, peak + 2.0), rel=1e-10)
     assert snap[1] > 0.14951, "the neighbor holds it back"
+
+
+def test_going_down_from_a_fold_ends_in_the_next_well(made: Made) -> None:
+    """Pushed beyond its samples a dome has small wells: none is stepped over on the way down."""
+    travel = 13.7077958
+    pressed = made(stroke=np.array([[travel - 1.5]]), dome_travel=np.array([[travel]]))
+    unit = Unit(pressed)
+    shapes, _ = at_rest(pressed, np.zeros((1, 1), bool))
+    folds = [
+        event
+        for event in driven(pressed, shapes, np.array([[0.4]])).events
+        if event.halted.reason[0] == Halt.FOLD
+    ]
+    assert len(folds) > 3
+    for event in folds:
+        at, rest = (
+            float(pressed.extensions(shape.coordinates)[0, 0])
+            for shape in (event.halted.shapes, event.after)
+        )
+        way = np.linspace(at, rest, 300)
+        pressure = float(event.halted.shapes.pressure[0, 0])
+        assert max(unit.touching(y) for y in way) <= pressure * (1.0 + 1e-9)
