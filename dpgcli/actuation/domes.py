@@ -149,7 +149,7 @@ def free_force(finger: Finger, volumes: DomeVolumes, extension: Array, pressure:
     return in_touch(finger, PressureWork(pressure, volumes, finger.domes), extension).force
 
 
-class Limits(NamedTuple):
+class DomeLimits(NamedTuple):
     """Where domes by themselves lose their places, (unit, batch).
 
     A ground dome snaps at an extension `peak` (mm) under `snap_pressure` (MPa), an inverted one
@@ -162,7 +162,7 @@ class Limits(NamedTuple):
     reset_pressure: Array
 
 
-def limits(finger: Finger, volumes: DomeVolumes) -> Limits:
+def limits(finger: Finger, volumes: DomeVolumes) -> DomeLimits:
     """The extremes of the pressure E'/A at which a dome alone rests, between its two rests.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -183,7 +183,7 @@ def limits(finger: Finger, volumes: DomeVolumes) -> Limits:
 
     peak = _largest(pressure, start, top)
     dip = _largest(lambda extension: -pressure(extension), top, well)
-    return Limits(peak, dip, pressure(peak), pressure(dip))
+    return DomeLimits(peak, dip, pressure(peak), pressure(dip))
 
 
 def _largest(function: Callable[[Array], Array], start: Array, end: Array) -> Array:
@@ -201,7 +201,7 @@ def _largest(function: Callable[[Array], Array], start: Array, end: Array) -> Ar
 
 
 def pushing(
-    finger: Finger, volumes: DomeVolumes, own: Limits, pressure: Array, inverted: Flags
+    finger: Finger, volumes: DomeVolumes, own: DomeLimits, pressure: Array, inverted: Flags
 ) -> PushingDomes:
     """Domes that only push, each in the place that it has at these pressures, (unit, batch).
 
@@ -233,7 +233,7 @@ def _zero(force: Callable[[Array], Array], negative: Array, positive: Array) -> 
     return 0.5 * (negative + positive)
 
 
-def kept_places(own: Limits, pressure: Array, inverted: Flags) -> Flags:
+def kept_places(own: DomeLimits, pressure: Array, inverted: Flags) -> Flags:
     """Which domes are inverted, once those have snapped or reset that these pressures make."""
     return np.asarray(
         (inverted | (pressure > own.snap_pressure)) & ~(pressure < own.reset_pressure)

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.actuation.domes import (
+    DomeLimits,
     DomesAt,
-    Limits,
     PressedDomes,
     PushingDomes,
     free_force,
@@ -19,9 +19,9 @@ from dpgcli.actuation.domes import (
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
-from dpgcli.equilibrium.family import Family
+from dpgcli.equilibrium.loaded import LoadedPotential
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import LARGEST_STEP, Ends, Outcome, Watch, follow
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, Watch, follow
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.curve import Spline
@@ -140,7 +140,7 @@ class Pressed:
         return self.units.finger
 
     @cached_property
-    def limits(self) -> Limits | None:
+    def limits(self) -> DomeLimits | None:
         """Where domes by themselves lose their places; None for those that always act."""
         if not isinstance(self.finger.law, PushOnly):
             return None
@@ -150,7 +150,9 @@ class Pressed:
         """The fingers of some lanes."""
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
         if self.limits is not None:
-            taken.__dict__["limits"] = Limits(*(take_lanes(part, index) for part in self.limits))
+            taken.__dict__["limits"] = DomeLimits(
+                *(take_lanes(part, index) for part in self.limits)
+            )
         return taken
 
     @cached_property
@@ -160,7 +162,9 @@ class Pressed:
         others = tuple(term for term in whole.terms if term.kind != "bistable")
         return Potential(whole.coordinates, others)
 
-    def family(self, shapes: Shapes, target: Array) -> Family[FingerCoordinates, PressedDomes]:
+    def family(
+        self, shapes: Shapes, target: Array
+    ) -> LoadedPotential[FingerCoordinates, PressedDomes]:
         """The energies on the way from the pressures of shapes to others, (unit, batch)."""
         law = PressedDomes(self.finger, self.volumes, shapes.pressure, target - shapes.pressure)
         if self.limits is not None:
@@ -169,7 +173,7 @@ class Pressed:
         bare = self._bare
         coordinates = bare.coordinates
         scale, stiffness = self.finger.stroke, self.units.holding_stiffness
-        return Family(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
+        return LoadedPotential(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
 
     def potential(self, pressure: Array, inverted: Flags) -> Potential[FingerCoordinates]:
         """The energy less the work of fixed pressures, domes in touch or not as they come."""
@@ -266,7 +270,7 @@ class Pressed:
         ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step, watch)
         pressure = shapes.pressure + ends.load * (target - shapes.pressure)
         there = replace(shapes, coordinates=ends.coordinates, pressure=pressure)
-        is_alone = (ends.outcome == Outcome.ARRIVED) & alone.any(axis=0)
+        is_alone = (ends.outcome == PathEnd.ARRIVED) & alone.any(axis=0)
         unit = np.where(is_alone, alone.argmax(axis=0), ends.cell)
         start, left = self._past(family, ends, target - shapes.pressure)
         tied = np.where(is_alone, alone, left) | self._meeting(family, ends)
@@ -278,7 +282,7 @@ class Pressed:
         return Halted(there, ends.load, reason, unit, tied, start)
 
     def _past(
-        self, family: Family[FingerCoordinates, PressedDomes], ends: Ends, change: Array
+        self, family: LoadedPotential[FingerCoordinates, PressedDomes], ends: Ends, change: Array
     ) -> tuple[Array, Flags]:
         """Coordinates a little past folds, and units that lose their balance within `TIE` as well.
 
@@ -286,7 +290,7 @@ class Pressed:
         leaves its place then is tied with it.
         """
         start, left = ends.coordinates.copy(), np.zeros(change.shape, bool)
-        folds = np.flatnonzero(ends.outcome == Outcome.FOLD)
+        folds = np.flatnonzero(ends.outcome == PathEnd.FOLD)
         if not len(folds):
             return start, left
         few, cell = family.take_lanes(folds), ends.cell[folds]
@@ -303,7 +307,9 @@ class Pressed:
         start[:, folds] = here + DISPLACED * ends.onward[:, folds]
         return start, left
 
-    def _meeting(self, family: Family[FingerCoordinates, PressedDomes], ends: Ends) -> Flags:
+    def _meeting(
+        self, family: LoadedPotential[FingerCoordinates, PressedDomes], ends: Ends
+    ) -> Flags:
         """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
         law, values = family.law, family.measure(ends.coordinates).value
         margin = law.margin(values, ends.load)
@@ -312,7 +318,7 @@ class Pressed:
         push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL
-        return np.asarray(near & is_alike & (ends.outcome == Outcome.EVENT))
+        return np.asarray(near & is_alike & (ends.outcome == PathEnd.EVENT))
 
     def after(self, halted: Halted) -> tuple[Shapes, Flags]:
         """What becomes of shapes that halted, at their pressures; which have come to rest.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dpgcli.actuation.tables import TIE, numbered
-from dpgcli.actuation.transitions import Outcome, Transitions
+from dpgcli.actuation.transitions import Departure, Transitions
 from dpgcli.arrays import Codes, Columns
 from dpgcli.design.outputs import Output
 from dpgcli.design.pressure import Pressure
@@ -32,8 +32,8 @@ DIRECTIONS = {1: "+", -1: "-"}
 def transition_rows(found: Transitions, pressure: Pressure) -> Columns:
     """Transitions by column, of the lines of a finger."""
     n_units = len(pressure.line_of)
-    flips = (found.outcome == Outcome.LEAVES) | (found.outcome == Outcome.ASTRAY)
-    rests = found.outcome == Outcome.LEAVES
+    flips = (found.outcome == Departure.LEAVES) | (found.outcome == Departure.ASTRAY)
+    rests = found.outcome == Departure.LEAVES
     return {
         "pattern": _patterns(found.code, n_units),
         "line": np.array(pressure.lines)[found.line],
@@ -65,4 +65,4 @@ def _units(
 
 def _notes(found: Transitions) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
     ends = zip(found.outcome.tolist(), found.pressure.tolist(), strict=True)
-    return np.array([Outcome(code).text(pressure) for code, pressure in ends], np.str_)
+    return np.array([Departure(code).text(pressure) for code, pressure in ends], np.str_)

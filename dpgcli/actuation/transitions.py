@@ -15,7 +15,7 @@ from dpgcli.arrays import Array, Codes, Flags, Indices
 from dpgcli.states.patterns import codes_of
 
 
-class Outcome(IntEnum):
+class Departure(IntEnum):
     """What comes of a state in a direction; `text` says so with the pressure that it is about."""
 
     LEAVES = 0
@@ -27,18 +27,18 @@ class Outcome(IntEnum):
     def text(self, pressure: float) -> str:
         """The sentence in tables, empty where a state leaves for another.
 
-        >>> Outcome.STAYS.text(0.299)
+        >>> Departure.STAYS.text(0.299)
         'no unit leaves up to 0.299 MPa'
         """
         return _TEXTS[self].format(pressure, "down" if pressure < 0.0 else "up")
 
 
 _TEXTS = {
-    Outcome.LEAVES: "",
-    Outcome.STAYS: "no unit leaves {1} to {0:.4g} MPa",
-    Outcome.FOLDS: "folds onto itself at {:.4g} MPa",
-    Outcome.LOST: "no equilibrium beyond {:.4g} MPa",
-    Outcome.ASTRAY: "released from {:.4g} MPa it is in no certified state",
+    Departure.LEAVES: "",
+    Departure.STAYS: "no unit leaves {1} to {0:.4g} MPa",
+    Departure.FOLDS: "folds onto itself at {:.4g} MPa",
+    Departure.LOST: "no equilibrium beyond {:.4g} MPa",
+    Departure.ASTRAY: "released from {:.4g} MPa it is in no certified state",
 }
 
 
@@ -93,7 +93,7 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     >>> rows = state_graph(pressed, np.array([0])).transitions
     >>> rows.code.tolist(), rows.sign.tolist(), rows.after.tolist()
     ([0, 0, 1, 1], [1, -1, 1, -1], [1, 0, 1, 0])
-    >>> [Outcome(code).name for code in rows.outcome]
+    >>> [Departure(code).name for code in rows.outcome]
     ['LEAVES', 'STAYS', 'STAYS', 'LEAVES']
     """
     n_units = pressed.finger.n_units
@@ -103,7 +103,7 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
     parts = [_first(pressed, line_of, reach, part) for part in directions.chunks(n_units)]
     transitions = Transitions.joined([_none(), *parts])
-    leads = transitions.take(np.flatnonzero(transitions.outcome == Outcome.LEAVES))
+    leads = transitions.take(np.flatnonzero(transitions.outcome == Departure.LEAVES))
     known = leads.code.astype(np.int64), leads.after.astype(np.int64)
     is_reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
     return StateGraph(transitions, is_stable[0], is_reached[0], float(reach[0]))
@@ -138,9 +138,9 @@ def _first(pressed: Pressed, line_of: Indices, reach: Array, directions: Directi
 
 def _ends(way: Way) -> Indices:
     """Outcomes of ways without a flip."""
-    ends = np.full(len(way.reason), Outcome.LOST, np.int64)
-    ends[way.reason == Halt.ARRIVED] = Outcome.STAYS
-    ends[way.reason == Halt.FOLDED] = Outcome.FOLDS
+    ends = np.full(len(way.reason), Departure.LOST, np.int64)
+    ends[way.reason == Halt.ARRIVED] = Departure.STAYS
+    ends[way.reason == Halt.FOLDED] = Departure.FOLDS
     return ends
 
 
@@ -152,7 +152,7 @@ def _put(
     lanes, halted = events.lanes, events.halted
     is_rest = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
     found.pressure[lanes] = on_line(halted.shapes, line_of, directions.line[lanes])
-    found.outcome[lanes] = np.where(is_rest, Outcome.LEAVES, Outcome.ASTRAY)
+    found.outcome[lanes] = np.where(is_rest, Departure.LEAVES, Departure.ASTRAY)
     units = np.arange(own.finger.n_units)[:, None]
     together = (units == halted.unit) | halted.tied
     found.unit[lanes] = together.argmax(axis=0)

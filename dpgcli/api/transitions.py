@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.actuation.alone import REACH
 from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transition_table import COLUMNS, transition_rows
-from dpgcli.actuation.transitions import Outcome, StateGraph, state_graph
+from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
 from dpgcli.api.predict import check_drawable
 from dpgcli.api.pressure import PressedInput, pressed_input
@@ -168,11 +168,11 @@ class TransitionsResult:
 
 
 _COUNTED = {
-    Outcome.LEAVES: "lead to another state or back",
-    Outcome.STAYS: "in which no unit leaves",
-    Outcome.FOLDS: "in which the finger folds onto itself",
-    Outcome.LOST: "in which no equilibrium is found",
-    Outcome.ASTRAY: "that end in no certified state",
+    Departure.LEAVES: "lead to another state or back",
+    Departure.STAYS: "in which no unit leaves",
+    Departure.FOLDS: "in which the finger folds onto itself",
+    Departure.LOST: "in which no equilibrium is found",
+    Departure.ASTRAY: "that end in no certified state",
 }
 
 

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.corrector import Corrected, corrected, of_cell, slope_by
-from dpgcli.equilibrium.family import Family, LoadedLaw, along
+from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along
 
 STEP, SMALLEST = 0.05, 1e-3  # of the cell's scale
 FURTHEST = 2.5  # steps: what else moves further has left its branch
@@ -35,7 +35,11 @@ class _Tangent(NamedTuple):
 
 @in_lanes
 def beyond(
-    family: Family[Coordinates, LoadedLaw], before: Array, load: Array, cell: int, fold: float
+    family: LoadedPotential[Coordinates, LoadedLaw],
+    before: Array,
+    load: Array,
+    cell: int,
+    fold: float,
 ) -> Branch:
     """The branch beyond the fold at which a cell's scalar is `fold`, (size, 1) and (1,) before it.
 
@@ -73,21 +77,25 @@ def beyond(
     return Branch(np.concatenate(coordinates, axis=1), np.concatenate(loads))
 
 
-def _alone(family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices) -> Array:
+def _alone(
+    family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+) -> Array:
     """The motion by which a force on the cell alone moves it by one scale."""
     _, scale, chosen = of_cell(family, here, cell)
     own = (chosen * along(family.measure.rows, here.linear.measured, here.by_hold)).sum(axis=0)
     return np.asarray(here.by_hold / own * scale)
 
 
-def _tangent(family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices) -> _Tangent:
+def _tangent(
+    family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+) -> _Tangent:
     """Along the branch."""
     stiffness, scale, _ = of_cell(family, here, cell)
     slope = slope_by(family, here, cell)
     return _Tangent(stiffness * here.by_hold * scale + slope * here.along_load, slope)
 
 
-def _is_left(family: Family[Coordinates, LoadedLaw], there: Corrected) -> bool:
+def _is_left(family: LoadedPotential[Coordinates, LoadedLaw], there: Corrected) -> bool:
     """Whether another law holds there."""
     margin = family.law.margin(there.linear.measured.value, there.load)
     return margin is not None and bool((margin < 0.0).any())

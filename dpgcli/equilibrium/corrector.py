@@ -13,7 +13,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
-from dpgcli.equilibrium.family import Family, Linearized, LoadedLaw, along, spread
+from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, along, spread
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
@@ -33,7 +33,7 @@ class Corrected(NamedTuple):
 
 @in_lanes
 def corrected(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     guess: Array,
     load: Array,
     cell: Indices,
@@ -80,7 +80,9 @@ def _solved(factors: Factorization, sides: Array) -> Array:
     return backward(factors, y)
 
 
-def slope_by(family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices) -> Array:
+def slope_by(
+    family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+) -> Array:
     """dλ per step of one scale of the cell; NaN where none is followed.
 
     With H' = H + k ∇q∇qᵀ the motion per q is k H'⁻¹∇q + λ' z, z = −H'⁻¹ ∂g/∂λ, and ∇q · of it is 1.
@@ -93,7 +95,7 @@ def slope_by(family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indi
 
 
 def motion_by(
-    family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+    family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
 ) -> tuple[Array, Array]:
     """How coordinates and load move per q of a cell, or per λ where none is followed."""
     stiffness, scale, _ = of_cell(family, here, cell)
@@ -104,7 +106,7 @@ def motion_by(
 
 
 def of_cell(
-    family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+    family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
 ) -> tuple[Array, Array, Array]:
     """Stiffness and scale of a cell of each lane, (batch,), and where it is, (cell, batch)."""
     shape = here.linear.measured.value.shape

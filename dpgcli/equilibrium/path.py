@@ -19,7 +19,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, corrected, motion_by, slope_by
-from dpgcli.equilibrium.family import Family, LoadedLaw, along
+from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along
 
 LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
@@ -35,7 +35,7 @@ Watch = Callable[[Indices, Array, Array], None]
 """Told lanes, their coordinates (size, lane) and loads (lane,) after each step."""
 
 
-class Outcome(IntEnum):
+class PathEnd(IntEnum):
     """How a path ended."""
 
     ARRIVED = 0
@@ -93,7 +93,7 @@ class _Walk:
 
 @in_lanes
 def follow(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     coordinates: Array,
     load: Array,
     end: Array,
@@ -113,8 +113,8 @@ def follow(
         coordinates.copy(), load.copy(), np.full(n, -1), np.full(n, -1), np.zeros_like(coordinates)
     )
     walk, fine = _begin(family, coordinates, load, towards, depth, largest_step)
-    ends.outcome[~fine] = Outcome.FAILED
-    ends.outcome[fine & (towards == 0.0)] = Outcome.ARRIVED
+    ends.outcome[~fine] = PathEnd.FAILED
+    ends.outcome[fine & (towards == 0.0)] = PathEnd.ARRIVED
     active, own = np.flatnonzero(ends.outcome < 0), family
     walk, own = walk.only(active), family.take_lanes(active)
     for _ in range(MAX_STEPS):
@@ -129,12 +129,12 @@ def follow(
             keep = np.flatnonzero(ending < 0)
             active, walk, own = active[keep], walk.only(keep), own.take_lanes(keep)
     if len(active):
-        _write(ends, active, walk, np.full(len(active), Outcome.FAILED))
+        _write(ends, active, walk, np.full(len(active), PathEnd.FAILED))
     return ends
 
 
 def _write(ends: Ends, lanes: Indices, walk: _Walk, outcome: Indices) -> None:
-    is_special = (outcome == Outcome.FOLD) | (outcome == Outcome.EVENT)
+    is_special = (outcome == PathEnd.FOLD) | (outcome == PathEnd.EVENT)
     ends.coordinates[:, lanes], ends.load[lanes] = walk.coordinates, walk.load
     ends.outcome[lanes] = outcome
     ends.cell[lanes] = np.where(is_special, walk.cell, -1)
@@ -142,7 +142,7 @@ def _write(ends: Ends, lanes: Indices, walk: _Walk, outcome: Indices) -> None:
 
 
 def _begin(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     coordinates: Array,
     load: Array,
     towards: Array,
@@ -163,7 +163,7 @@ def _begin(
     return walk, here.is_fine
 
 
-def _margin(family: Family[Coordinates, LoadedLaw], here: Corrected) -> Array:
+def _margin(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) -> Array:
     margin = family.law.margin(here.linear.measured.value, here.load)
     return np.full(here.linear.measured.value.shape, np.inf) if margin is None else margin
 
@@ -185,7 +185,7 @@ class _Trial(NamedTuple):
 
 
 def _one_step(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     walk: _Walk,
     end: Array,
     towards: Array,
@@ -199,7 +199,7 @@ def _one_step(
     is_fold = (walk.cell >= 0) & (to_fold <= FOLD_DISTANCE) & is_before
     if is_fold.any():
         _land(walk, is_fold, to_fold, towards)
-        ending[is_fold] = Outcome.FOLD
+        ending[is_fold] = PathEnd.FOLD
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
     trial = _tried(family, walk, step, end, towards, depth)
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
@@ -215,7 +215,7 @@ def _one_step(
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
     meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
     is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
-    ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, Outcome.FOLD, Outcome.FAILED)
+    ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
@@ -227,13 +227,13 @@ def _one_step(
         walk.coordinates = np.where(moved, event.coordinates, walk.coordinates)
         walk.load = np.where(moved, event.load, walk.load)
         walk.cell = np.where(landed, event_cell, walk.cell)
-        ending[landed] = Outcome.EVENT
-    ending[accepted & is_last] = Outcome.ARRIVED
+        ending[landed] = PathEnd.EVENT
+    ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
 
 
 def _tried(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     walk: _Walk,
     step: Array,
     end: Array,
@@ -258,7 +258,7 @@ def _tried(
 
 
 def _move(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     walk: _Walk,
     trial: _Trial,
     which: Flags,
@@ -280,7 +280,7 @@ def _move(
 
 
 def _first_dip(
-    family: Family[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, towards: Array
+    family: LoadedPotential[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, towards: Array
 ) -> Array:
     """The share of a step at which λ would first turn back, by the law alone; 1 where nowhere.
 
@@ -312,7 +312,7 @@ class _Place(NamedTuple):
 
 
 def _at_event(
-    family: Family[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, cell: Indices
+    family: LoadedPotential[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, cell: Indices
 ) -> _Place:
     """Where the margins of cells vanish, by secants: near to the points that were tried."""
     lanes = np.arange(len(cell))
@@ -341,7 +341,7 @@ def _land(walk: _Walk, which: Flags, distance: Array, towards: Array) -> None:
 
 
 def _turn(
-    family: Family[Coordinates, LoadedLaw],
+    family: LoadedPotential[Coordinates, LoadedLaw],
     walk: _Walk,
     here: Corrected,
     cell: Indices,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.family import Holding
+from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.terms import Formulate

@@ -11,7 +11,7 @@ from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.graph import reachable, reached_from_rest, stable_states
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.transition_table import transition_rows
-from dpgcli.actuation.transitions import Outcome, StateGraph, state_graph
+from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.arrays import Columns
 from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
@@ -116,7 +116,7 @@ def test_a_finger_without_any_well_stays(study: Study, pressed: Made) -> None:
     own = pressed(study(2).changed(force_linearity=np.array([[0.3]])))
     found = state_graph(own, np.zeros(2, np.int64))
     assert found.transitions.code.tolist() == [0, 0]
-    assert set(found.transitions.outcome.tolist()) <= {Outcome.STAYS, Outcome.FOLDS}
+    assert set(found.transitions.outcome.tolist()) <= {Departure.STAYS, Departure.FOLDS}
     assert found.is_reached.tolist() == [True, False, False, False]
 
 
@@ -150,7 +150,7 @@ def test_contact_and_release_are_no_transitions(study: Study, pressed: Made) -> 
     finger = study(2)
     own = pressed(type(finger)(**{**vars(finger), "law": PushOnly(PUBLISHED)}))
     found = state_graph(own, np.array([0, 1]))
-    moves = found.transitions.take(np.flatnonzero(found.transitions.outcome == Outcome.LEAVES))
+    moves = found.transitions.take(np.flatnonzero(found.transitions.outcome == Departure.LEAVES))
     flipped = [int(code).bit_count() for code in moves.flipped]
     assert len(moves.code) == 8
     assert flipped == [1] * 8
@@ -173,7 +173,7 @@ def test_one_state_that_fails_does_not_spoil_the_others(
     monkeypatch.setattr(Pressed, "followed", failing)
     found = state_graph(own, line).transitions
     row = int(np.flatnonzero((found.code == 0b101) & (found.sign == 1))[0])
-    assert found.outcome[row] == Outcome.FOLDS
+    assert found.outcome[row] == Departure.FOLDS
     assert found.after[row] == found.code[row]
     others = np.arange(len(found.code)) != row
     for name in ("pressure", "outcome", "unit", "flipped", "reached", "after"):
@@ -196,7 +196,7 @@ def test_what_is_left_must_be_the_certified_state(
     line = np.array([0, 1])
     found = state_graph(pressed(study(2)), line)
     rows = table(found, line)
-    astray = found.transitions.outcome == Outcome.ASTRAY
+    astray = found.transitions.outcome == Departure.ASTRAY
     assert rows["reached_at_pressure"][astray].tolist() == ["11", "11"]
     assert rows["pattern_after"][astray].tolist() == ["", ""]
     assert all("no certified state" in note for note in rows["note"][astray])

@@ -14,7 +14,7 @@ import pytest
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.scatter import reliability
 from dpgcli.actuation.sequences import pulse_sequence
-from dpgcli.actuation.transitions import Outcome, state_graph
+from dpgcli.actuation.transitions import Departure, state_graph
 from dpgcli.api.pressure import pressed_input
 from dpgcli.api.scatter import SHARE, drawn_by
 from dpgcli.arrays import keep_freed_memory
@@ -42,7 +42,7 @@ def test_the_whole_graph_of_two_lines(
     found = benchmark.pedantic(state_graph, (pressed, line_of), rounds=ROUNDS[n_units])
     benchmark.extra_info["cpu_seconds"] = (process_time() - began) / ROUNDS[n_units]
     assert len(found.transitions.code) == 4 << n_units
-    n_stays = (found.transitions.outcome == Outcome.STAYS).sum()
+    n_stays = (found.transitions.outcome == Departure.STAYS).sum()
     assert n_stays == 4 << n_units // 2
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq, minimize, minimize_scalar
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.equilibrium.family import spread
+from dpgcli.equilibrium.loaded import spread
 from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated

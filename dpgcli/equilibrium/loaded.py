@@ -80,7 +80,7 @@ class Linearized(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Family(Generic[System, Law]):
+class LoadedPotential(Generic[System, Law]):
     """Potentials by a load: `terms` that do not feel it, and a `measure` under a loaded `law`.
 
     `scale` (cell, 1 or batch) is the measure of a large change of each scalar, `stiffness` (same
@@ -94,9 +94,9 @@ class Family(Generic[System, Law]):
     scale: Array
     stiffness: Array
 
-    def take_lanes(self, index: Indices) -> "Family[System, Law]":
+    def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
         """The same family for some lanes of the batch."""
-        return Family(
+        return LoadedPotential(
             self.coordinates.take_lanes(index),
             tuple(term.take_lanes(index) for term in self.terms),
             self.measure.take_lanes(index),
