@@ -48,7 +48,7 @@ from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
 from dpgcli.hard_cases.families import FAMILIES, PATTERNS
-from dpgcli.hard_cases.verdicts import Verdict
+from dpgcli.hard_cases.outcomes import Verdict
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group
 from dpgcli.states.quantities import declared

@@ -33,6 +33,11 @@ class PressedDomes:
     inverted: Flags | None = None
     peak: Array | None = None
 
+    @property
+    def is_smooth(self) -> bool:
+        """Curves from points may bend anywhere; the published one bends once."""
+        return self.finger.law.curve is None and self.volumes.shape is None
+
     def at(self, load: Array) -> "DomesAt":
         """The law at a load."""
         work = PressureWork(self.pressures(load), self.volumes, self._domes)

@@ -59,4 +59,4 @@ def _statement(found: PulseSequence, pair: Obstacle) -> str:
 
 def _size(thresholds: np.ndarray[tuple[int, ...], np.dtype[np.float64]], unit: int) -> str:
     pressure = float(thresholds[unit, 0])
-    return "no pressure" if np.isnan(pressure) else f"{pressure:.4g} MPa"
+    return "no pressure" if np.isnan(pressure) else f"{pressure:.5g} MPa"

@@ -9,7 +9,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
 
 EVENTS = (Halt.FOLD, Halt.ALONE, Halt.CONTACT, Halt.RELEASE)
-MOST_EVENTS = 8  # for each unit, on one way: more are no way of a finger
+MOST_EVENTS = 64  # for each unit, on one way: curves with many bends have many
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.study_tables import write_stress
 from dpgcli.hard_cases import verdicts
 from dpgcli.hard_cases.cases import Case, all_cases, check_families
+from dpgcli.hard_cases.outcomes import Outcome
 from dpgcli.hard_cases.table import STRESS_COLUMNS, FamilySummary, rows, summarized
-from dpgcli.hard_cases.verdicts import Outcome
 
 
 @dataclass(frozen=True)

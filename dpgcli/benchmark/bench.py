@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dpgcli.actuation.pressed import Pressed
 from dpgcli.arrays import Array, Columns, Flags, keep_freed_memory
 from dpgcli.benchmark.ablation import ablations, check_ablation
 from dpgcli.benchmark.methods import (
@@ -21,9 +22,11 @@ from dpgcli.benchmark.methods import (
     package_methods,
     third_party_methods,
 )
+from dpgcli.benchmark.thresholds import SnapCase
 from dpgcli.benchmark.timing import Times, measured, numpy_kernel, peak_bytes
 from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
+from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Scene
 from dpgcli.hard_cases.cases import check_law
 from dpgcli.hard_cases.families import repeated
@@ -67,6 +70,8 @@ COLUMNS = (
     Column("max_energy_error_mJ", "mJ", "largest error of an energy"),
     Column("rms_energy_error_mJ", "mJ", "root mean square of the energies' errors"),
     Column("bound_mm", "mm", "bound on the change of a tip, known before"),
+    Column("max_threshold_error", "", "largest relative error of a pressure at which it snaps"),
+    Column("times_as_long", "", "time of a threshold over that of this package, one way"),
     Column("seconds", "s", "wall time of a call, median"),
     Column("seconds_min", "s", "wall time of a call, smallest"),
     Column("seconds_max", "s", "wall time of a call, largest"),
@@ -122,6 +127,8 @@ class Bench:
             few = slice(None, None, -(-patterns.shape[1] // most))
             for method in third_party_methods(self.finger, patterns[:, few]):
                 yield self._row(method, _only(reference, few))
+        if self.scene.pressure is not None:
+            yield from self._thresholds(self.scene.pressure)
         if self.known is not None:
             yield self._model_error(self.known)
         yield from self._by_units()
@@ -154,6 +161,23 @@ class Bench:
             **errors(first, reference),
             **_times(measured(method.run, self.repeats), method.n_states),
         }
+
+    def _thresholds(self, pressure: Pressure) -> Iterator[Row]:
+        """What follows the straight finger to its first snap, all lines at one pressure."""
+        case = SnapCase.of(Pressed.of(UnitSolutions.of(self.finger), pressure))
+        own = math.nan
+        for follower in case.followers() if math.isfinite(case.threshold) else ():
+            found = follower.run()
+            times = _times(measured(follower.run, self.repeats), follower.n_states)
+            own = times["seconds_per_state"] if math.isnan(own) else own
+            off = np.abs(found / case.threshold - 1.0)
+            yield {
+                **self._facts("pressure", follower.name, follower.n_states),
+                **times,
+                "n_missing": int(np.isnan(off).sum()),
+                "max_threshold_error": _largest(off[np.isfinite(off)]),
+                "times_as_long": times["seconds_per_state"] / own,
+            }
 
     def _facts(self, group: str, method: str, n_states: int, finger: Finger | None = None) -> Row:
         finger = finger or self.finger

@@ -4,7 +4,7 @@ It shares nothing with `mechanics` but the finger's parameters. Shapes are the f
 (B_1x, B_1y, T_1x, T_1y, B_2x, …) in mm.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +40,8 @@ class SpringNetwork:
 
     Spans are the chords, the struts (the clamped one too) and the domes, in this order: their
     vectors are `incidence` (span, free node) times the nodes plus `clamped` (span, 2). Each has
-    a spring, E = ½ k x² [1 + β(u² − 2u)] with u = x/d, linear where β = 0. Corner c is between
+    a spring, E = ½ k x² [1 + β(u² − 2u)] − P x with u = x/d, linear where β = 0, and P the push of
+    a pressure on a dome. Corner c is between
     spans `chord[c]` and `strut[c]`, E = ½ k_c a². All in mm, N and rad.
     """
 
@@ -50,6 +51,7 @@ class SpringNetwork:
     stiffness: Array
     softening: Array
     stroke: Array
+    push: Array
     chord: Indices
     strut: Indices
     corner_stiffness: Array
@@ -70,10 +72,16 @@ class SpringNetwork:
             stiffness=np.concatenate((bar, values["bistable_stiffness"])),
             softening=np.concatenate((np.zeros(n_bars), 1.0 - values["force_linearity"])),
             stroke=np.concatenate((np.ones(n_bars), values["stroke"])),
+            push=np.zeros(n_bars + n_units),
             chord=np.concatenate((units, units)),
             strut=n_units + np.concatenate((units, units + 1)),
             corner_stiffness=np.tile(2.0 * values["hinge_stiffness"], 2),
         )
+
+    def pushed(self, push: Array) -> "SpringNetwork":
+        """The same with pushes on its domes, N, (unit,)."""
+        bars = np.zeros(len(self.push) - len(push))
+        return replace(self, push=np.concatenate((bars, push)))
 
     def energy(self, nodes: Array) -> float:
         """Energy (mJ) of a shape, (4 n,)."""
@@ -85,6 +93,10 @@ class SpringNetwork:
         rates = self._rates(strains)
         pull = self._force(strains) @ rates.length
         return self._energy(strains), pull + self._moment(strains) @ rates.corner
+
+    def gradient(self, nodes: Array) -> Array:
+        """The energy's gradient (N) alone."""
+        return self.energy_and_gradient(nodes)[1]
 
     def hessian(self, nodes: Array) -> Array:
         """Second derivatives (N/mm), (4 n, 4 n), of the energy of a shape, (4 n,).
@@ -121,11 +133,13 @@ class SpringNetwork:
     def _energy(self, strains: _Strains) -> float:
         x, u = strains.extension, strains.extension / self.stroke
         springs = self.stiffness * x * x * (1.0 + self.softening * u * (u - 2.0))
-        return 0.5 * float(springs.sum() + self._moment(strains) @ strains.corner)
+        stored = 0.5 * float(springs.sum() + self._moment(strains) @ strains.corner)
+        return stored - float(self.push @ x)
 
     def _force(self, strains: _Strains) -> Array:
         x, u = strains.extension, strains.extension / self.stroke
-        return np.asarray(self.stiffness * x * (1.0 + self.softening * u * (2.0 * u - 3.0)))
+        own = self.stiffness * x * (1.0 + self.softening * u * (2.0 * u - 3.0))
+        return np.asarray(own - self.push)
 
     def _stiffness(self, strains: _Strains) -> Array:
         u = strains.extension / self.stroke

@@ -138,7 +138,7 @@ def _springable(finger: Finger) -> Solve:
     from springable.mechanics.model import Model
     from springable.mechanics.static_solver import StaticSolver
 
-    network, assembly = SpringNetwork.of(finger), _springable_assembly(finger)
+    network, assembly = SpringNetwork.of(finger), springable_parts(finger).assembly
     solver = StaticSolver(Model(assembly, [LoadStep([], [], [], [])]))
     clamped = assembly.get_coordinates()[:4]
 
@@ -151,9 +151,23 @@ def _springable(finger: Finger) -> Solve:
     return solve
 
 
-def _springable_assembly(finger: Finger) -> Any:
-    """Nodes in the order B_0, T_0, B_1, …; a unit's chord, far strut, dome and two corners."""
-    from springable.mechanics.assembly import Assembly
+class SpringableParts(NamedTuple):
+    """A finger in springable: its nodes in the order B_0, T_0, B_1, … and its elements."""
+
+    base: list[Any]
+    top: list[Any]
+    elements: list[Any]
+
+    @property
+    def assembly(self) -> Any:
+        """All of them together."""
+        from springable.mechanics.assembly import Assembly
+
+        return Assembly({*self.base, *self.top}, self.elements, auto_node_numbering=False)
+
+
+def springable_parts(finger: Finger) -> SpringableParts:
+    """A unit's chord, far strut, dome and two corners."""
     from springable.mechanics.element import Element
     from springable.mechanics.mechanical_behavior import LinearBehavior
     from springable.mechanics.node import Node
@@ -177,7 +191,7 @@ def _springable_assembly(finger: Finger) -> Any:
             Element(Angle(base[i + 1], base[i], top[i]), corner),
             Element(Angle(top[i + 1], base[i + 1], base[i]), corner),
         ]
-    return Assembly({*base, *top}, elements, auto_node_numbering=False)
+    return SpringableParts(base, top, elements)
 
 
 def _springable_domes(values: dict[str, Array]) -> list[Any]:
@@ -195,6 +209,10 @@ def _springable_domes(values: dict[str, Array]) -> list[Any]:
         def gradient_energy(self, alpha: float) -> tuple[float]:
             k, x, u, softening = self._at(alpha)
             return (k * x * (1.0 + softening * u * (2.0 * u - 3.0)),)
+
+        def hessian_energy(self, alpha: float) -> tuple[float]:
+            k, _, u, softening = self._at(alpha)
+            return (k * (1.0 + 6.0 * softening * u * (u - 1.0)),)
 
         def _at(self, length: float) -> tuple[float, float, float, float]:
             given, extension = self._parameters, length - self._natural_measure

@@ -31,6 +31,7 @@ GROUPS = {
     "ladder": "Methods, with a batch of states as large as a sweep's",
     "one finger": "The same, for the states of this finger alone",
     "peer": "What one would do instead, state by state",
+    "pressure": "The pressure at which the straight finger first snaps",
     "model": "The lattice against the data given",
     "units": "All 2^n states of longer fingers",
     "designs": "Many designs at once",
@@ -41,6 +42,7 @@ SHOWN = {
     "ladder": ("certified", "n_missing", "max_tip_error_mm", "rms_tip_error_mm",
                "max_angle_error_rad", "max_energy_error_mJ", "µs_per_state", "spread",
                "cpu_µs_per_state"),
+    "pressure": ("n_missing", "max_threshold_error", "seconds", "µs_per_state", "times_as_long"),
     "model": ("n_missing", "max_tip_error_mm", "rms_tip_error_mm"),
     "units": ("n_units", "n_states", "seconds", "µs_per_state", "peak_MiB"),
     "designs": ("n_designs", "n_states", "seconds", "µs_per_state", "peak_MiB"),
@@ -176,6 +178,6 @@ def _cell(row: "Row", name: str) -> str:
         return "yes" if value else "no"
     if isinstance(value, int):
         return f"{value:,}"
-    if name.endswith(("_mm", "_rad", "_mJ")):
+    if name.endswith(("_mm", "_rad", "_mJ", "threshold_error")):
         return f"{value:.1e}"
     return f"{value:.3g}"

@@ -219,8 +219,9 @@ def _uncertainty(prediction: "Prediction") -> Iterator[str]:
 def _barriers(summary: "Summary") -> Iterator[str]:
     """The least robust unit of all states, and saddles that were not found."""
     if summary.least_robust is not None:
-        barrier, where = summary.least_robust.barrier, summary.least_robust.pattern
-        yield f"least robust: unit {summary.least_robust.unit} in {where}, {barrier:.5g} mJ"
+        least = summary.least_robust
+        what = "units" if "," in least.unit else "unit"
+        yield f"least robust: {what} {least.unit} in {least.pattern}, {least.barrier:.5g} mJ"
     if summary.n_saddles_not_found:
         n = counted(summary.n_saddles_not_found, "barrier")
         yield f"{n} not found: no certified saddle parts the two states, though both exist"

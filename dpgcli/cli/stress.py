@@ -21,8 +21,8 @@ from dpgcli.cli.streams import put, say
 if TYPE_CHECKING:
     from dpgcli.api.stress import HardCases, StressResult
     from dpgcli.arrays import Columns
+    from dpgcli.hard_cases.outcomes import Outcome
     from dpgcli.hard_cases.table import FamilySummary
-    from dpgcli.hard_cases.verdicts import Outcome
     from dpgcli.mechanics.finger import Finger
 
 MISSED = "Missed, where node coordinates or the guess that was given end"
@@ -123,7 +123,8 @@ def _print_table(title: str, records: list[dict[str, str]]) -> None:
     """Print records of the same names under a title, if there are any."""
     left = ("subject", "family", "case", "formulation", "pattern", "verdict", "status", "units")
     if records:
-        texts = {name: [record[name] for record in records] for name in records[0]}
+        names = dict.fromkeys(name for record in records for name in record)
+        texts = {name: [record.get(name, "-") for record in records] for name in names}
         put(f"{title}\n")
         print_grid(texts, left=(*left, "reached_pattern"))
         put("")
@@ -131,6 +132,7 @@ def _print_table(title: str, records: list[dict[str, str]]) -> None:
 
 def _family(summary: "FamilySummary") -> dict[str, str]:
     counts = {verdict.value: str(n) for verdict, n in summary.verdicts.items()}
+    error = summary.true_threshold_error
     return {
         "family": summary.family,
         "formulation": summary.formulation,
@@ -142,6 +144,7 @@ def _family(summary: "FamilySummary") -> dict[str, str]:
         "condition": _rounded(summary.condition),
         "true_tip_error_mm": _rounded(summary.true_tip_error),
         "iterations": f"{summary.iterations:.0f}" if summary.iterations >= 0 else "-",
+        **({} if math.isnan(error) else {"threshold_error": _rounded(error)}),
     }
 
 

@@ -92,6 +92,17 @@ def slope_by(family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indi
     return np.where(cell >= 0, (1.0 - stiffness * by_hold) / by_load * scale, np.nan)
 
 
+def motion_by(
+    family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices
+) -> tuple[Array, Array]:
+    """How coordinates and load move per q of a cell, or per λ where none is followed."""
+    stiffness, scale, _ = of_cell(family, here, cell)
+    slope = slope_by(family, here, cell) / scale
+    along_cell = stiffness * here.by_hold + slope * here.along_load
+    is_held = cell >= 0
+    return np.where(is_held, along_cell, here.along_load), np.where(is_held, slope, 1.0)
+
+
 def of_cell(
     family: Family[Coordinates, LoadedLaw], here: Corrected, cell: Indices
 ) -> tuple[Array, Array, Array]:

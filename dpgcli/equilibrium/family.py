@@ -27,7 +27,11 @@ Law = TypeVar("Law", bound="LoadedLaw", covariant=True)
 
 
 class LoadedLaw(Protocol):
-    """The energy of a scalar under a load λ, (batch,): arrays (cell, batch)."""
+    """The energy of a scalar under a load λ, (batch,): arrays (…, cell, batch)."""
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether its force bends so little that no step of a path leads over a fold and back."""
 
     def at(self, load: Array) -> ScalarLaw:
         """The law under a load."""

@@ -18,7 +18,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
-from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, corrected, of_cell, slope_by
+from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, corrected, motion_by, slope_by
 from dpgcli.equilibrium.family import Family, LoadedLaw, along
 
 LARGEST_STEP = 0.1  # of a cell's scale
@@ -27,6 +27,8 @@ FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
+PLACES = 64  # on a step, at which laws from points are looked at,
+SMALLEST_GUARDED = 1e-3  # of the scale, if it is longer
 MAX_STEPS = 600
 
 Watch = Callable[[Indices, Array, Array], None]
@@ -202,22 +204,28 @@ def _one_step(
     trial = _tried(family, walk, step, end, towards, depth)
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
+    dip = _first_dip(family, walk, trial, towards)
+    is_over = trial.is_fine & ~is_beyond & (dip < 1.0)
     crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
-    is_event = trial.is_fine & ~is_beyond & (crossed < 0.0).any(axis=0)
-    accepted = trial.is_fine & ~is_beyond & ~is_event & (ending < 0)
+    is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
+    accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
     to_root = walk.slope / (walk.slope - slope)
-    shorter = np.where(is_beyond, CLOSER * to_root, np.where(is_event, first, SHRINKING)) * step
+    part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
+    shorter = np.where(is_beyond, CLOSER * to_root, part) * step
     meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
     is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, Outcome.FOLD, Outcome.FAILED)
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
+    event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
+    event, moved = _at_event(family, walk, trial, event_cell), accepted & landed
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
     if landed.any():
-        event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
+        walk.coordinates = np.where(moved, event.coordinates, walk.coordinates)
+        walk.load = np.where(moved, event.load, walk.load)
         walk.cell = np.where(landed, event_cell, walk.cell)
         ending[landed] = Outcome.EVENT
     ending[accepted & is_last] = Outcome.ARRIVED
@@ -271,6 +279,53 @@ def _move(
     walk.put(np.flatnonzero(which), new, which)
 
 
+def _first_dip(
+    family: Family[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, towards: Array
+) -> Array:
+    """The share of a step at which λ would first turn back, by the law alone; 1 where nowhere.
+
+    So that no step leads over a fold to where the path rises again. What else is stiff beside the
+    law is taken as it is here: K + R + ∂F/∂λ dλ/dq = 0.
+    """
+    if family.law.is_smooth:
+        return np.ones(len(towards))
+    place = np.maximum(walk.cell, 0), np.arange(len(towards))
+    scale = np.broadcast_to(family.scale, walk.values.shape)[place]
+    share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
+    way = trial.there.linear.measured.value - walk.values
+    between = walk.values + share * way
+    here, there = (family.law.at(load)(between).stiffness for load in (walk.load, trial.there.load))
+    stiffness = (here + share * (there - here))[:, *place]
+    rate = family.law.rate(between, walk.load)[:, *place]
+    slope = towards * walk.slope / (walk.sign * scale)
+    turns = (stiffness - stiffness[0] - rate[0] * slope) / -rate / slope <= 0.0
+    turns[0], turns[-1] = False, True
+    is_told = (walk.cell >= 0) & (np.abs(way[place]) > SMALLEST_GUARDED * scale)
+    return np.where(is_told, turns.argmax(axis=0) / (PLACES - 1), 1.0)
+
+
+class _Place(NamedTuple):
+    """Coordinates and loads."""
+
+    coordinates: Array
+    load: Array
+
+
+def _at_event(
+    family: Family[Coordinates, LoadedLaw], walk: _Walk, trial: _Trial, cell: Indices
+) -> _Place:
+    """Where the margins of cells vanish, by secants: near to the points that were tried."""
+    lanes = np.arange(len(cell))
+    there, margin, before = trial.there, trial.margin[cell, lanes], walk.margin[cell, lanes]
+    is_near = np.isfinite(before) & (before > 2.0 * np.abs(margin))
+    share = np.where(is_near, margin, 0.0) / np.where(is_near, before - margin, 1.0)
+    followed = np.maximum(trial.cell, 0), lanes
+    by_cell = (there.linear.measured.value - walk.values)[followed]
+    rest = share * np.where(trial.cell >= 0, by_cell, there.load - walk.load)
+    motion, by = motion_by(family, there, trial.cell)
+    return _Place(there.coordinates + motion * rest, there.load + by * rest)
+
+
 def _distance(slope: Array, last_slope: Array, last: Array) -> Array:
     """Steps to where the slope vanishes, by the secant through the last point and this one."""
     falls = last_slope > slope
@@ -296,11 +351,8 @@ def _turn(
 
     The cell that moves most; the one so far, unless another moves half as much again.
     """
-    stiffness, scale, _ = of_cell(family, here, cell)
-    slope = slope_by(family, here, cell) / scale  # dλ/dq of the cell so far
+    motion, by = motion_by(family, here, cell)
     is_held = cell >= 0
-    motion = np.where(is_held, stiffness * here.by_hold + slope * here.along_load, here.along_load)
-    by = np.where(is_held, slope, 1.0)  # dλ along that motion
     rows, measured = family.measure.rows, here.linear.measured
     rates = along(rows, measured, motion) / family.scale
     size = np.abs(rates)

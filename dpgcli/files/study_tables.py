@@ -14,9 +14,9 @@ from dpgcli.benchmark.bench import COLUMNS, Row, as_columns
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
+from dpgcli.hard_cases.outcomes import Outcome
 from dpgcli.hard_cases.table import STRESS_COLUMNS
 from dpgcli.hard_cases.table import rows as stress_rows
-from dpgcli.hard_cases.verdicts import Outcome
 
 
 def write_bench(path: Path, rows: Sequence[Row], spec_json: str, command: Sequence[str]) -> None:

@@ -114,6 +114,11 @@ def _with_names(families: Sequence[Family], only: Sequence[str]) -> Iterator[Fam
 def _cases(subject: str, family: Family, base: Finger) -> Iterator[Case]:
     for variant in family.variants(base):
         patterns = variant.patterns or few_patterns(variant.finger.n_units)
-        names = [n for n in FORMULATIONS if n == "chain" or not variant.finger.is_rigid]
+        names = [n for n in FORMULATIONS if n == "chain" or not _by_chain_alone(variant)]
         for pattern, formulation in product(patterns, names):
             yield Case(subject, family.name, variant, pattern, formulation)
+
+
+def _by_chain_alone(variant: Variant) -> bool:
+    """Whether bars do not give way, or there is pressure."""
+    return variant.finger.is_rigid or bool(variant.pressure)

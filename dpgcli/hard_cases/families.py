@@ -24,6 +24,10 @@ LONG_FINGER = 30  # units, from which on one pattern has to do: extended precisi
 FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
 WALL_RATIOS = (1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6)  # c_w k_b
+PRESSED_RATIOS = (1.0, 10.0, 1e2, 1e3, 1e4, 1e6, 1e8, 1e10, 1e12, 1e13, 1e14, 1e15)
+NEARLY_EQUAL = (1e-3, 3e-6, 1e-6, 1e-9)  # thresholds of two units, relative
+PRESSED_DISTANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)  # of α from its limit
+PRESSED_WALLS = (1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3)  # c_w k_b
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
 FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
     "straight": ((0.0, 0.0), "0"),
@@ -51,7 +55,9 @@ class Start:
 class Variant:
     """A finger of one design with the patterns to solve; none stand for `few_patterns`.
 
-    The solver gets lengths in another unit, with `scale` of these units in a mm.
+    The solver gets lengths in another unit, with `scale` of these units in a mm. With a sign
+    `pressure` the pressure on all domes goes that way, and what is asked for is where the first of
+    them loses its place.
     """
 
     label: str
@@ -59,6 +65,7 @@ class Variant:
     patterns: tuple[str, ...] = ()
     start: Start = Start()
     scale: float = 1.0
+    pressure: int = 0
 
 
 class Family(NamedTuple):
@@ -295,6 +302,54 @@ def _mirror(base: Finger) -> Iterator[Variant]:
         yield from _both(f"from {name}", unit, patterns=(pattern,), start=Start(corners=corners))
 
 
+def _pressure(base: Finger) -> Iterator[Variant]:
+    """Thresholds of pressure that rises or falls on all units at once."""
+    unit = base.with_units([0])
+    for n_units in (1, N_GRADED):
+        finger = _with_strokes(unit, np.linspace(0.9, 1.15, n_units))
+        for ratio in PRESSED_RATIOS[:: 1 if n_units == 1 else 3]:
+            label = f"{n_units} unit{'s' * (n_units > 1)}, k_L/k_b = {ratio:g}"
+            yield from _driven(label, _with_bars(finger, ratio))
+        yield from _driven(f"{n_units} unit{'s' * (n_units > 1)}, k_L = ∞", rigid(finger))
+    for apart, (bars, finger) in product(NEARLY_EQUAL, _stiff_and_rigid(unit).items()):
+        factors = np.array([1.0, 1.0 + apart])
+        pair = changed(
+            repeated(finger, 2),
+            bistable_stiffness=factors * finger.bistable_stiffness[0],
+            hinge_stiffness=factors * finger.hinge_stiffness[0],
+        )
+        yield from _driven(f"thresholds {apart:g} apart, {bars}", pair, alternating=False)
+    fold = float(limits(unit).force_linearity[0])
+    for distance, (bars, finger) in product(PRESSED_DISTANCES, _stiff_and_rigid(unit).items()):
+        near = changed(finger, force_linearity=fold * (1.0 - distance))
+        yield from _driven(f"α at fold − {distance:g}, {bars}", near)
+    for linearity in (0.12, 0.2, 0.3, 0.35, 0.5):
+        yield from _driven(f"α = {linearity:g}", changed(unit, force_linearity=linearity))
+    softness = 1.0 / float(unit.bistable_stiffness.min())
+    for ratio, n_units in product(PRESSED_WALLS, (1, 2)):
+        finger = _with_strokes(unit, np.linspace(1.0, 1.1, n_units))
+        walled = changed(finger, wall_compliance=ratio * softness)
+        label = f"{n_units} unit{'s' * (n_units > 1)}, c_w k_b = {ratio:g}"
+        yield from _driven(label, walled, alternating=False)
+
+
+def _driven(label: str, finger: Finger, *, alternating: bool = True) -> Iterator[Variant]:
+    """The finger under pressure that rises or falls, from patterns that it may change."""
+    ends = few_patterns(finger.n_units, with_ground=True)
+    inverted, ground, *others = ends[0], ends[-1], *ends[1:-1]
+    for words, sign, first in (("rises", 1, ground), ("falls", -1, inverted)):
+        patterns = (first, *others) if alternating else (first,)
+        yield Variant(f"{label}, pressure {words}", finger, patterns, pressure=sign)
+
+
+def _with_strokes(unit: Finger, factors: Array) -> Finger:
+    return changed(repeated(unit, len(factors)), stroke=factors * unit.stroke[0])
+
+
+def _stiff_and_rigid(unit: Finger) -> dict[str, Finger]:
+    return {"k_L/k_b = 1e3": _with_bars(unit, 1e3), "k_L = ∞": rigid(unit)}
+
+
 PATTERNS = Family("patterns", _patterns)  # states of the finger as it is given
 FAMILIES = (
     Family("stiffness", _stiffness),  # k_L/k_b from 1 to 1e15, and infinite
@@ -309,5 +364,6 @@ FAMILIES = (
     Family("fold", _fold),  # α, k_θ and d at the loss of bistability, to 1e-12 of it
     Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
     Family("walls", _walls),  # c_w k_b from 1e-9 to 1e6, of all units or one
+    Family("pressure", _pressure),  # thresholds of pressure, at the ends of what there is
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Columns
-from dpgcli.hard_cases.verdicts import Outcome, Verdict
+from dpgcli.hard_cases.outcomes import Outcome, Verdict
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 
@@ -33,6 +33,7 @@ STRESS_COLUMNS = (
     _column("true_tip_error_mm", "mm", "distance from the tip in extended precision"),
     _column("true_angle_error_rad", "rad", "difference from the tip angle in extended precision"),
     _column("iterations", "", "steps of Newton's method", Kind.COUNT),
+    _column("true_threshold_error", "", "relative error of a threshold pressure"),
 )
 
 
@@ -57,6 +58,7 @@ def rows(outcomes: Sequence[Outcome]) -> Columns:
         "true_tip_error_mm": np.array([outcome.true_tip_error for outcome in outcomes]),
         "true_angle_error_rad": np.array([outcome.true_angle_error for outcome in outcomes]),
         "iterations": np.array([answer.iterations for answer in answers]),
+        "true_threshold_error": np.array([outcome.true_threshold_error for outcome in outcomes]),
     }
 
 
@@ -65,7 +67,7 @@ class FamilySummary:
     """Counts by verdict of one family and formulation, and the worst of its right states.
 
     Residual in N, true tip error in mm; `residual_over_floor` is of states with an inverted
-    unit, since a straight finger rounds nothing. All five are NaN where nothing is right.
+    unit, since a straight finger rounds nothing. Each is NaN where no right answer has one.
     """
 
     subject: str
@@ -79,6 +81,7 @@ class FamilySummary:
     condition: float
     true_tip_error: float
     iterations: float
+    true_threshold_error: float
 
 
 def summarized(outcomes: Iterable[Outcome]) -> list[FamilySummary]:
@@ -104,8 +107,9 @@ def _family_summary(names: tuple[str, str, str], outcomes: list[Outcome]) -> Fam
         condition=_worst(outcome.answer.condition for outcome in found),
         true_tip_error=_worst(outcome.true_tip_error for outcome in found),
         iterations=_worst(outcome.answer.iterations for outcome in found),
+        true_threshold_error=_worst(outcome.true_threshold_error for outcome in found),
     )
 
 
 def _worst(values: Iterable[float]) -> float:
-    return max(values, default=np.nan)
+    return max((value for value in values if not np.isnan(value)), default=np.nan)

@@ -5,13 +5,14 @@ and, where it called none stable, from the reference's own start too.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import replace
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array
+from dpgcli.hard_cases import thresholds
 from dpgcli.hard_cases.cases import Case
+from dpgcli.hard_cases.outcomes import Answer, Outcome, Verdict
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
@@ -32,68 +33,6 @@ MARGINAL_EIGENVALUE = (
 LARGEST_CONDITION = 1.0 / np.finfo(float).eps  # what doubles can tell from infinity
 
 
-class Verdict(StrEnum):
-    """Assessment of the solver's answer to a case by extended precision.
-
-    - right: called stable, and it is, with an error within the stated one
-    - recognized: a minimum that is not the pattern's, and not called stable
-    - no such state: not called stable, and extended precision finds no such state either
-    - marginal: refused as marginal; it is a minimum, but its curvature nearly vanishes
-    - missed: not called stable, though extended precision finds the state
-    - overconfident: called stable, and it is, but its error exceeds the stated one
-    - wrong: called stable, but it is not
-    """
-
-    RIGHT = "right"
-    RECOGNIZED = "recognized"
-    NO_SUCH_STATE = "no such state"
-    MARGINAL = "marginal"
-    MISSED = "missed"
-    OVERCONFIDENT = "overconfident"
-    WRONG = "wrong"
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The solver's answer to a case, with lengths in mm.
-
-    `nodes` (4 n, 1) in mm and `pose` (3,), tip x, y (mm) and angle (rad), are those at the end of
-    the search, whatever its status; `tip_error` (mm) and `angle_error` (rad) are the errors that
-    the solver states; `residual` and `residual_floor` in N.
-    """
-
-    status: Status
-    reached: Flags
-    nodes: Array
-    pose: Array
-    tip_error: float
-    angle_error: float
-    residual: float
-    residual_floor: float
-    condition: float
-    iterations: int
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """An answer with its verdict and its true errors (mm, rad), NaN without a true state."""
-
-    case: Case
-    answer: Answer
-    verdict: Verdict
-    true_tip_error: float
-    true_angle_error: float
-
-    @property
-    def is_failure(self) -> bool:
-        """Whether the command fails; a missed state counts for the chain's own guess only."""
-        is_default = self.case.formulation == "chain" and self.case.has_own_guess
-        return self.verdict in _ALWAYS_FAIL or (self.verdict is Verdict.MISSED and is_default)
-
-
-_ALWAYS_FAIL = (Verdict.WRONG, Verdict.OVERCONFIDENT)
-
-
 def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
     """Solve cases and judge the answers, one at a time; needs mpmath.
 
@@ -108,6 +47,8 @@ def stress(cases: Iterable[Case]) -> Iterator[Outcome]:
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of mechanisms
 def answered(case: Case) -> Answer:
     """Solve a case in its own unit of length; the answer is in mm."""
+    if case.variant.pressure:
+        return thresholds.answered(case)
     scale = case.variant.scale
     units = UnitSolutions.of(scaled(case.variant.finger, scale))
     settled = _settled(case, units)
@@ -191,6 +132,8 @@ def judged(case: Case, answer: Answer) -> Outcome:
     """The answer's verdict and true errors by extended precision."""
     if answer.status != Status.STABLE:
         return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)
+    if case.variant.pressure:
+        return thresholds.judged(case, answer)
     truth = _next_to(case, answer)
     off = np.abs(truth.pose[:, 0] - answer.pose)
     tip_error, angle_error = float(np.hypot(off[0], off[1])), float(off[2])

@@ -104,11 +104,11 @@ def linear(stiffness: "mpf", x: "mpf") -> Response:
 
 
 def bistable(unit: Unit, x: "mpf") -> Response:
-    """E = ½ k_b x² [1 + β(u² − 2u)] with u = x/d and β = 1−α."""
+    """E = ½ k_b x² [1 + β(u² − 2u)] − P x with u = x/d, β = 1−α and a constant push P."""
     u, softening, stiffness = x / unit.stroke, 1 - unit.linearity, unit.bistable
     return Response(
-        stiffness * x * x * (1 + softening * (u * u - 2 * u)) / 2,
-        stiffness * x * (1 + softening * (2 * u * u - 3 * u)),
+        stiffness * x * x * (1 + softening * (u * u - 2 * u)) / 2 - unit.push * x,
+        stiffness * x * (1 + softening * (2 * u * u - 3 * u)) - unit.push,
         stiffness * (1 + 6 * softening * (u * u - u)),
     )
 

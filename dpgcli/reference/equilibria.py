@@ -24,6 +24,7 @@ from dpgcli.reference.energy import (
     measured,
 )
 from dpgcli.reference.units import (
+    Unit,
     extended_units,
     inverted_rest,
     spring_barrier,
@@ -67,14 +68,22 @@ class ExtendedStates:
 
 
 def extended_states(
-    finger: Finger, inverted: Flags, nodes: Array | None = None, digits: int = 50
+    finger: Finger,
+    inverted: Flags,
+    nodes: Array | None = None,
+    digits: int = 50,
+    *,
+    walls: Array | None = None,
+    pushes: Array | None = None,
 ) -> ExtendedStates:
     """Find the equilibrium of each pattern, shape (unit, state), by Newton's method.
 
     The search starts at `nodes`, (4 n, state) in mm, or where each inverted unit rests in the
     second well that it has with rigid bars. It has converged when the next step is below
     10^−(digits/2 + 5) of the finger's length; as many digits as the bars are stiffer than the
-    springs are carried on top. Raises ValueError for a batch of fingers or a wrong shape.
+    springs are carried on top. Walls begin at `walls`, (unit, state) in mm, or where they are at
+    rest; `pushes`, (unit, state) in N, are those of pressures on the domes, none by default.
+    Raises ValueError for a batch of fingers or a wrong shape.
 
     >>> from dpgcli.mechanics.finger import uniform_finger
     >>> unit = uniform_finger(
@@ -90,31 +99,52 @@ def extended_states(
         raise ValueError(f"{finger.n_designs} designs, not one")
     if inverted.ndim != 2 or len(inverted) != n or inverted.shape[1] == 0:
         raise ValueError(f"inverted has shape {inverted.shape}, not ({n}, one or more states)")
-    if nodes is not None and nodes.shape != (4 * n, inverted.shape[1]):
-        raise ValueError(f"nodes has shape {nodes.shape}, not {(4 * n, inverted.shape[1])}")
-    lost = _digits_lost(finger)
+    sizes = {"nodes": (nodes, 4 * n), "walls": (walls, n), "pushes": (pushes, n)}
+    for name, (values, size) in sizes.items():
+        if values is not None and values.shape != (size, inverted.shape[1]):
+            raise ValueError(f"{name} has shape {values.shape}, not {(size, inverted.shape[1])}")
+    lost = digits_lost(finger)
     with mpmath.workdps(digits + lost):
         units = extended_units(finger)
         rest_of = {unit: inverted_rest(unit) for unit in set(units)}
         rests = [rest_of[unit] for unit in units]
-        frame = RigidBars(units) if finger.is_rigid else ElasticBars(units)
         tolerance = mpmath.mpf(10) ** -(digits // 2 + 5)
         smallest = tolerance / mpmath.mpf(10) ** lost
         rows = []
         for state, pattern in enumerate(inverted.T):
             opened = [(m * int(on), w * int(on)) for (m, w), on in zip(rests, pattern, strict=True)]
             start = RigidBars(units).nodes([angle for angle, _ in opened for _ in "ab"])
-            bars: Energy = frame
-            if finger.has_walls:
-                bars = YieldingWalls(frame, [wall for _, wall in opened])
+            push = None if pushes is None else pushes[:, state]
+            begin = [w for _, w in opened] if walls is None else extended(walls[:, state])
+            bars = energy_of(finger, pushed(units, push), begin)
             if nodes is not None:
-                start = [mpmath.mpf(value) for value in nodes[:, state].tolist()]
+                start = extended(nodes[:, state])
             found = _minimum(bars, start, tolerance, smallest)
             rows.append(_missing(n) if found is None else _row(found, pattern))
     return ExtendedStates(*(np.stack(column, axis=-1) for column in zip(*rows, strict=True)))
 
 
-def _digits_lost(finger: Finger) -> int:
+def pushed(units: list[Unit], push: Array | None) -> list[Unit]:
+    """Units whose domes are pushed, (unit,) in N."""
+    if push is None:
+        return units
+    return [unit._replace(push=p) for unit, p in zip(units, extended(push), strict=True)]
+
+
+def energy_of(finger: Finger, units: list[Unit], walls: list["mpf"]) -> Energy:
+    """The energy of a finger's units; where walls give way, the search begins at `walls`, mm."""
+    frame = RigidBars(units) if finger.is_rigid else ElasticBars(units)
+    return YieldingWalls(frame, walls) if finger.has_walls else frame
+
+
+def extended(values: Array) -> list["mpf"]:
+    """Doubles, taken as exact."""
+    from mpmath import mpf
+
+    return [mpf(value) for value in values.tolist()]
+
+
+def digits_lost(finger: Finger) -> int:
     """Decimal digits that stiff bars cost: the ratio of their stiffness to the springs', log10."""
     if finger.is_rigid:
         return 0
@@ -171,13 +201,26 @@ def _forward(factorization: Factorization, right_hand_side: list["mpf"]) -> list
 
 def _downhill(factorization: Factorization, gradient: list["mpf"]) -> list["mpf"]:
     """The step −(L|D|Lᵀ)⁻¹ g: Newton's if the Hessian is positive definite, downhill if not."""
-    step = _forward(factorization, [-value for value in gradient])
-    step = [value / abs(d) for value, d in zip(step, factorization.pivots, strict=True)]
-    for row in range(len(step) - 1, 0, -1):
+    y = _forward(factorization, [-value for value in gradient])
+    y = [value / abs(d) for value, d in zip(y, factorization.pivots, strict=True)]
+    return _backward(factorization, y)
+
+
+def solved(factorization: Factorization, right_hand_side: list["mpf"]) -> list["mpf"]:
+    """(L D Lᵀ)⁻¹ b."""
+    y = _forward(factorization, right_hand_side)
+    y = [value / d for value, d in zip(y, factorization.pivots, strict=True)]
+    return _backward(factorization, y)
+
+
+def _backward(factorization: Factorization, y: list["mpf"]) -> list["mpf"]:
+    """L⁻ᵀ y."""
+    x = list(y)
+    for row in range(len(x) - 1, 0, -1):
         entries = factorization.below[row]
         for column, entry in enumerate(entries, row - len(entries)):
-            step[column] -= entry * step[row]
-    return step
+            x[column] -= entry * x[row]
+    return x
 
 
 class Stationary(NamedTuple):
@@ -226,7 +269,7 @@ def _further(
     fraction = 1 / max(1, bars.strokes_opened(here, step) / LARGEST_OPENING)
     slope = SUFFICIENT_DECREASE * fdot(step, expansion.gradient)
     springs = sum(unit.bistable * unit.stroke**2 for unit in bars.units)
-    allowed = expansion.energy + ROUNDING * eps * (expansion.energy + springs)
+    allowed = expansion.energy + ROUNDING * eps * (abs(expansion.energy) + springs)
     for _ in range(MOST_HALVINGS):
         trial = bars.moved(here, [fraction * part for part in step])
         there = bars.at(trial)
@@ -250,9 +293,9 @@ def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     is_ahead = [cross(cell.top, strut) > 0 for cell in shape for strut in (cell.near, cell.far)]
     is_upright = max(map(abs, angles)) < np.pi / 2
     return (
-        _long_doubles([nodes[-4], nodes[-3], -sum(angles)]),
-        _long_doubles([expansion.energy])[0],
-        _long_doubles(openings),
+        long_doubles([nodes[-4], nodes[-3], -sum(angles)]),
+        long_doubles([expansion.energy])[0],
+        long_doubles(openings),
         *_spectrum(found),
         factorization.is_positive,
         sides == pattern.tolist()
@@ -284,7 +327,8 @@ def _missing(n_units: int) -> tuple[Any, ...]:
     return np.full(3, nan), nan, np.full(n_units, nan), np.nan, np.nan, False, False
 
 
-def _long_doubles(values: Iterable["mpf"]) -> ExtendedArray:
+def long_doubles(values: Iterable["mpf"]) -> ExtendedArray:
+    """Numbers as long doubles."""
     from mpmath import nstr
 
     return np.array([np.longdouble(nstr(value, PRINTED_DIGITS)) for value in values])

@@ -15,7 +15,10 @@ BISECTIONS = 60
 
 
 class Unit(NamedTuple):
-    """One unit's L, H and d (mm), k_b (N/mm), α, k_θ (N mm/rad), k_L (N/mm) and c_w (mm/N)."""
+    """One unit's L, H and d (mm), k_b (N/mm), α, k_θ (N mm/rad), k_L (N/mm) and c_w (mm/N).
+
+    `push` (N) is that of a pressure on its dome, the same wherever the dome is.
+    """
 
     length: "mpf"
     height: "mpf"
@@ -25,6 +28,7 @@ class Unit(NamedTuple):
     hinge: "mpf"
     bar: "mpf"
     wall: "mpf" = 0
+    push: "mpf" = 0
 
 
 def extended_units(finger: Finger) -> list[Unit]:
@@ -32,7 +36,7 @@ def extended_units(finger: Finger) -> list[Unit]:
     from mpmath import mpf
 
     parameters = finger.arrays()
-    arrays = [*list(parameters.values())[: len(Unit._fields) - 1], parameters["wall_compliance"]]
+    arrays = [*list(parameters.values())[: len(Unit._fields) - 2], parameters["wall_compliance"]]
     columns = (np.broadcast_to(v, (finger.n_units, 1))[:, 0] for v in arrays)
     return [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags, Indices, distinct
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Settled
+from dpgcli.states.flips import Flips
 from dpgcli.states.patterns import codes_of, inverted_units
-from dpgcli.states.saddles import Flips, SaddleStatus, is_state, saddles
+from dpgcli.states.saddles import SaddleStatus, is_state, saddles
 from dpgcli.states.units import UnitSolutions
 
 TIE = 1e-6  # of a barrier: those as near are not told apart

@@ -10,8 +10,9 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.barriers import Barriers, barriers
 from dpgcli.states.certify import Settled
+from dpgcli.states.flips import Flips, held_path
 from dpgcli.states.patterns import inverted_units
-from dpgcli.states.saddles import Flips, Saddles, held_path, saddles
+from dpgcli.states.saddles import Saddles, saddles
 from dpgcli.states.scan import pulls
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions

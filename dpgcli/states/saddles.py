@@ -12,27 +12,20 @@ push its neighbor on to where the finger's pull and its push balance (our deriva
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.banded import backward
-from dpgcli.equilibrium.family import Holding
-from dpgcli.equilibrium.newton import Equilibrium, minimize, stationary
-from dpgcli.mechanics.coordinates import FingerPotential
+from dpgcli.equilibrium.newton import Equilibrium, stationary
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled, Status
+from dpgcli.states.flips import Flips, held, held_path
 from dpgcli.states.guess import geometric_guess
 from dpgcli.states.rigid_unit import tangent_of
 from dpgcli.states.scan import pulls
-from dpgcli.states.settle import lanes_at_once, settle, settle_from
-from dpgcli.states.units import UnitSolutions
-
-Value = TypeVar("Value", bound=np.generic)
+from dpgcli.states.settle import lanes_at_once
 
 NEAR = 1e-3  # of the step cap: two searches that end as near have found the same state
 PLACES = 1024  # of a dome's travel before its top, at which it is looked at for ripples
@@ -52,66 +45,6 @@ class SaddleStatus(IntEnum):
     def text(self) -> str:
         """The word in tables, such as `not_found`."""
         return self.name.lower()
-
-
-@dataclass(frozen=True)
-class Flips:
-    """Units that flip, one in each lane: in the pattern `lower`, (unit, lane), it is not inverted.
-
-    `units` have one design, or one for each lane; `tolerance` is over the forces in play.
-    """
-
-    units: UnitSolutions
-    formulate: Formulate
-    lower: Flags
-    unit: Indices
-    tolerance: float
-
-    @cached_property
-    def is_flipping(self) -> Flags:
-        """Which unit flips, (unit, lane)."""
-        return np.asarray(np.arange(len(self.lower))[:, None] == self.unit)
-
-    @cached_property
-    def upper(self) -> Flags:
-        """The patterns with the unit inverted."""
-        return np.asarray(self.lower | self.is_flipping)
-
-    @cached_property
-    def potential(self) -> FingerPotential:
-        """The energy with the dome that flips in touch, or about to be."""
-        return self.formulate(self.units.finger.with_domes(self.upper))
-
-    def of_unit(self, values: NDArray[Value]) -> NDArray[Value]:
-        """Values by unit, (1 or unit, 1 or lane), of the unit that flips, (lane,)."""
-        return np.asarray(np.broadcast_to(values, self.lower.shape)[self.unit, self._lanes])
-
-    @property
-    def _lanes(self) -> Indices:
-        return np.arange(len(self.unit))
-
-    def extension(self, coordinates: Array) -> Array:
-        """Of the spring of the dome that flips, mm, (lane,)."""
-        return self.of_unit(self.potential.coordinates.springs(coordinates).extension)
-
-    def own_energy(self, extension: Array) -> Array:
-        """Of the dome that flips, by the extension of its spring, attached to nothing: mJ."""
-        finger = self.units.finger
-        return self.of_unit(finger.law.pulling.response(extension, finger.domes).energy)
-
-    def take(self, index: Indices) -> "Flips":
-        """Some of them; one may repeat."""
-        units = self.units.take_lanes(index)
-        return replace(self, units=units, lower=self.lower[:, index], unit=self.unit[index])
-
-    def settled(self, inverted: Flags) -> Settled:
-        """The states of patterns, those before or after the flip."""
-        return settle(self.units, self.formulate, inverted, self.tolerance)
-
-    def settled_from(self, inverted: Flags, start: Array, step: float = 1.0) -> Settled:
-        """The states that lie downhill from coordinates, with the dome that flips about to act."""
-        way = self.units, self.potential, inverted, start, self.tolerance
-        return settle_from(*way, largest_step=step)
 
 
 @dataclass(frozen=True)
@@ -148,6 +81,7 @@ def saddles(flips: Flips) -> Saddles:
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
+    >>> from dpgcli.states.units import UnitSolutions
     >>> units = UnitSolutions.of(uniform_finger(1, **STUDY))
     >>> flip = Flips(units, chain_potential, np.array([[False]]), np.array([0]), 1e-12)
     >>> print(saddles(flip).energy.round(8))  # mJ
@@ -229,21 +163,6 @@ def _at_barrier(flips: Flips) -> Array:
     return held(flips, start, flips.of_unit(barrier))
 
 
-def held(flips: Flips, start: Array, target: Array) -> Array:
-    """Coordinates, (size, lane), at the least energy with each dome that flips held by a spring.
-
-    The spring pulls its extension towards `target` (mm); where it comes to rest beside that is a
-    minimum over all else as well.
-    """
-    stiffness = np.where(flips.is_flipping, flips.units.holding_stiffness, 0.0)
-    terms = (
-        replace(term, law=Holding(term.law, stiffness, target)) if term.kind == "bistable" else term
-        for term in flips.potential.terms
-    )
-    potential = replace(flips.potential, terms=tuple(terms))
-    return minimize(potential, start, flips.tolerance).coordinates
-
-
 def _certified(flips: Flips, start: Array) -> Saddles:
     """The saddles next to some coordinates, if they part the two states."""
     there = stationary(flips.potential, start, flips.tolerance)
@@ -303,36 +222,3 @@ def _searched_again(flips: Flips, found: Saddles) -> Saddles:
         start = path.coordinates[:, *highest]
         found.put(lanes, _certified(few, start))
     return found
-
-
-@dataclass(frozen=True)
-class HeldPath:
-    """Places between two shapes, at each of which the dome that flips is held.
-
-    Extensions of its spring (mm) and energies (mJ), (place, lane); coordinates (size, place, lane).
-    """
-
-    extension: Array
-    energy: Array
-    coordinates: Array
-
-
-def held_path(flips: Flips, first: Array, last: Array, shares: Array) -> HeldPath:
-    """The least energies with the dome held at shares, (place,), of the way between two shapes.
-
-    A dome that only pushes is in touch all the way to its own well, and stays in that.
-    """
-    n = len(flips.unit)
-    many = flips.take(np.tile(np.arange(n), len(shares)))
-    share = np.repeat(shares, n)
-    start, end = (np.tile(coordinates, len(shares)) for coordinates in (first, last))
-    target = (1.0 - share) * many.extension(start) + share * many.extension(end)
-    there = held(many, (1.0 - share) * start + share * end, target)
-    extension, energy = many.extension(there), many.potential.evaluate(there).energy
-    finger = many.units.finger
-    if not pulls(finger):
-        acting = finger.law.response(extension, finger.domes).energy
-        extension = np.minimum(extension, many.of_unit(finger.law.touching(finger.domes).highest))
-        energy = energy - many.of_unit(acting) + many.own_energy(extension)
-    shape = (len(shares), n)
-    return HeldPath(extension.reshape(shape), energy.reshape(shape), there.reshape(-1, *shape))

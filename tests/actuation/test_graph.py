@@ -141,10 +141,11 @@ def test_designs_in_one_batch_do_not_feel_each_other(
     strokes = [np.array([[3.5], [3.4], [3.7]]), np.array([[4.5], [3.5], [4.0]])]
     lines = np.array([0, 0, 1])
     own = [pressed(study(3).changed(stroke=stroke)) for stroke in strokes]
-    alone = [reachable(one, lines, np.array([0.4])) for one in own]
+    reach = np.array([0.4, 0.5])
+    alone = [reachable(one, lines, reach[k : k + 1]) for k, one in enumerate(own)]
     together = pressed(study(3).changed(stroke=both(*strokes)))
     monkeypatch.setattr(directions, "lanes_at_once", lambda n_units: 5)
-    found = reachable(together, lines, np.array([0.4, 0.4]))
+    found = reachable(together, lines, reach)
     for design in (0, 1):
         assert same(of_design(found, design), alone[design])
 

@@ -18,6 +18,7 @@ from dpgcli.files.prediction import write_states
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
+from dpgcli.states.barriers import barriers
 from dpgcli.states.certify import Status, certify
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.predict import predict
@@ -99,3 +100,13 @@ def test_floor_of_that_map_pyarrow_alone(benchmark: Any, tmp_path: Path) -> None
         warmup_rounds=1,
     )
     note_rate(benchmark, 2**20)
+
+
+def test_all_barriers_of_five_units(benchmark: Any) -> None:
+    """160 barriers over 80 saddles, each certified."""
+    units = UnitSolutions.of(uniform_finger(5, **REFERENCE))
+    inverted = inverted_units(np.arange(32, dtype=np.uint64), 5)
+    states = settle(units, chain_potential, inverted, 1e-12)
+    found = benchmark(barriers, units, chain_potential, states, 1e-12)
+    assert np.isfinite(found.energy).all()
+    note_rate(benchmark, 32)

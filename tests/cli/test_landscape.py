@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -215,8 +216,26 @@ def test_the_summary_names_the_least_robust_unit(call: Any, graded: str) -> None
     said = call("predict", graded, "--columns", "barriers").stderr
     assert "least robust: unit 3 in 00100, 1.6769 mJ" in said  # the first of those that tie
     assert "not found" not in said
+    rest = call("predict", graded, "--columns", "barriers", "--pattern", "00000").stderr
+    assert "least robust: units 1,2,3 in 00000, 6.0382 mJ" in rest
     without = call("predict", graded).stderr
     assert "least robust" not in without
+
+
+def test_barriers_that_are_not_found_are_counted(
+    call: Any, graded: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if no saddle led to both of its states."""
+    monkeypatch.setattr(
+        "dpgcli.states.saddles._are_same", lambda ends, _: np.zeros(len(ends.status), bool)
+    )
+    result = call("predict", graded, "--columns", "barriers", "--pattern", "1000?")
+    assert result.exit_code == ExitCode.DONE
+    assert "10 barriers not found: no certified saddle parts the two states" in result.stderr
+    assert "least robust" not in result.stderr
+    way = call("landscape", graded, *WAY)
+    assert way.exit_code == ExitCode.USAGE
+    assert "no flips of single units lead there from 00000; 160 barriers not found" in way.stderr
 
 
 def test_a_state_without_neighbors_has_empty_barriers(call: Any, folder: Path, study: Any) -> None:

@@ -15,8 +15,8 @@ import pytest
 from dpgcli.cli.exits import ExitCode
 from dpgcli.hard_cases import verdicts
 from dpgcli.hard_cases.cases import Case
+from dpgcli.hard_cases.outcomes import Answer, Outcome, Verdict
 from dpgcli.hard_cases.table import STRESS_COLUMNS
-from dpgcli.hard_cases.verdicts import Answer, Outcome, Verdict
 
 Call = Callable[..., Any]
 QUICK = ("--only", "mirror")

@@ -30,7 +30,7 @@ KILLS = (
     "S.submit = submit"
 )
 FAILS = """
-from dpgcli.hard_cases.verdicts import Outcome
+from dpgcli.hard_cases.outcomes import Outcome
 Outcome.is_failure = property(lambda self: True)
 """
 BREAKS = (

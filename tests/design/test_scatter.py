@@ -104,11 +104,20 @@ def test_no_scatter_is_the_design_itself(design: Design) -> None:
     )
 
 
-@pytest.mark.parametrize("key", ["dome_height_mm", "stroke_mm"])
-def test_draws_that_make_no_finger_are_wrong(design: Design, key: str) -> None:
-    """Domes that never reach their neighbors, or of no height at all."""
+@pytest.mark.parametrize(
+    ("key", "least"), [("dome_height_mm", 3.0), ("unit_separation_mm", 0.0), ("stroke_mm", 0.0)]
+)
+def test_draws_that_make_no_finger_are_wrong(design: Design, key: str, least: float) -> None:
+    """Domes that never reach their neighbors, and sizes below zero."""
     draws = scattered(design, {key: Tolerance(2.5, False)}, N, 1)
     n_wrong = int(draws.are_wrong.sum())
+    stream = np.random.default_rng([1, OF_UNITS.index(key)])
+    nominal = {"dome_height_mm": [6.5, 6.5, 6.5, 7.5, 7.5], "stroke_mm": [3.5, 3.5, 3.5, 4.5, 4.5]}
+    drawn = np.array(nominal.get(key, [3.0] * 5)) + 2.5 * stream.standard_normal((N, 5))
+    is_wrong = (drawn <= least).any(axis=1)
+    if key == "unit_separation_mm":
+        is_wrong |= (drawn >= np.array(nominal["dome_height_mm"])).any(axis=1)
+    assert np.array_equal(draws.are_wrong, is_wrong)
     assert 0.1 * N < n_wrong < 0.9 * N
     ((places, _, finger),) = draws.batches()
     assert len(places) == N - n_wrong

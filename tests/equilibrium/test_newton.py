@@ -8,9 +8,9 @@ from numpy.testing import assert_array_equal
 
 from dpgcli.arrays import Array
 from dpgcli.equilibrium.banded import factorize
-from dpgcli.equilibrium.newton import Equilibrium, minimize
+from dpgcli.equilibrium.newton import Equilibrium, minimize, stationary
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 
 N_UNITS = 4
@@ -140,3 +140,24 @@ def test_energy_never_rises_on_the_way(reference_finger: Reference, formulate: F
         ]
     )
     assert (np.diff(energies, axis=0) <= 1e-11).all()
+
+
+def test_undamped_steps_reach_the_saddle_and_the_minimum_next_to_them() -> None:
+    """One unit between rigid bars: its top at x = 2.0041742418 mm, its well at 3.2450151985."""
+    potential = chain_potential(uniform_finger(1, **STUDY))
+    corners = np.arcsin(np.array([2.0041742418, 3.2450151985]) / 21.5)
+    away = np.array([[0.01, -0.004], [0.002, 0.003]])
+    there = stationary(potential, corners + away, 1e-12)
+    np.testing.assert_allclose(there.coordinates, np.stack((corners, corners)), atol=1e-10)
+    assert there.factorization.n_negative.tolist() == [1, 0]
+    assert (there.relative_residual <= 1e-12).all()
+    assert (there.iterations <= 8).all()  # quadratic
+    alone = [stationary(potential, (corners + away)[:, [lane]], 1e-12) for lane in (0, 1)]
+    assert [float(one.energy[0]) for one in alone] == there.energy.tolist()
+
+
+def test_undamped_steps_that_are_too_few_say_so() -> None:
+    potential = chain_potential(uniform_finger(1, **STUDY))
+    there = stationary(potential, np.array([[0.11], [0.08]]), 1e-12, max_iterations=1)
+    assert there.relative_residual[0] > 1e-6
+    assert there.iterations.tolist() == [1]

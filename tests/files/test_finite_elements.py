@@ -135,6 +135,64 @@ def _flat(section: Any) -> dict[str, float]:
     return {"": section} if isinstance(section, int | float) else {}
 
 
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_a_scaled_copy_is_what_the_manual_says(scale: float) -> None:
+    """From geometry its dome keeps the base of 16 mm; given by the lattice it is similar."""
+    given = {
+        f"finger.geometry.{key}": round(scale * value, 9)
+        for key, value in (
+            ("dome_height_mm", 6.5),
+            ("dome_thickness_mm", 0.75),
+            ("chamber_length_mm", 9.0),
+            ("channel_width_mm", 10.0),
+            ("limiting_layer_thickness_mm", 1.5),
+            ("unit_separation_mm", 3.0),
+            ("chamber_width_mm", 20.0),
+        )
+    }
+    by_geometry = [WORD, "finger.geometry.unit_cell_mm=null"]
+    by_geometry += [f"{key}={value}" for key, value in given.items()]
+    finger, copy = finger_of(WORD), finger_of(*by_geometry)
+    held = copy.bistable_stiffness * copy.stroke**2 / (finger.bistable_stiffness * finger.stroke**2)
+    assert held == pytest.approx(scale**3 * scale**1.55, rel=1e-2)
+    values = {
+        "segment_length_mm": 13.5 * scale,
+        "segment_height_mm": 10.75 * scale,
+        "stroke_mm": 3.5 * scale,
+        "bistable_stiffness_N_per_mm": 12.84 * scale,
+        "force_linearity": 0.043,
+        "hinge_stiffness_N_mm_per_rad": 24.2 * scale**3,
+    }
+    for key, walls in (("published", 0.0), ("push_only", 0.5)):
+        rows = [
+            dpg.predict(
+                {"finger": {"units": 2, "law": key, "lattice": lattice, **rest}}
+            ).to_pandas()
+            for lattice, rest in (
+                (values, similar(scale, walls)),
+                ({k: v / scale ** POWERS[k] for k, v in values.items()}, similar(1.0, walls)),
+            )
+        ]
+        assert (rows[0].status == "stable").all()
+        np.testing.assert_allclose(rows[0].tip_y_mm, scale * rows[1].tip_y_mm, atol=1e-9)
+        np.testing.assert_allclose(rows[0].energy_mJ, scale**3 * rows[1].energy_mJ, atol=1e-9)
+
+
+POWERS = {
+    "segment_length_mm": 1,
+    "segment_height_mm": 1,
+    "stroke_mm": 1,
+    "bistable_stiffness_N_per_mm": 1,
+    "force_linearity": 0,
+    "hinge_stiffness_N_mm_per_rad": 3,
+}
+
+
+def similar(scale: float, walls: float) -> dict[str, float]:
+    """Bars and walls of a scaled finger."""
+    return {"linear_stiffness_N_per_mm": 1e4 * scale, "wall_compliance_mm_per_N": walls / scale}
+
+
 def test_its_known_errors_are_said() -> None:
     trusts = dpg.explain(STUDY, settings=[WORD]).trusts
     known = {trust.record["output"]: trust.record for trust in trusts}

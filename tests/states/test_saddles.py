@@ -14,7 +14,8 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.states.barriers import Barriers, barriers
-from dpgcli.states.saddles import Flips, Saddles, SaddleStatus, saddles
+from dpgcli.states.flips import Flips
+from dpgcli.states.saddles import Saddles, SaddleStatus, saddles
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 
