@@ -28,9 +28,10 @@ from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.trust import TRUST, WARNINGS
 from dpgcli.states.columns import Column
-from dpgcli.temporary import temporary_file
+from dpgcli.temporary import drop_orphans, temporary_file
 
 NAME = re.compile(r"(\d{10})-(\d{10})-([0-9a-f]{16})\.part")
+UNFINISHED = re.compile(r"\.(.+)\.dpg\d+\.tmp")
 COUNT = re.compile(r"[1-9][0-9]{0,9}")  # as many digits as a name has room for
 LISTS = ("states", "designs")
 SAID = "sweep.json"
@@ -177,6 +178,12 @@ class PartStore:
                     path.unlink()
             self.folder.rmdir()
             self.folder.parent.rmdir()
+
+    def drop_half_written(self) -> None:
+        """Remove what workers that were killed were about to write."""
+        names = (UNFINISHED.fullmatch(path.name) for path in inside(self.folder))
+        for name in {found[1] for found in names if found}:
+            drop_orphans(self.folder / name)
 
     def parts(self) -> list[Part]:
         """Parts in order of their designs, but for those that lie within another one.

@@ -56,7 +56,10 @@ def run(
         study.check_disk()
     if study.extent.seconds > LONG:
         tell(cost(study))
-    progress = compute()
+    try:
+        progress = compute()
+    finally:  # a signal to all processes ends workers at once
+        study.store.drop_half_written()
     replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]
     if part is None:
         _write_tables(study, progress, replays, command)

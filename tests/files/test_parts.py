@@ -123,3 +123,21 @@ def test_a_description_with_its_designs_is_one(tmp_path: Path) -> None:
     said |= {FINGERPRINT: fingerprint(said)}
     (tmp_path / SAID).write_text(json.dumps({**said, SHA256: _sha256(said)}))
     assert PartStore(tmp_path).said() == said
+
+
+def test_what_killed_workers_were_about_to_write_goes(tmp_path: Path) -> None:
+    """And nothing that somebody still writes, nor anything else."""
+    store = PartStore(tmp_path / ("0" * 16))
+    store.drop_half_written()  # there is no folder yet
+    store.folder.mkdir()
+    orphan = store.folder / ".0000000000-0000000001.dpg0.tmp"
+    orphan.touch()
+    others = [store.folder / name for name in (".mine.tmp", "sweep.json", "a.dpg0.tmp")]
+    for other in others:
+        other.touch()
+    with store.part(1, 2) as file:
+        held = set(store.folder.iterdir()) - {orphan, *others}
+        assert len(held) == 1
+        store.drop_half_written()
+        assert set(store.folder.iterdir()) == {*others, *held}
+        file.write(b"")

@@ -10,12 +10,15 @@ from typing import Any
 import pytest
 
 from dpgcli.errors import UsageError
+from dpgcli.files.sweep_file import read_sweep
 from dpgcli.studies import sweep as studies
+from dpgcli.studies.run import run
 from dpgcli.studies.sweep import Progress, Shard, Study, assemble, stores
 from dpgcli.sweeps.executors import Backend, serial
 from dpgcli.sweeps.extent import BYTES_PER_STATE
 from dpgcli.sweeps.pool import processes
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 AXES = (
     "{key: finger.geometry.dome_height_mm, linear: {from: 2.5, to: 7, count: 19}}",
     "{key: finger.units, values: [2, 4]}",
@@ -366,3 +369,20 @@ def test_up_to_date_means_both_tables_of_just_this(study: Any, expected: dict[st
     (made.folder / studies.DESIGNS).unlink()
     assert not made.is_up_to_date
     assert finish(made) == expected
+
+
+def test_nothing_half_written_is_left_by_workers_that_a_signal_ends(tmp_path: Path) -> None:
+    """As when all processes of a terminal's group get it: the parent cleans up behind them."""
+    path = tmp_path / "s.yaml"
+    (tmp_path / "base.yaml").write_bytes((CONFIGS / "three_unit.yaml").read_bytes())
+    path.write_text("base: base.yaml\nspace: [{key: finger.units, values: [1]}]\n")
+    study = Study(read_sweep(path), tmp_path)
+
+    def compute() -> Progress:
+        study.store.folder.mkdir(parents=True)
+        (study.store.folder / ".0000000000-0000000001.dpg0.tmp").touch()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(study, None, compute, warn=print, tell=print)
+    assert not list(study.store.folder.iterdir())
