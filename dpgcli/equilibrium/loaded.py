@@ -95,7 +95,7 @@ class LoadedPotential(Generic[System, Law]):
     stiffness: Array
 
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
-        """The same family for some lanes of the batch."""
+        """The same potential for some lanes of the batch."""
         return LoadedPotential(
             self.coordinates.take_lanes(index),
             tuple(term.take_lanes(index) for term in self.terms),
