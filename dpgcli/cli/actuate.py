@@ -18,7 +18,7 @@ Pressures = Annotated[
     list[str] | None,
     typer.Option(
         "--pressure",
-        metavar="RAMP",
+        metavar="MPA",
         help="MPa: 0:0.15:0, or A=0:0.15:0 for each line, or a CSV file  [default: the spec's]",
     ),
 ]

@@ -42,7 +42,7 @@ EXAMPLES = {
     "actuate": (
         "dpg actuate finger.yaml --pressure 0:0.15:0",
         "dpg actuate finger.yaml --pressure 0:0.2:-0.1:0 --output path.parquet --plot path.svg",
-        "dpg actuate finger.yaml --from 11000 --pressure 0:0.2:0 --cycles 100 --format csv",
+        "dpg actuate finger.yaml --from 110 --pressure 0:0.2:0 --cycles 100 --format csv",
     ),
     "transitions": (
         "dpg transitions finger.yaml",
@@ -54,9 +54,9 @@ EXAMPLES = {
         "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
     "pulses": (
-        "dpg pulses finger.yaml --to 11111",
-        "dpg pulses finger.yaml --to 11100 --set 'pressure={lines: {A: 1-3, B: 4-5}}'",
-        "dpg pulses finger.yaml --table --from 11111 --format csv > pulses.csv",
+        "dpg pulses finger.yaml --to 111",
+        "dpg pulses finger.yaml --to 110 --set 'pressure.lines={A: 1-2, B: 3}'",
+        "dpg pulses finger.yaml --table --from 111 --format csv > pulses.csv",
     ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",

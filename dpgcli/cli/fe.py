@@ -76,7 +76,9 @@ def dome(
     poisson: Poisson = 0.48,
     pressure: Annotated[
         float | None,
-        typer.Option("--pressure", help="Peak, MPa  [default: 1.25 times the expected snap]"),
+        typer.Option(
+            "--pressure", metavar="MPA", help="Peak, MPa  [default: 1.25 times the expected snap]"
+        ),
     ] = None,
     mesh: MeshOption = Mesh.MEDIUM,
     run: RunOption = False,

@@ -151,8 +151,10 @@ def test_of_thousands_of_mistakes_ten_are_shown(fit: Any) -> None:
     time, travel, force = exports.measured()
     content = table(time, travel, force).replace(b".", b":")
     lines = asked(fit(content, *NAMED)).splitlines()
-    assert len(lines) == 11
-    assert lines[-1] == "dpg: 602 problems; of those in rows of data the first 10 are shown"
+    assert len(lines) == 13
+    more = "expected a number, found something else in more than 100 places"
+    assert lines[10:12] == [f"dome.csv: {key}: {more}" for key in ("travel_mm", "force_N")]
+    assert lines[-1] == "dpg: 202 problems; of those in rows of data the first 10 are shown"
     assert lines[0].startswith("dome.csv:2: travel_mm: expected a number")
 
 

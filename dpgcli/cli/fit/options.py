@@ -29,7 +29,7 @@ Bootstrap = Annotated[
         help="95 % intervals from N resampled fits",
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampling")]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the resampling")]
 LossOption = Annotated[Loss, typer.Option("--loss", help="How residuals count")]
 LossScale = Annotated[
     float | None,
