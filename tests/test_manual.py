@@ -135,6 +135,7 @@ def scratch_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "with_slow"), [*stories()])
 @pytest.mark.usefixtures("scratch_copy")
 def test_a_page_does_what_it_shows(

@@ -60,6 +60,7 @@ def states(finger: Pressed, pressures: Array) -> list[Flags]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_histories_go_as_independent_hysterons_do(finger: Pressed, seed: int) -> None:
     up, down = thresholds(finger)

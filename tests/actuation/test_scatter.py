@@ -13,6 +13,8 @@ from dpgcli.actuation.sequences import pulse_sequence
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
 
+pytestmark = pytest.mark.slow
+
 Study = Callable[..., Finger]
 Made = Callable[..., Pressed]
 STROKES = np.array([[3.5], [3.5], [4.2]])

@@ -12,6 +12,8 @@ from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transitions import state_graph
 from dpgcli.mechanics.finger import Finger
 
+pytestmark = pytest.mark.slow
+
 Study = Callable[..., Finger]
 Made = Callable[..., Pressed]
 STROKES = np.array([[3.5], [3.5], [4.2]])

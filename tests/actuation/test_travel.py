@@ -112,6 +112,7 @@ def test_under_pressure_the_energy_is_that_of_springs_in_the_same_shape(
     assert np.abs(work).max() > 10.0
 
 
+@pytest.mark.slow
 def test_half_the_step_finds_the_same_events(finger: Pressed) -> None:
     ways = [way_of(finger, ROUND, largest_step=step) for step in (0.1, 0.05, 0.025)]
     assert len(ways[2].points) > 1.5 * len(ways[0].points)
@@ -126,6 +127,7 @@ def test_half_the_step_finds_the_same_events(finger: Pressed) -> None:
             assert next(pressures) == pytest.approx(next(pressures), rel=1e-11, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_cycles_close(finger: Pressed) -> None:
     way = way_of(finger, (0.3, -0.3, 0.05), n_cycles=100)
     assert way.points.cycle[-1] == 100
@@ -135,6 +137,7 @@ def test_cycles_close(finger: Pressed) -> None:
     assert found.tip <= found.nodes < 1e-9
 
 
+@pytest.mark.slow
 def test_cycles_that_are_known_are_those_that_one_would_find(finger: Pressed) -> None:
     """The first differs: it begins at rest."""
     history = (0.3, -0.066, 0.1)

@@ -155,6 +155,7 @@ def test_the_end_under_pressure_is_certified_by_its_balance() -> None:
     assert "0.16 MPa" in found.summary[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pressure", "settings"),
     [("0:150:0", {}), ("0:1000", FITTED), ("0:-1000", {})],

@@ -13,6 +13,8 @@ from dpgcli.design.dimensions import Tolerance
 from dpgcli.errors import ActuationError, DpgError, SpecError, UsageError
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 GRADED, UNIFORM, EIGHT = (
     CONFIGS / f"{name}.yaml" for name in ("graded_five_unit", "five_unit", "eight_unit")

@@ -13,6 +13,8 @@ from dpgcli.api.transitions import TransitionsResult
 from dpgcli.errors import OutputError, SpecError, UsageError
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 GRADED = CONFIGS / "graded_five_unit.yaml"
 FITTED = {"finger.calibration": "finite_elements", "finger.law": "push_only"}

@@ -19,6 +19,8 @@ from dpgcli.files.known_states import read_states
 from dpgcli.files.scene_file import read_spec, scene_of
 from dpgcli.mechanics.finger import Finger
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[2] / "configs" / "calibration"
 STUDY = EXAMPLES.parent / "three_unit.yaml"
 GEOMETRIC = 10.75  # mm, the segment height of the geometry

@@ -14,6 +14,8 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = [
     *("event", "line", "pressure_MPa", "unit", "kind", "pattern_before", "pattern_after"),

@@ -10,6 +10,8 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
+
 LINES = ("-s", "pressure.lines={A: 1-2, B: 3}")
 NAMES = [
     *("pulse", "line", "peak_pressure_MPa", "margin_MPa", "pattern_before", "pattern_at_peak"),

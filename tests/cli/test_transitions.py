@@ -12,6 +12,8 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
+
 NAMES = [
     *("pattern", "line", "direction", "pressure_MPa", "unit", "reached_at_pressure"),
     *("pattern_after", "tie", "note"),

@@ -194,6 +194,7 @@ def highest_held(finger: Finger, flips: Flips, lane: int) -> float:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.description)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_scipy_finds_the_same_saddle_energies(
@@ -379,6 +380,7 @@ def test_a_curve_with_ripples_has_no_barrier_that_is_not_certified(
     assert table.least_robust.tolist() == [""] * 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS[2:], ids=lambda law: law.description)
 def test_saddles_between_soft_bars_are_found_from_the_held_path_too(
     all_patterns: Callable[[int], Flags], law: DomeLaw

@@ -14,6 +14,8 @@ from dpgcli.files.sweep_file import read_sweep
 from dpgcli.sweeps import metrics, pressures
 from dpgcli.sweeps.metrics import UNDER_PRESSURE
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = [
     *("n_reachable", "reachable_patterns", "snap_pressure_min_MPa", "snap_pressure_max_MPa"),
