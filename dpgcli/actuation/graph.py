@@ -182,16 +182,16 @@ def _pulses(
     """
     own, stairs, way = raised(pressed, line_of, reach, directions, n_stairs)
     n, ends = len(directions), on_line(way.shapes, line_of, directions.line)
-    begin = _Ranges(
-        np.arange(n), np.zeros(n), directions.code, ~np.zeros(n, bool), np.zeros(n, bool)
-    )
+    here, no = directions.code, np.zeros(n, bool)
+    begin = _Ranges(np.arange(n), np.zeros(n), here, here, ~no, no)
     parts = [begin]
     for stair in stairs:
         lanes, halted = stair.events.lanes, stair.events.halted
         start = on_line(halted.shapes, line_of, directions.line[lanes])
         is_fine = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
         is_tie = np.asarray(halted.tied.any(axis=0))
-        parts.append(_Ranges(lanes, start, codes_of(stair.rest.inverted), is_fine, is_tie))
+        at_peak, after = (codes_of(s.inverted) for s in (stair.events.after, stair.rest))
+        parts.append(_Ranges(lanes, start, at_peak, after, is_fine, is_tie))
     ranges = _Ranges.joined(parts)
     ranges = ranges.take(np.argsort(ranges.lane, kind="stable"))
     found, n_lost = ranges.pulses(directions, ends)
@@ -207,15 +207,20 @@ class _Ranges(Rows):
 
     lane: Indices
     start: Array
+    at_peak: Codes
     target: Codes
     is_fine: Flags
     is_tie: Flags
 
     def pulses(self, directions: Directions, ends: Array) -> tuple[Pulses, int]:
-        """Ranges side by side that lead to the same are one; those that lead nowhere are none."""
+        """Ranges side by side of the same pattern, at the peak and after it, are one.
+
+        Those that lead nowhere are none.
+        """
         begins = np.ones(len(self.lane), bool)
         begins[1:] = (
             (self.lane[1:] != self.lane[:-1])
+            | (self.at_peak[1:] != self.at_peak[:-1])
             | (self.target[1:] != self.target[:-1])
             | (self.is_fine[1:] != self.is_fine[:-1])
         )

@@ -175,10 +175,6 @@ class Pressed:
         scale, stiffness = self.finger.stroke, self.units.holding_stiffness
         return LoadedPotential(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
 
-    def potential(self, pressure: Array, inverted: Flags) -> Potential[FingerCoordinates]:
-        """The energy less the work of fixed pressures, domes in touch or not as they come."""
-        return self._with(self.domes(pressure, inverted))
-
     def domes(self, pressure: Array, inverted: Flags) -> DomesAt | PushingDomes:
         """The law of the domes under fixed pressures."""
         if self.limits is None:
@@ -206,7 +202,7 @@ class Pressed:
 
     def travels(self, shapes: Shapes) -> Array:
         """Travels of the domes' poles, mm, (unit, batch): apart from their neighbors, their own."""
-        law = self.domes(shapes.pressure, shapes.inverted)
+        law = self._domes_of(shapes)
         extension = self.extensions(shapes.coordinates)
         if isinstance(law, PushingDomes):
             extension = np.clip(extension, law.low, law.high)
@@ -214,7 +210,19 @@ class Pressed:
 
     def energy(self, shapes: Shapes) -> Array:
         """Energy less the work of the pressures, mJ, (batch,)."""
-        return self.potential(shapes.pressure, shapes.inverted).evaluate(shapes.coordinates).energy
+        return self._with(self._domes_of(shapes)).evaluate(shapes.coordinates).energy
+
+    def _domes_of(self, shapes: Shapes) -> DomesAt | PushingDomes:
+        """The law of domes where they are.
+
+        One in touch may be pressed beyond its own limit, as the hinge holds it back: from there on
+        it pushes up to the inverted well.
+        """
+        inverted = shapes.inverted
+        if self.limits is not None and shapes.touching is not None:
+            is_beyond = shapes.pressure > self.limits.snap_pressure
+            inverted = inverted | (shapes.touching & is_beyond)
+        return self.domes(shapes.pressure, inverted)
 
     @property
     def _downhill_step(self) -> float:

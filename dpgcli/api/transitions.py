@@ -13,7 +13,7 @@ from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transition_table import COLUMNS, transition_rows
 from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
-from dpgcli.api.predict import check_drawable
+from dpgcli.api.predict import MOST_DRAWN
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.scatter import Draws, ScatterInput, drawn_by
 from dpgcli.api.tables import Table
@@ -237,7 +237,10 @@ def check_size(given: PressedInput) -> None:
 
 def check_drawable_graph(given: PressedInput) -> None:
     """Raise UsageError for a graph that nobody could read."""
-    check_drawable(2**given.pressed.finger.n_units, "plot")
+    n_states = 2**given.pressed.finger.n_units
+    if n_states > MOST_DRAWN:
+        what = f" draws at most {MOST_DRAWN} states, not {n_states:,}: take "
+        raise UsageError(Field("plot"), what, Field("graph"), ", and a program for large graphs")
 
 
 def graph_path(path: str | Path) -> Path:

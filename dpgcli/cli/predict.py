@@ -221,7 +221,9 @@ def _barriers(summary: "Summary") -> Iterator[str]:
     if summary.least_robust is not None:
         least = summary.least_robust
         what = "units" if "," in least.unit else "unit"
-        yield f"least robust: {what} {least.unit} in {least.pattern}, {least.barrier:.5g} mJ"
+        others = least.n_states - 1
+        ties = f"; as little in {counted(others, 'other state')}" if others else ""
+        yield f"least robust: {what} {least.unit} in {least.pattern}, {least.barrier:.5g} mJ{ties}"
     if summary.n_saddles_not_found:
         n = counted(summary.n_saddles_not_found, "barrier")
         yield f"{n} not found: no certified saddle parts the two states, though both exist"

@@ -74,7 +74,7 @@ def _answer(pressed: Pressed, settled: Settled, halted: Halted | None, status: S
 def _residual(pressed: Pressed, halted: Halted) -> float:
     """The largest unbalanced force where a finger stopped, N."""
     shapes = halted.shapes
-    potential = pressed.potential(shapes.pressure, shapes.inverted)
+    potential = pressed.as_touching(shapes)
     gradient = potential.evaluate(shapes.coordinates).gradient
     return float(np.abs(gradient / potential.coordinates.force_unit).max())
 

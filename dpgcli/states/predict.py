@@ -29,11 +29,15 @@ class Breakdown:
 
 @dataclass(frozen=True)
 class LeastRobust:
-    """The smallest barrier of all states, mJ, its pattern and its unit, or units where they tie."""
+    """The smallest barrier of all states, mJ, its pattern and its unit, or units where they tie.
+
+    `n_states` have as small a one, that of `pattern` among them.
+    """
 
     barrier: float
     pattern: str
     unit: str
+    n_states: int = 1
 
 
 @dataclass
@@ -82,7 +86,10 @@ class Summary:
         known = self.least_robust
         if known is None or (1.0 + TIE) * barriers[place] < known.barrier:
             pattern = block["pattern"][place].decode()
-            self.least_robust = LeastRobust(float(barriers[place]), pattern, str(units[place]))
+            unit, n_states = str(units[place]), int(ties.sum())
+            self.least_robust = LeastRobust(float(barriers[place]), pattern, unit, n_states)
+        elif barriers[place] <= (1.0 + TIE) * known.barrier:
+            self.least_robust = replace(known, n_states=known.n_states + int(ties.sum()))
 
     def _break_down(self, block: Columns, stable: Flags) -> None:
         if not self.shares:

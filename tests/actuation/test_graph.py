@@ -197,3 +197,16 @@ def test_a_unit_that_is_not_bistable_has_no_thresholds(study: Study, pressed: Ma
     none = thresholds_alone(pressed(study(2).changed(force_linearity=np.array([[0.3]]))))
     assert none.reach.tolist() == none.furthest.tolist()
     assert none.furthest[0] > 1.0
+
+
+def test_peaks_are_parted_by_thresholds_that_only_show_under_pressure(
+    study: Study, pressed: Made
+) -> None:
+    """A unit without a second well snaps as well, and is back after the pulse."""
+    linearity = np.array([[0.043], [0.1]])  # lost near 0.096, the hinge included
+    own = pressed(study(2, np.inf).changed(force_linearity=linearity))
+    pulses = reachable(own, np.array([0, 0]), np.array([0.3])).pulses
+    up = pulses.take(np.flatnonzero((pulses.source == 0) & (pulses.sign > 0)))
+    assert up.target.tolist() == [2, 2]
+    np.testing.assert_array_equal(up.stop, [up.start[1], 0.3])
+    assert up.start[0] == pytest.approx(0.1495, rel=1e-6)

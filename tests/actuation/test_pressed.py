@@ -1,6 +1,7 @@
 """Thresholds under pressure: closed forms, independence between rigid bars, ties, cycles."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_a_dome_that_only_pushes_leaves_its_neighbor_when_sucked_back(
 ) -> None:
     """Published energies: in touch from the start, so snap and reset are those of the spring."""
     finger = study(1, np.inf)
-    pushing = pressed(type(finger)(**{**vars(finger), "law": PushOnly(PUBLISHED)}))
+    pushing = pressed(replace(finger, law=PushOnly(PUBLISHED)))
     snap, reset = events_of(pushing, 0.3, -0.3)
     found = [event.halted.shapes.pressure[0, 0] * AREA for event in (snap, reset)]
     np.testing.assert_allclose(found, closed_form(3.5), rtol=1e-10)
@@ -162,3 +163,21 @@ def test_the_inverted_state_under_pressure_is_the_root_of_its_force(
 
     opening: Array = finger.extensions(there.coordinates)
     assert opening[0, 0] == pytest.approx(brentq(unbalanced, 3.0, 4.0, xtol=1e-13), rel=1e-12)
+
+
+@pytest.mark.parametrize("hinge_stiffness", [24.2, 120.0, 300.0])
+def test_a_dome_that_its_hinge_holds_back_has_the_energy_of_one_that_is_attached(
+    study: Study, pressed: Made, hinge_stiffness: float
+) -> None:
+    """In touch on both sides of the snap, beyond the pressure at which it snaps by itself."""
+    finger = study(1, np.inf).changed(
+        hinge_stiffness=np.array([[hinge_stiffness]]), force_linearity=np.zeros((1, 1))
+    )
+    pushing = replace(finger, law=PushOnly(PUBLISHED))
+    (attached,) = events_of(pressed(finger), 0.4)
+    (pushed,) = events_of(pressed(pushing), 0.4)
+    assert pushed.released == pytest.approx(attached.released, rel=1e-9)
+    before = pushed.halted.shapes
+    assert pressed(pushing).limits.snap_pressure[0, 0] < before.pressure[0, 0]
+    own = pressed(pushing)
+    np.testing.assert_array_equal(own.travels(before), own.extensions(before.coordinates))
