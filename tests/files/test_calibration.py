@@ -99,6 +99,11 @@ def test_no_beginning_of_a_fitted_file_is_believed(path: Path, own: str) -> None
     assert read_as_it_is(path, own[:-1]) == read_as_it_is(path, own)  # but for its last break
 
 
+def test_a_curve_without_anything_is_a_problem_of_its_own(path: Path) -> None:
+    cut = WHOLE[: WHOLE.index("curve:")] + "curve:\n"
+    assert any("curve: expected" in said for said in problems(path, cut))
+
+
 def test_a_fitted_file_may_have_other_line_breaks(path: Path, own: str) -> None:
     found = read_calibration(path)
     path.write_bytes(own.replace("\n", "\r\n").encode())
