@@ -239,8 +239,8 @@ def check_drawable_graph(given: PressedInput) -> None:
     """Raise UsageError for a graph that nobody could read."""
     n_states = 2**given.pressed.finger.n_units
     if n_states > MOST_DRAWN:
-        what = f" draws at most {MOST_DRAWN} states, not {n_states:,}: take "
-        raise UsageError(Field("plot"), what, Field("graph"), ", and a program for large graphs")
+        what = f" draws at most {MOST_DRAWN} states, not {n_states:,}: take the GraphML file"
+        raise UsageError(Field("plot"), f"{what}, and a program for large graphs")
 
 
 def graph_path(path: str | Path) -> Path:
