@@ -34,6 +34,7 @@ from dpgcli.temporary import working_folder_is_gone
 from dpgcli.text import printable
 
 P = ParamSpec("P")
+_stops: list[BaseException] = []  # what a signal has raised; the first is the last
 
 NOTHING_HALF = "nothing half-written is left"
 SOON = 0.01  # s
@@ -78,24 +79,34 @@ def command(function: Callable[P, None]) -> Callable[P, None]:
             sys.stdout.flush()  # while a signal still stops it
         except typer.Exit:
             raise
-        except SpecError as error:
-            say_problems(error)
-            raise typer.Exit(ExitCode.USAGE) from None
-        except NoWorkerError as error:
-            fail(ExitCode.FAILED_CASES, error.message)
-        except REFUSED as error:
-            fail(ExitCode.USAGE, error.message)
-        except NothingSelectedError as error:
-            fail(ExitCode.NOTHING_SELECTED, error.message)
-        except KeyboardInterrupt as stop:
-            fail(ExitCode.INTERRUPTED, f"interrupted; {str(stop) or NOTHING_HALF}")
-        except Terminated as stop:
-            fail(ExitCode.TERMINATED, f"terminated; {str(stop) or NOTHING_HALF}")
+        except (KeyboardInterrupt, Terminated) as stop:
+            _fail_stopped(isinstance(stop, Terminated), str(stop))
         except Exception as error:
-            _fail_if_refused(error)
-            _internal_error()
+            if _stops:  # extension modules make errors of their own of what is raised in them
+                _fail_stopped(isinstance(_stops[0], Terminated))
+            _fail_by_kind(error)
 
     return run
+
+
+def _fail_stopped(terminated: bool, message: str = "") -> NoReturn:
+    code = ExitCode.TERMINATED if terminated else ExitCode.INTERRUPTED
+    fail(code, f"{'terminated' if terminated else 'interrupted'}; {message or NOTHING_HALF}")
+
+
+def _fail_by_kind(error: Exception) -> NoReturn:
+    match error:
+        case SpecError():
+            say_problems(error)
+            raise typer.Exit(ExitCode.USAGE) from None
+        case NoWorkerError():
+            fail(ExitCode.FAILED_CASES, error.message)
+        case NothingSelectedError():
+            fail(ExitCode.NOTHING_SELECTED, error.message)
+    if isinstance(error, REFUSED):
+        fail(ExitCode.USAGE, error.message)
+    _fail_if_refused(error)
+    _internal_error()
 
 
 def say_problems(error: SpecError) -> None:
@@ -214,7 +225,8 @@ def _stop(number: int, frame: FrameType | None) -> None:
         _send_again(number)
         return
     _ignore_further_signals()
-    raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+    _stops.append(KeyboardInterrupt() if number == signal.SIGINT else Terminated())
+    raise _stops[0]
 
 
 def _send_again(number: int) -> None:

@@ -80,6 +80,14 @@ try:
 except BaseException as error:
     raise ImportError("failed to import") from error
 """
+CONVERTING_LATER = """
+def convert():
+    try:
+        os.kill(os.getpid(), signal.{name})
+        sum(map(abs, range(99)))
+    except BaseException as error:
+        raise ValueError("building a validator: KeyboardInterrupt") from None
+"""
 DESTROYED = """
 class Last:
     def __del__(self):
@@ -89,7 +97,11 @@ last = [Last()]
 """
 
 
-@pytest.mark.parametrize("place", [CONVERTING, DESTROYED], ids=["import", "destructor"])
+@pytest.mark.parametrize(
+    "place",
+    [CONVERTING, CONVERTING_LATER, DESTROYED],
+    ids=["import", "extension", "destructor"],
+)
 @pytest.mark.parametrize(("number", "code", "word"), SIGNALS)
 def test_an_interrupt_where_others_would_catch_it(
     tmp_path: Path, place: str, number: signal.Signals, code: int, word: str
@@ -104,6 +116,7 @@ app = typer.Typer()
 @command
 def work():
     import odd
+    getattr(odd, "convert", int)()
     getattr(odd, "last", []).clear()
     time.sleep(20)
     print("went on")
