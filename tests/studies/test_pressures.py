@@ -171,7 +171,7 @@ def test_a_batch_of_metrics_needs_pressure_for_its_columns() -> None:
 def test_units_that_hold_but_one_state_leave_no_numbers_for_all(
     pressed: Pressed, tables: Any, linearity: float
 ) -> None:
-    """With 0.1 a unit still snaps under pressure, but holds no shape after; with 0.2 it does not."""
+    """With 0.1 a unit still snaps, but holds no shape without pressure; with 0.2 it does not."""
     axis = f"{{key: finger.overrides.1.lattice.force_linearity, values: [0.02, {linearity}]}}"
     _, designs = tables(pressed(axis))
     bistable, other = designs[NAMES[2:6]].to_numpy(float)
