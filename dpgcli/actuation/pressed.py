@@ -12,10 +12,10 @@ from dpgcli.actuation.domes import (
     PressedDomes,
     PushingDomes,
     free_force,
-    kept_places,
     limits,
     pushing,
 )
+from dpgcli.actuation.folding import folded
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
@@ -184,9 +184,10 @@ class Pressed:
     def as_touching(self, shapes: Shapes) -> Potential[FingerCoordinates]:
         """The energy less the work of the pressures, each dome in touch or not as it is."""
         work = PressureWork(shapes.pressure, self.volumes, self.finger.domes)
-        return self._with(DomesAt(self.finger, work, shapes.touching))
+        return self.with_domes(DomesAt(self.finger, work, shapes.touching))
 
-    def _with(self, law: ScalarLaw) -> Potential[FingerCoordinates]:
+    def with_domes(self, law: ScalarLaw) -> Potential[FingerCoordinates]:
+        """The energy with domes of some law."""
         bare = self._bare
         dome = Term("domes", bare.coordinates.dome, law)
         return Potential(bare.coordinates, (*bare.terms, dome))
@@ -210,7 +211,7 @@ class Pressed:
 
     def energy(self, shapes: Shapes) -> Array:
         """Energy less the work of the pressures, mJ, (batch,)."""
-        return self._with(self._domes_of(shapes)).evaluate(shapes.coordinates).energy
+        return self.with_domes(self._domes_of(shapes)).evaluate(shapes.coordinates).energy
 
     def _domes_of(self, shapes: Shapes) -> DomesAt | PushingDomes:
         """The law of domes where they are.
@@ -223,43 +224,6 @@ class Pressed:
             is_beyond = shapes.pressure > self.limits.snap_pressure
             inverted = inverted | (shapes.touching & is_beyond)
         return self.domes(shapes.pressure, inverted)
-
-    @property
-    def _downhill_step(self) -> float:
-        """Of the step cap: shorter where curves bend often, or barriers end where domes let go."""
-        is_plain = self.limits is None and self.finger.law.curve is None
-        return 1.0 if is_plain else SHORT_STEP
-
-    def relaxed(self, shapes: Shapes) -> tuple[Shapes, Flags]:
-        """Go downhill from shapes at their pressures to the next minima; which have arrived.
-
-        Domes that only push and are pushed out of their places fall back, and the others go on.
-        """
-        inverted, coordinates = shapes.inverted, shapes.coordinates
-        if self.limits is not None:
-            inverted = kept_places(self.limits, shapes.pressure, inverted)
-        for _ in range(self.finger.n_units + 1):
-            law = self.domes(shapes.pressure, inverted)
-            there = minimize(
-                self._with(law), coordinates, TOLERANCE, largest_step=self._downhill_step
-            )
-            coordinates = there.coordinates
-            extension = self.extensions(coordinates)
-            if not isinstance(law, PushingDomes):
-                break
-            fallen = inverted & (extension <= law.low)
-            inverted = inverted & ~fallen
-            if not fallen.any():
-                break
-        is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
-        beyond = extension > self.units.wells.spring_barrier
-        if not isinstance(law, PushingDomes):
-            return replace(shapes, coordinates=coordinates, inverted=beyond), is_there
-        touching = law.touches(extension)
-        inverted = np.where(touching, beyond, inverted)
-        return replace(
-            shapes, coordinates=coordinates, inverted=inverted, touching=touching
-        ), is_there
 
     def followed(
         self,
@@ -285,7 +249,7 @@ class Pressed:
         tied &= np.arange(len(left))[:, None] != unit
         reason = _reasons(ends, shapes.touching)
         reason = np.where(is_alone, Halt.ALONE, reason)
-        is_folded = family.coordinates.springs(ends.coordinates).is_folded
+        is_folded = folded(family.coordinates, ends.coordinates)
         reason = np.where(is_folded, Halt.FOLDED, reason)
         return Halted(there, ends.load, reason, unit, tied, start)
 
@@ -327,32 +291,6 @@ class Pressed:
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL
         return np.asarray(near & is_alike & (ends.outcome == PathEnd.EVENT))
-
-    def after(self, halted: Halted) -> tuple[Shapes, Flags]:
-        """What becomes of shapes that halted, at their pressures; which have come to rest.
-
-        Domes that meet or leave their neighbors change nothing else.
-        """
-        shapes, n = halted.shapes, len(halted.unit)
-        is_first = np.arange(self.finger.n_units)[:, None] == halted.unit
-        meets = (halted.reason == Halt.CONTACT) | (halted.reason == Halt.RELEASE)
-        touching = shapes.touching
-        if touching is not None:
-            touching = touching ^ (is_first & meets)
-        falls = np.flatnonzero((halted.reason == Halt.FOLD) | (halted.reason == Halt.ALONE))
-        moved = replace(
-            shapes,
-            coordinates=shapes.coordinates.copy(),
-            inverted=shapes.inverted.copy(),
-            touching=touching,
-        )
-        is_fine = np.ones(n, bool)
-        if len(falls):
-            alone = (halted.reason == Halt.ALONE) & (is_first | halted.tied)
-            start = replace(moved, coordinates=halted.start, inverted=shapes.inverted ^ alone)
-            relaxed, is_fine[falls] = self.take_lanes(falls).relaxed(start.take_lanes(falls))
-            moved.put(falls, relaxed)
-        return moved, is_fine
 
     def _about_to_touch(self, shapes: Shapes, target: Array) -> Shapes:
         """The shapes; domes that are just in touch remain so if pressure will push them there."""

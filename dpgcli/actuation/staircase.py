@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.actuation.pressed import Halt, Halted, Pressed, Shapes
+from dpgcli.actuation.snaps import after
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
 
@@ -81,13 +82,14 @@ class Journey:
         if not len(met):
             return None
         own, halted, lanes = own.take_lanes(met), halted.take_lanes(met), lanes[met]
-        after, is_fine = own.after(halted)
-        released = own.energy(halted.shapes) - own.energy(after)
-        self.reason[lanes] = np.where(is_fine, halted.reason, Halt.FAILED)
-        self.ending.put(lanes, after)
-        self._own, self._lanes, self._shapes = own, lanes, after
+        halted, shapes, ending = after(own, halted)
+        is_fine = ending == Halt.ARRIVED
+        released = own.energy(halted.shapes) - own.energy(shapes)
+        self.reason[lanes] = np.where(is_fine, halted.reason, ending)
+        self.ending.put(lanes, shapes)
+        self._own, self._lanes, self._shapes = own, lanes, shapes
         self.go_on(is_fine)
-        return own, Events(lanes, halted, after, released, is_fine)
+        return own, Events(lanes, halted, shapes, released, is_fine)
 
     def go_on(self, which: Flags) -> None:
         """Leave all others where they are, by the lanes of the last events or of what is left."""

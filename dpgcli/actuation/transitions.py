@@ -155,7 +155,7 @@ def _put(
     found.outcome[lanes] = np.where(is_rest, Departure.LEAVES, Departure.ASTRAY)
     units = np.arange(own.finger.n_units)[:, None]
     together = (units == halted.unit) | halted.tied
-    found.unit[lanes] = together.argmax(axis=0)
+    found.unit[lanes] = (together & (events.flipped | ~events.flipped.any(axis=0))).argmax(axis=0)
     found.flipped[lanes] = codes_of(events.flipped)
     found.tied[lanes] = codes_of(together & (units != found.unit[lanes]))
     found.reached[lanes] = codes_of(events.after.inverted)

@@ -6,13 +6,13 @@ from enum import StrEnum
 
 import numpy as np
 
+from dpgcli.actuation.folding import folded
 from dpgcli.actuation.pressed import Halt, Halted, Pressed, Shapes
+from dpgcli.actuation.snaps import after
 from dpgcli.actuation.staircase import EVENTS, MOST_EVENTS
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
-from dpgcli.states.crossing import crosses_itself, fewest_in_loop, outline
 
-STRAIGHT = 1e-9  # rad: a unit that turns by less is in no loop
 HALVINGS = 20  # of the way to where a finger folds onto itself
 
 
@@ -72,7 +72,8 @@ class Travel:
     """The way of a finger as far as it went.
 
     `holds` are the places of the points at which steps ended, in their order. `reason` is
-    `Halt.ARRIVED`, or why it went no further than to the `pressure` (MPa, by unit).
+    `Halt.ARRIVED`, or why it went no further than to the `pressure` (MPa, by unit). `folded` are
+    the units inverted in the shape that it would snap to there, if that is what folds.
     """
 
     points: Points
@@ -80,6 +81,7 @@ class Travel:
     holds: tuple[int, ...]
     reason: Halt
     pressure: Array
+    folded: Flags | None = None
 
     @property
     def final(self) -> Shapes:
@@ -130,25 +132,13 @@ def _bits(shapes: Shapes) -> bytes:
     return b"".join(part.tobytes() for part in parts if part is not None)
 
 
-def folded(pressed: Pressed, coordinates: Array) -> Flags:
-    """Shapes that no finger can take, (batch,): impossible cells, parts in the same place."""
-    system, finger = pressed.coordinates, pressed.finger
-    near, far = (corner(coordinates).value for corner in system.corners)
-    turn = np.maximum(np.abs(near + far), STRAIGHT)
-    apart = fewest_in_loop(turn, finger.segment_length, finger.n_units)
-    flags = system.springs(coordinates).is_folded
-    if apart is not None:
-        nodes = system.stations(coordinates)
-        flags = flags | crosses_itself(outline(nodes, finger.segment_height), apart)
-    return flags
-
-
 class _Traveler:
     """A finger under way: where it is, and the points and events that lie behind it."""
 
     def __init__(self, pressed: Pressed, start: Shapes, largest_step: float) -> None:
         self.pressed, self.here, self.largest_step = pressed, start, largest_step
         self.reason, self.pressure = Halt.ARRIVED, start.pressure[:, 0]
+        self.folded: Flags | None = None
         self.place, self.share = (1, 1), 0.0  # cycle and step; how much of it is done
         self.behind: list[Points] = []
         self.n_points = 0
@@ -161,7 +151,8 @@ class _Traveler:
     def travel(self) -> Travel:
         """What lies behind."""
         points = joined(self.behind)
-        return Travel(points, tuple(self.events), tuple(self.holds), self.reason, self.pressure)
+        lists = tuple(self.events), tuple(self.holds)
+        return Travel(points, *lists, self.reason, self.pressure, self.folded)
 
     def begin(self) -> None:
         """Begin a cycle."""
@@ -226,12 +217,14 @@ class _Traveler:
 
     def _go_through(self, halted: Halted) -> None:
         """Go on from an event to what becomes of the finger there."""
-        after, is_fine = self.pressed.after(halted)
-        self.reason = Halt.ARRIVED if is_fine[0] else Halt.FAILED
-        before = self.n_points - 1
-        if is_fine[0] and self._pass(after, np.array([self.share])):
-            event = self._event(halted, after)
-            self.events.append(replace(event, before=before, after=self.n_points - 1))
+        halted, shapes, ending = after(self.pressed, halted)
+        self.reason = Halt(ending[0])
+        if self.reason is Halt.ARRIVED:
+            event = replace(self._event(halted, shapes), before=self.n_points - 1)
+            self._pass(shapes, np.array([self.share]))
+            self.events.append(replace(event, after=self.n_points - 1))
+        elif self.reason is Halt.FOLDED:
+            self.folded = shapes.inverted[:, 0]
 
     def _event(self, halted: Halted, after: Shapes) -> Event:
         """What happened, its points aside. Of tied units none is the first but by its number."""
@@ -254,7 +247,7 @@ class _Traveler:
         """
         if not len(share):
             return True
-        is_folded = folded(self.pressed, shapes.coordinates)
+        is_folded = folded(self.pressed.coordinates, shapes.coordinates)
         n = int(is_folded.argmax()) if is_folded.any() else len(share)
         cycle, step = (np.full(len(share), count) for count in self.place)
         points = Points(shapes, cycle, step, share).take(np.arange(n))
@@ -273,7 +266,7 @@ class _Traveler:
             middle = 0.5 * (here.pressure + beyond)
             halted = self.pressed.followed(here, middle, self.largest_step)
             is_well = Halt(halted.reason[0]) is Halt.ARRIVED
-            if is_well and not folded(self.pressed, halted.shapes.coordinates)[0]:
+            if is_well and not folded(self.pressed.coordinates, halted.shapes.coordinates)[0]:
                 here = halted.shapes
             else:
                 beyond = middle

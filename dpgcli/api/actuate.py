@@ -172,7 +172,11 @@ class ActuateResult:
         if self.way.reason is Halt.ARRIVED:
             return "" if self.certificate.is_certified else self.certificate.text
         pressures = self._pressures(self.way.pressure)
-        return f"{WHY[self.way.reason]} at {pressures}, {self._place()}"
+        if self.way.folded is None:
+            return f"{WHY[self.way.reason]} at {pressures}, {self._place()}"
+        reached = texts(self.way.folded[:, None]).astype(str)[0]
+        snaps = f"the finger snaps at {pressures} to {reached}, which folds onto itself"
+        return f"{snaps}, {self._place()}"
 
     def _place(self) -> str:
         points = self.way.points

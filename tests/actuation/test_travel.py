@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from dpgcli.actuation.certificate import certificate
+from dpgcli.actuation.folding import folded
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.readings import Readings, drift
 from dpgcli.actuation.rest import at_rest
-from dpgcli.actuation.travel import Kind, Travel, folded, travel
+from dpgcli.actuation.travel import Kind, Travel, travel
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.terms import chain_potential
@@ -53,7 +54,7 @@ def test_every_point_is_an_equilibrium(finger: Pressed) -> None:
     sides = [event.before for event in way.events]
     inner = np.setdiff1d(np.arange(len(way.points)), sides)
     assert float(readings.balance.curvature[inner].min()) > 0.0
-    assert not folded(finger, way.points.shapes.coordinates).any()
+    assert not folded(finger.coordinates, way.points.shapes.coordinates).any()
 
 
 @pytest.mark.parametrize("largest_step", [0.1, 0.4])  # some steps of the latter fail
@@ -233,7 +234,7 @@ def test_a_finger_folds_onto_itself_where_it_does_whatever_the_step(
     for way in ways:
         assert way.reason is Halt.FOLDED
         assert len(way.events) == 1
-        assert not folded(finger, way.points.shapes.coordinates).any()
+        assert not folded(finger.coordinates, way.points.shapes.coordinates).any()
         assert way.points.shapes.pressure.max() < way.pressure[0] < 2000.0
     assert ways[0].pressure == pytest.approx(ways[1].pressure, rel=1e-4)
 

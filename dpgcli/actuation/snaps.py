@@ -1,0 +1,126 @@
+"""Snaps: what becomes of fingers where a unit, or a dome that is apart, has lost its place.
+
+They go downhill at that pressure to the next minimum. Where other units are just about to go as
+well, it is up to the steps of the descent which of them go along: these are tied.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.actuation.domes import PushingDomes, kept_places
+from dpgcli.actuation.folding import folded
+from dpgcli.actuation.pressed import LARGEST_RESIDUAL, TOLERANCE, Halt, Halted, Pressed, Shapes
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.newton import minimize
+
+SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
+SHORTER = (0.5, 0.25)  # times the step: descents that a doubtful one is compared with
+NEAR_FOLD = 0.02  # of the stiffness in play: with less left another unit is about to go
+
+
+class Outcome(NamedTuple):
+    """Where fingers halted, with all that is tied there, what they become, and `Halt` codes.
+
+    They have come to rest (`ARRIVED`), fold onto themselves or have no rest.
+    """
+
+    halted: Halted
+    shapes: Shapes
+    ending: Indices
+
+
+class _Rest(NamedTuple):
+    """Minima, the stiffness left there, (batch,), and which are minima."""
+
+    shapes: Shapes
+    curvature: Array
+    is_there: Flags
+
+
+def after(pressed: Pressed, halted: Halted) -> Outcome:
+    """What becomes of shapes that halted, at their pressures.
+
+    Domes that meet or leave their neighbors change nothing else.
+    """
+    shapes, n = halted.shapes, len(halted.unit)
+    is_first = np.arange(pressed.finger.n_units)[:, None] == halted.unit
+    meets = (halted.reason == Halt.CONTACT) | (halted.reason == Halt.RELEASE)
+    touching = shapes.touching
+    if touching is not None:
+        touching = touching ^ (is_first & meets)
+    falls = np.flatnonzero((halted.reason == Halt.FOLD) | (halted.reason == Halt.ALONE))
+    moved = replace(
+        shapes,
+        coordinates=shapes.coordinates.copy(),
+        inverted=shapes.inverted.copy(),
+        touching=touching,
+    )
+    ending, tied = np.full(n, Halt.ARRIVED), halted.tied.copy()
+    if len(falls):
+        alone = (halted.reason == Halt.ALONE) & (is_first | halted.tied)
+        start = replace(moved, coordinates=halted.start, inverted=shapes.inverted ^ alone)
+        own, few = pressed.take_lanes(falls), halted.take_lanes(falls)
+        rest, undecided = _decided(own, few, start.take_lanes(falls))
+        is_folded = folded(own.coordinates, rest.shapes.coordinates)
+        ending[falls] = np.where(is_folded, Halt.FOLDED, Halt.ARRIVED)
+        ending[falls[~rest.is_there]] = Halt.FAILED
+        tied[:, falls] |= undecided
+        moved.put(falls, rest.shapes)
+    return Outcome(replace(halted, tied=tied), moved, ending)
+
+
+def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:
+    """Minima downhill, and units that go along or not with the length of steps, (unit, batch).
+
+    That is looked at where more units go than are tied, or another one is about to.
+    """
+    rest = _relaxed(pressed, start, 1.0)
+    units = np.arange(pressed.finger.n_units)[:, None]
+    others = (rest.shapes.inverted ^ halted.shapes.inverted) & ~halted.tied & (units != halted.unit)
+    is_doubtful = others.any(axis=0) | (rest.curvature < NEAR_FOLD)
+    doubtful = np.flatnonzero(is_doubtful & rest.is_there)
+    undecided = np.zeros(halted.tied.shape, bool)
+    if len(doubtful):
+        few, begin = pressed.take_lanes(doubtful), start.take_lanes(doubtful)
+        for share in SHORTER:
+            again = _relaxed(few, begin, share)
+            differs = again.shapes.inverted ^ rest.shapes.inverted[:, doubtful]
+            undecided[:, doubtful] |= differs & again.is_there
+    return rest, undecided & (units != halted.unit)
+
+
+def _relaxed(pressed: Pressed, shapes: Shapes, share: float) -> _Rest:
+    """Go downhill from shapes at their pressures to the next minima, by a share of the usual step.
+
+    Domes that only push and are pushed out of their places fall back, and the others go on.
+    """
+    inverted, coordinates = shapes.inverted, shapes.coordinates
+    if pressed.limits is not None:
+        inverted = kept_places(pressed.limits, shapes.pressure, inverted)
+    step = share * _downhill_step(pressed)
+    for _ in range(pressed.finger.n_units + 1):
+        law = pressed.domes(shapes.pressure, inverted)
+        there = minimize(pressed.with_domes(law), coordinates, TOLERANCE, largest_step=step)
+        coordinates = there.coordinates
+        extension = pressed.extensions(coordinates)
+        if not isinstance(law, PushingDomes):
+            break
+        fallen = inverted & (extension <= law.low)
+        inverted = inverted & ~fallen
+        if not fallen.any():
+            break
+    is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
+    beyond, touching = extension > pressed.units.wells.spring_barrier, None
+    if isinstance(law, PushingDomes):
+        touching = law.touches(extension)
+        beyond = np.where(touching, beyond, inverted)
+    found = replace(shapes, coordinates=coordinates, inverted=beyond, touching=touching)
+    return _Rest(found, there.curvature, np.asarray(is_there))
+
+
+def _downhill_step(pressed: Pressed) -> float:
+    """Of the step cap: shorter where curves bend often, or barriers end where domes let go."""
+    is_plain = pressed.limits is None and pressed.finger.law.curve is None
+    return 1.0 if is_plain else SHORT_STEP
