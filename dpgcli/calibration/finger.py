@@ -86,6 +86,8 @@ class FingerFit:
                 )
             if not np.isfinite(values[key]).all():
                 raise FitError(Field("free"), f" {key}: is infinite, start from a finite value")
+            if key == COUPLING and not self.finger.hinge_stiffness.all():
+                raise FitError(Field("free"), f" {key}: hinges have no stiffness to couple")
 
     def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.
@@ -243,8 +245,6 @@ class FingerFit:
         """Hinges may turn out not to turn each other; the sign is that of the data."""
         hinge = float(self.finger.hinge_stiffness.min())
         most, is_free = LARGEST_COUPLING * hinge, COUPLING in self.free
-        if is_free and not hinge:
-            raise FitError(Field("free"), f" {COUPLING}: hinges have no stiffness to couple")
         begin = start or FIRST_COUPLING * hinge
         return Parameter(COUPLING, begin if is_free else start, -most, most, is_free)
 
