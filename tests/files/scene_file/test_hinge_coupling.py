@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 import dpgcli as dpg
+from dpgcli.api.inputs import scene_input
+from dpgcli.api.recalibration import recalibrated_scene
 from dpgcli.design.dimensions import Tolerance
+from dpgcli.design.resolve import resolve
 from dpgcli.design.scatter import scattered
 from dpgcli.files.scene_file import read_spec
 
 CONFIGS = Path(__file__).parents[3] / "configs"
+WALLS = "wall_compliance_mm_per_N"
 KEY = "hinge_coupling_N_mm_per_rad"
 LATTICE = {
     "segment_length_mm": 13.5,
@@ -52,6 +56,9 @@ def test_it_is_said_where_it_is_from() -> None:
     (source,) = (source for source in plan.scene.sources if source.key == KEY)
     assert (source.value, source.origin, source.units) == (1.2, "given", "1-3")
     assert coupling(finger(**{KEY: 1.2}), settings={f"finger.{KEY}": -0.3}) == -0.3
+    graded = finger(overrides={"2": {"lattice": {"stroke_mm": 3.4}}}, **{KEY: 1.2})
+    (source,) = (source for source in dpg.explain(graded).scene.sources if source.key == KEY)
+    assert source.units == "1-3"
 
 
 def test_a_calibration_may_have_it_and_it_is_scaled_as_hinges_are(tmp_path: Path) -> None:
@@ -123,6 +130,10 @@ def test_errors_and_tolerances_of_it_reach_the_tips() -> None:
         assert row[f"tip_{axis}_uncertainty_mm"] == pytest.approx(moved, rel=1e-4)
     with pytest.raises(dpg.SpecError, match="hinges do not turn each other"):
         dpg.explain(finger() | {"uncertainty": {KEY: 0.1}})
+    with pytest.raises(dpg.SpecError, match=f"{KEY} is 0"):
+        dpg.explain(finger(**{KEY: 0.0}) | {"uncertainty": {KEY: "10%"}})
+    none = dpg.predict(finger(**{KEY: 0.0}) | {"uncertainty": {KEY: 0.1}}, columns="uncertainty")
+    assert none.to_pandas()["tip_y_uncertainty_mm"].max() > 1e-4, "what a little of it would do"
 
 
 def test_draws_whose_hinges_would_run_away_are_none() -> None:
@@ -134,6 +145,25 @@ def test_draws_whose_hinges_would_run_away_are_none() -> None:
     draws = scattered(design, {hinge: Tolerance(1.0, False)}, 400, 1)
     moved = (24.2 + draws.moves[hinge]).min(axis=0)
     assert draws.are_wrong.tolist() == (moved <= 22.0).tolist() and draws.are_wrong.any()
+
+
+def test_designs_with_and_without_one_are_no_batch() -> None:
+    base = read_spec(CONFIGS / "three_unit.yaml").design
+    design = base.with_values({f"finger.{KEY}": np.array([0.0, 1.2, 0.0, -5.0])})
+    parts = resolve(design).alike(np.arange(4))
+    assert [part.tolist() for part in parts] == [[0, 2], [1, 3]]
+
+
+def test_a_calibration_takes_the_place_of_what_a_spec_says(tmp_path: Path) -> None:
+    """As in `compare --calibration`; one that has none leaves it."""
+    (tmp_path / "coupled.yaml").write_text(FILE)
+    (tmp_path / "other.yaml").write_text(
+        FILE.replace(KEY + ": {value: 1.2", f"{WALLS}: {{value: 1")
+    )
+    given = scene_input(finger(**{KEY: 5.0}), {})
+    for name, expected in (("coupled.yaml", 1.2), ("other.yaml", 5.0)):
+        found = recalibrated_scene(given, tmp_path / name).finger
+        assert found.hinge_coupling[0, 0] == expected
 
 
 def test_long_fingers_are_solved_whole() -> None:
