@@ -37,12 +37,11 @@ def line_of(given: GivenPressure, n_units: int) -> Indices:
 
 
 def history_of(given: GivenPressure, n_units: int) -> History | None:
-    """The pressures of all lines by step; those that the history does not name are at 0 MPa."""
+    """The pressures of all lines by step."""
     if not given.history:
         return None
     times = given.history.get(TIME)
-    n_steps = len(next(iter(given.history.values())))
-    columns = [given.history.get(line, np.zeros(n_steps)) for line in units_by_line(given, n_units)]
+    columns = [given.history[line] for line in units_by_line(given, n_units)]
     return History(np.array(columns, float).T, None if times is None else np.array(times, float))
 
 
@@ -82,8 +81,12 @@ def _history_issues(given: GivenPressure, n_units: int) -> Iterator[Issue]:
             yield Issue(path, f"a line: {', '.join(lines)}", dotted((column,)))
         if length != lengths[first]:
             yield Issue(path, f"{lengths[first]} numbers, as {first}", str(length))
-    if lengths and lengths.keys() == {TIME}:
-        yield Issue(HISTORY, "pressures of a line", "times alone")
+    left = [line for line in lines if line not in lengths]
+    if lengths and left and lengths.keys() <= {*lines, TIME}:
+        zeros = ":".join("0" * max(length for length in lengths.values()))
+        expected = f"pressures for each line: {', '.join(lines)}"
+        hint = f"{left[0]}: {zeros} keeps it at 0 MPa"
+        yield Issue(HISTORY, expected, f"none for {', '.join(left)}", hint)
     times = np.array(given.history.get(TIME, ()), float)
     for place in np.flatnonzero(np.diff(times) < 0.0)[:1].tolist():
         expected = f"a time from {number(times[place])} s on"

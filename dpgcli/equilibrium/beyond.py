@@ -57,12 +57,12 @@ def beyond(
     way = _Tangent(_alone(family, here, which), 0.0 * load)
     found: list[Corrected] = []
     while len(found) < MOST_POINTS:
-        values = here.linear.measured.value
+        values = here.measured.value
         guess = family.coordinates.moved(here.coordinates, way.motion * step)
         target, there_load = values[cell] + step * scale, here.load + way.slope * step
         there = corrected(family, guess, there_load, which, target, depth)
         is_unstable = (slope_by(family, there, which) * rises < 0.0)[0]
-        moved = np.abs((there.linear.measured.value - values) / family.scale).max()
+        moved = np.abs((there.measured.value - values) / family.scale).max()
         is_near = moved <= FURTHEST * abs(step)
         if there.is_fine[0] and is_unstable and is_near and not _is_left(family, there):
             found.append(there)
@@ -82,7 +82,7 @@ def _alone(
 ) -> Array:
     """The motion by which a force on the cell alone moves it by one scale."""
     _, scale, chosen = of_cell(family, here, cell)
-    own = (chosen * along(family.measure.rows, here.linear.measured, here.by_hold)).sum(axis=0)
+    own = (chosen * along(family.measure.rows, here.measured, here.by_hold)).sum(axis=0)
     return np.asarray(here.by_hold / own * scale)
 
 
@@ -97,5 +97,5 @@ def _tangent(
 
 def _is_left(family: LoadedPotential[Coordinates, LoadedLaw], there: Corrected) -> bool:
     """Whether another law holds there."""
-    margin = family.law.margin(there.linear.measured.value, there.load)
+    margin = family.law.margin(there.measured.value, there.load)
     return margin is not None and bool((margin < 0.0).any())

@@ -12,11 +12,12 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
-from dpgcli.equilibrium.contracts import Coordinates
-from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, along, spread
+from dpgcli.equilibrium.contracts import Coordinates, Measured
+from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along, spread
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
-SETTLED_STEP = 1e-5  # of the step cap; Newton squares it
+SETTLED_STEP = 1e-5  # of the step cap: what is left to go
+COMPACTING_SHARE = 0.25  # of ended lanes: from it on, dropping them pays for the copy
 MAX_CORRECTIONS = 8
 
 
@@ -25,10 +26,39 @@ class Corrected(NamedTuple):
 
     coordinates: Array
     load: Array
-    linear: Linearized
+    measured: Measured
     along_load: Array  # −H'⁻¹ ∂g/∂λ
     by_hold: Array  # H'⁻¹ ∇q
     is_fine: Flags
+
+
+class _Points(NamedTuple):
+    """Points under way, (size, batch) and (batch,), and the cell of each that is held at a target.
+
+    `stiffness` (cell, batch) is zero where nothing is held.
+    """
+
+    coordinates: Array
+    load: Array
+    chosen: Flags
+    stiffness: Array
+    target: Array
+
+    def only(self, lanes: Indices) -> "_Points":
+        """Some lanes."""
+        return _Points(*(np.take(getattr(self, f), lanes, axis=-1) for f in self._fields))
+
+
+class _Look(NamedTuple):
+    """What there is at points: which are solutions, which stable; and Newton's step from them."""
+
+    measured: Measured
+    along_load: Array
+    by_hold: Array
+    is_there: Flags
+    is_stable: Flags
+    step: Array
+    change: Array
 
 
 @in_lanes
@@ -40,37 +70,56 @@ def corrected(
     target: Array,
     depth: int,
 ) -> Corrected:
-    """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1."""
-    shape = family.measure(guess).value.shape
-    chosen = np.arange(shape[0])[:, None] == cell
-    is_held = cell >= 0
-    stiffness = np.where(chosen, np.broadcast_to(family.stiffness, shape), 0.0)
-    target = np.where(is_held, target, 0.0)
-    scale = np.where(chosen, np.broadcast_to(family.scale, shape), 0.0).sum(axis=0)
-    x, n = guess, len(load)
-    settled, done = np.zeros(n, bool), np.zeros(n, bool)
-    coordinates = family.coordinates
+    """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1.
+
+    Lanes that have ended are put aside where they are many.
+    """
+    n, lanes, own = len(load), np.arange(len(load)), family
+    chosen = np.arange(len(family.measure(guess).value))[:, None] == cell
+    stiffness = np.where(chosen, np.broadcast_to(family.stiffness, chosen.shape), 0.0)
+    here = _Points(guess, load, chosen, stiffness, np.where(cell >= 0, target, 0.0))
+    coordinates, by_load, by_hold = np.zeros((3, *guess.shape))
+    loads, is_fine = np.zeros(n), np.zeros(n, bool)
     for count in range(MAX_CORRECTIONS + 1):
-        linear = family.linearized(x, load, stiffness, target, depth)
-        residual = np.abs(linear.gradient / coordinates.gradient_scale).max(axis=0)
-        away = np.where(chosen, linear.measured.value - target, 0.0).sum(axis=0)
-        is_there = (residual <= TOLERANCE) & (
-            np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
-        )
-        done |= is_there & settled
-        factors = factorize(linear.hessian, family.column_depths)
-        selector = spread(family.measure.rows, linear.measured, chosen.astype(float), x)
-        sides = np.stack((-linear.gradient, -linear.rate, selector), axis=1)
-        by_residual, by_load, by_hold = np.moveaxis(_solved(factors, sides), 1, 0)
-        if done.all() or count == MAX_CORRECTIONS:
+        look = _look(own, here, depth)
+        ended = look.is_there | (count == MAX_CORRECTIONS)
+        rest = np.flatnonzero(~ended)
+        is_crowded = ended.mean() > COMPACTING_SHARE
+        if is_crowded:
+            done = lanes[ended]
+            coordinates[:, done], loads[done] = here.coordinates[:, ended], here.load[ended]
+            by_load[:, done], by_hold[:, done] = look.along_load[:, ended], look.by_hold[:, ended]
+            is_fine[done] = (look.is_there & look.is_stable)[ended]
+        if not len(rest):
             break
-        change = (-away - total(selector * by_residual)) / total(selector * by_load)
-        change = np.where(is_held, change, 0.0)
-        step = np.where(done, 0.0, by_residual + change * by_load)
-        settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
-        x, load = coordinates.moved(x, step), np.where(done, load, load + change)
-    is_fine = done & (factors.pivots > 0.0).all(axis=0)
-    return Corrected(x, load, linear, by_load, by_hold, is_fine)
+        step, change = np.where(ended, 0.0, look.step), np.where(ended, 0.0, look.change)
+        moved = own.coordinates.moved(here.coordinates, step)
+        here = here._replace(coordinates=moved, load=here.load + change)
+        if is_crowded:
+            lanes, own, here = lanes[rest], own.take_lanes(rest), here.only(rest)
+    measured = look.measured if len(lanes) == n else family.measure(coordinates)
+    return Corrected(coordinates, loads, measured, by_load, by_hold, is_fine)
+
+
+def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth: int) -> _Look:
+    coordinates, is_held = family.coordinates, here.chosen.any(axis=0)
+    linear = family.linearized(here.coordinates, here.load, here.stiffness, here.target, depth)
+    measured, rows = linear.measured, family.measure.rows
+    away = np.where(here.chosen, measured.value - here.target, 0.0).sum(axis=0)
+    factors = factorize(linear.hessian, family.column_depths)
+    selector = spread(rows, measured, here.chosen.astype(float), here.coordinates)
+    sides = np.stack((-linear.gradient, -linear.rate, selector), axis=1)
+    by_residual, by_load, by_hold = np.moveaxis(_solved(factors, sides), 1, 0)
+    change = (-away - total(selector * by_residual)) / total(selector * by_load)
+    change = np.where(is_held, change, 0.0)
+    step = by_residual + change * by_load
+    scale = np.where(here.chosen, np.broadcast_to(family.scale, here.chosen.shape), 0.0).sum(axis=0)
+    residual = np.abs(linear.gradient / coordinates.gradient_scale).max(axis=0)
+    is_held_there = np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
+    is_settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
+    is_there = np.asarray((residual <= TOLERANCE) & is_held_there & is_settled)
+    is_stable = np.asarray((factors.pivots > 0.0).all(axis=0))
+    return _Look(measured, by_load, by_hold, is_there, is_stable, step, change)
 
 
 def _solved(factors: Factorization, sides: Array) -> Array:
@@ -88,7 +137,7 @@ def slope_by(
     With H' = H + k ∇q∇qᵀ the motion per q is k H'⁻¹∇q + λ' z, z = −H'⁻¹ ∂g/∂λ, and ∇q · of it is 1.
     """
     stiffness, scale, chosen = of_cell(family, here, cell)
-    rows, measured = family.measure.rows, here.linear.measured
+    rows, measured = family.measure.rows, here.measured
     by_hold = (chosen * along(rows, measured, here.by_hold)).sum(axis=0)
     by_load = (chosen * along(rows, measured, here.along_load)).sum(axis=0)
     return np.where(cell >= 0, (1.0 - stiffness * by_hold) / by_load * scale, np.nan)
@@ -109,7 +158,7 @@ def of_cell(
     family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected, cell: Indices
 ) -> tuple[Array, Array, Array]:
     """Stiffness and scale of a cell of each lane, (batch,), and where it is, (cell, batch)."""
-    shape = here.linear.measured.value.shape
+    shape = here.measured.value.shape
     chosen = (np.arange(shape[0])[:, None] == cell).astype(float)
     stiffness = (chosen * family.stiffness).sum(axis=0)
     return stiffness, (chosen * family.scale).sum(axis=0), chosen

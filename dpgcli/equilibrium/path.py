@@ -155,7 +155,7 @@ def _begin(
     here = corrected(family, coordinates, load, nothing, free, depth)
     margin = _margin(family, here)
     walk = _Walk(
-        here.coordinates, here.load, here.linear.measured.value, np.zeros_like(coordinates),
+        here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
         margin,
     )  # fmt: skip
@@ -164,8 +164,8 @@ def _begin(
 
 
 def _margin(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) -> Array:
-    margin = family.law.margin(here.linear.measured.value, here.load)
-    return np.full(here.linear.measured.value.shape, np.inf) if margin is None else margin
+    margin = family.law.margin(here.measured.value, here.load)
+    return np.full(here.measured.value.shape, np.inf) if margin is None else margin
 
 
 class _Trial(NamedTuple):
@@ -220,10 +220,11 @@ def _one_step(
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
     event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
-    event, moved = _at_event(family, walk, trial, event_cell), accepted & landed
+    event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
-    if landed.any():
+    if event is not None:
+        moved = accepted & landed
         walk.coordinates = np.where(moved, event.coordinates, walk.coordinates)
         walk.load = np.where(moved, event.load, walk.load)
         walk.cell = np.where(landed, event_cell, walk.cell)
@@ -251,7 +252,7 @@ def _tried(
     scale = np.broadcast_to(family.scale, walk.values.shape)
     target = walk.values[place] + walk.sign * step * scale[place]
     there = corrected(family, guess, load, cell, target, depth)
-    moved = np.abs((there.linear.measured.value - walk.values) / scale).max(axis=0)
+    moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
@@ -270,7 +271,7 @@ def _move(
         walk,
         coordinates=there.coordinates,
         load=there.load,
-        values=there.linear.measured.value,
+        values=there.measured.value,
         last=trial.step + unknown,
         last_slope=walk.slope + unknown,
         margin=trial.margin,
@@ -292,7 +293,7 @@ def _first_dip(
     place = np.maximum(walk.cell, 0), np.arange(len(towards))
     scale = np.broadcast_to(family.scale, walk.values.shape)[place]
     share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
-    way = trial.there.linear.measured.value - walk.values
+    way = trial.there.measured.value - walk.values
     between = walk.values + share * way
     here, there = (family.law.at(load)(between).stiffness for load in (walk.load, trial.there.load))
     stiffness = (here + share * (there - here))[:, *place]
@@ -320,7 +321,7 @@ def _at_event(
     is_near = np.isfinite(before) & (before > 2.0 * np.abs(margin))
     share = np.where(is_near, margin, 0.0) / np.where(is_near, before - margin, 1.0)
     followed = np.maximum(trial.cell, 0), lanes
-    by_cell = (there.linear.measured.value - walk.values)[followed]
+    by_cell = (there.measured.value - walk.values)[followed]
     rest = share * np.where(trial.cell >= 0, by_cell, there.load - walk.load)
     motion, by = motion_by(family, there, trial.cell)
     return _Place(there.coordinates + motion * rest, there.load + by * rest)
@@ -353,7 +354,7 @@ def _turn(
     """
     motion, by = motion_by(family, here, cell)
     is_held = cell >= 0
-    rows, measured = family.measure.rows, here.linear.measured
+    rows, measured = family.measure.rows, here.measured
     rates = along(rows, measured, motion) / family.scale
     size = np.abs(rates)
     chosen = size.argmax(axis=0)

@@ -46,6 +46,12 @@ class PressedDesigns:
         return Thresholds(snap, reset, np.broadcast_to(found.furthest, self.n_designs))
 
     @cached_property
+    def both(self) -> Array:
+        """Snap and reset pressures (2, unit, design), NaN for units that hold but one state."""
+        found = np.stack([self.thresholds.snap, self.thresholds.reset])
+        return np.where(np.isnan(found).any(axis=0), np.nan, found)
+
+    @cached_property
     def is_reached(self) -> Flags:
         """Which states pulses lead to from rest, (design, pattern by code)."""
         is_stable = stable_states(self.pressed, self.n_designs)

@@ -165,3 +165,15 @@ def test_a_batch_of_metrics_needs_pressure_for_its_columns() -> None:
     assert all(metric.needs_pressure for metric in UNDER_PRESSURE)
     others = {m.name for m in metrics.METRICS} - set(NAMES)
     assert not any(m.needs_pressure for m in metrics.METRICS if m.name in others)
+
+
+@pytest.mark.parametrize("linearity", [0.1, 0.2])
+def test_units_that_hold_but_one_state_leave_no_numbers_for_all(
+    pressed: Pressed, tables: Any, linearity: float
+) -> None:
+    """With 0.1 a unit still snaps, but holds no shape without pressure; with 0.2 it does not."""
+    axis = f"{{key: finger.overrides.1.lattice.force_linearity, values: [0.02, {linearity}]}}"
+    _, designs = tables(pressed(axis))
+    bistable, other = designs[NAMES[2:6]].to_numpy(float)
+    assert np.isfinite(bistable).all()
+    assert np.isnan(other).all()

@@ -140,14 +140,14 @@ def test_histories() -> None:
     lists = pressure_of(f"{LINES}, history: {{A: 0:0.15:0, B: [0, -1.0e-1, 0]}}").history
     assert lists.pressure.tolist() == [[0.0, 0.0], [0.15, -0.1], [0.0, 0.0]]
     assert lists.time is None
-    timed = pressure_of(f"{LINES}, history: {{time_s: [0, 2, 2], B: 0:.1:+0}}").history
+    timed = pressure_of(f"{LINES}, history: {{time_s: [0, 2, 2], A: 0:0:0, B: 0:.1:+0}}").history
     assert timed.pressure.tolist() == [[0.0, 0.0], [0.0, 0.1], [0.0, 0.0]]
     assert timed.time.tolist() == [0.0, 2.0, 2.0]
 
 
 def test_what_says_the_same_is_the_same() -> None:
-    one = read("lines: {A: 1-3, B: '4, 5'}, history: {A: 0:0.1}")
-    other = read("lines: {A: ' 1 - 3', B: [4, 5]}, history: {A: [0, 0.1]}")
+    one = read("lines: {A: 1-3, B: '4, 5'}, history: {A: 0:0.1, B: 0:0}")
+    other = read("lines: {A: ' 1 - 3', B: [4, 5]}, history: {A: [0, 0.1], B: [0, 0.0]}")
     assert canonical_json(one) == canonical_json(other)
     again = checked(parse_document("x.yaml", canonical_json(one)))
     assert again == one
@@ -200,7 +200,14 @@ def test_what_says_the_same_is_the_same() -> None:
         ("history: {A: [0, null, 0]}", "history.A.1: expected a pressure in MPa, found nothing"),
         ("history: {A: [0, x]}", 'history.A.1: expected a pressure in MPa, found "x"'),
         ("history: {C: 0:1}", "history.C: expected a line: A, found C"),
-        ("history: {time_s: [0, 1]}", "history: expected pressures of a line, found times alone"),
+        (
+            "history: {time_s: [0, 1]}",
+            "history: expected pressures for each line: A, found none for A",
+        ),
+        (
+            "lines: {A: 1-3, B: 4-5}, history: {A: 0:0.1:0}",
+            "history: expected pressures for each line: A, B, found none for B (B: 0:0:0 keeps",
+        ),
         (
             "history: {time_s: [0, 2, 1], A: 0:1:0}",
             "history.time_s.2: expected a time from 2 s on, found 1",
