@@ -81,14 +81,13 @@ def settle_from(
 
 
 def _worth_a_search(settled: Settled, units: UnitSolutions) -> Indices:
-    """Lanes without a state, if units feel each other and all inverted ones may have second wells.
+    """Lanes without a state, if bars give way and every inverted unit may have a second well.
 
     What is folded in its own wells between stiff bars has no other state.
     """
     is_elsewhere = ((settled.reached != settled.inverted) | settled.strayed).any(axis=0)
     is_missed = is_elsewhere | (settled.status != Status.STABLE)
-    finger = units.finger
-    if (finger.is_rigid and not finger.is_coupled) or not is_missed.any():
+    if units.finger.is_rigid or not is_missed.any():
         return np.arange(0)
     has_none = (settled.inverted & units.have_no_well).any(axis=0)
     is_no_other = settled.is_folded & ~is_elsewhere & ~units.are_soft.any(axis=0)

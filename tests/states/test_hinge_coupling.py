@@ -152,4 +152,6 @@ def test_halves_are_no_way_to_it() -> None:
 def test_no_bound_is_claimed_before_the_work() -> None:
     plan = explain(Scene(finger_with(3, 1.2, 1e4), ()), Request(target_error=0.01))
     assert np.isinf(plan.error_bound)
-    assert not any("do not feel" in o.why for o in plan.omissions)
+    for coupling in (0.0, 1.2):
+        rigid = explain(Scene(finger_with(3, coupling), ()), Request())
+        assert any("do not feel" in o.why for o in rigid.omissions) == (coupling == 0.0)
