@@ -26,7 +26,7 @@ class Command(TyperCommand):
                 formatter.write(f"{'':{formatter.current_indent}}{line}\n")
 
 
-class Group(TyperGroup):
+class CommandGroup(TyperGroup):
     """A command of several."""
 
     def get_short_help_str(self, limit: int = 0) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dpgcli.cli.commands import Group, add_command
+from dpgcli.cli.commands import CommandGroup, add_command
 from dpgcli.cli.exits import run_and_exit
 
 # Small matrices gain nothing from threads; set before NumPy is loaded.
@@ -32,7 +32,7 @@ class Commands(Mapping[str, Any]):
         module = import_module(f"dpgcli.cli.{name}")
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
         if hasattr(module, "app"):  # commands of its own
-            app.add_typer(module.app, name=name, cls=Group)
+            app.add_typer(module.app, name=name, cls=CommandGroup)
         else:
             add_command(app, getattr(module, name))
         return typer.main.get_group(app).commands[name]
@@ -44,7 +44,7 @@ class Commands(Mapping[str, Any]):
         return len(NAMES)
 
 
-class _Program(Group):
+class _Program(CommandGroup):
     def __init__(self, **named: Any) -> None:
         super().__init__(**{**named, "commands": Commands()})
 

@@ -57,7 +57,7 @@ class Curve(Spline):
     """A dome's energy by its travel.
 
     `rests` are the top and the well, where the slope vanishes: the minimum that lies deepest below
-    what is on both its sides, and the highest maximum before it; NaN where there is none.
+    the highest maximum before it, and that maximum; NaN where there is none.
     `branches` are the stretches between the two on which the energy falls, each from its top to its
     well, the last one first.
     """
@@ -163,10 +163,10 @@ def _parabola(travel: Array, value: Array) -> tuple[float, float]:
 def _rests(
     cubic: "CubicSpline",
 ) -> tuple[tuple[float, float], tuple[tuple[float, float], ...]]:
-    """The highest top before the deepest well, by how much it lies below both sides, and that well.
+    """The highest top before the deepest well, and that well: the deepest below all tops before it.
 
-    Then what lies between the two: the branches, from the last to the first. A curve that ends
-    while it rises goes on rising, so that a well near its end is not the shallower for it.
+    Then what lies between the two: the branches, from the last to the first. What comes after a
+    well counts for nothing: a curve may end anywhere, and its spline may turn over there.
     """
     slope, bend = cubic.derivative(), cubic.derivative(2)
     roots = np.array([root for root in slope.roots(extrapolate=False) if root > 0.0])
@@ -174,13 +174,7 @@ def _rests(
     wells = wells[wells > np.min(tops, initial=np.inf)]
     if not len(wells):
         return (np.nan, np.nan), ((np.nan, np.nan),)
-    end = float(cubic.x[-1])
-    last = np.inf if slope(end) > 0.0 else float(cubic(end))
-    depths = [
-        min(cubic(tops[tops < well]).max(), np.max(cubic(tops[tops > well]), initial=last))
-        - cubic(well)
-        for well in wells
-    ]
+    depths = [cubic(tops[tops < well]).max() - cubic(well) for well in wells]
     well = float(wells[np.argmax(depths)])
     before = tops[tops < well]
     top = float(before[np.argmax(cubic(before))])

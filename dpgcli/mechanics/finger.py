@@ -129,13 +129,16 @@ class Finger:
     def force_scale(self) -> Array:
         """The forces in play in each unit, (k_b + k_θ/H²) d, in N, shape (unit, design).
 
+        Without k_b where a dome exerts no force, unless there is no hinge either.
+
         >>> unit = uniform_finger(1, segment_length=13.5, segment_height=10.0, stroke=2.0,
         ...     bistable_stiffness=1.0, force_linearity=0.0, hinge_stiffness=100.0)
         >>> float(unit.force_scale[0, 0])
         4.0
         """
         hinge = self.hinge_stiffness / self.segment_height**2
-        return (self.acting * self.bistable_stiffness + hinge) * self.stroke
+        stiffness = self.acting * self.bistable_stiffness + hinge
+        return np.where(stiffness > 0.0, stiffness, self.bistable_stiffness) * self.stroke
 
     @property
     def straight_length(self) -> Array:

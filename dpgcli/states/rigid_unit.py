@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Response
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.finger import Finger
@@ -69,6 +70,7 @@ def _with_hinge(
     return Response(energy, spring.force + pull, spring.stiffness + stiffness)
 
 
+@in_lanes
 def tangent_of(finger: Finger, extension: Array) -> Array:
     """The tangent t of the corners' turn of a unit between rigid bars whose dome extends by y, mm.
 

@@ -26,7 +26,7 @@ SEARCHED = 512  # places at which the force of a unit is looked at, for any curv
 FEWER = 64  # for the polynomial, whose force turns twice
 COARSE = 16  # of them, with walls, for which the corners' turn is searched
 TANGENTS = 2.0  # times a slope's reach: a stiffness may have a kink in the cell
-WIDEST = 1.5  # of the travel to the spring's own well: no unit rests beyond
+WIDEST = 1.5  # of the travel to the polynomial's own well: no unit rests beyond
 ARRIVED = 1e-15  # of what places are counted by: a smaller step is rounding
 ONE = np.ones((1, 1))
 BISECTIONS = 53  # of one 64th of the range: down to rounding
@@ -120,10 +120,11 @@ def _range(finger: Finger, own_well: Array) -> tuple[Array, Flags]:
     domes = finger.domes
     whole = domes.stroke + domes.contact
     own = own_well + domes.contact  # a travel; the unit's is shorter
-    furthest = WIDEST * np.where(np.isnan(own), whole, own)
     curve = finger.law.curve
-    if curve is not None:  # beyond its last point nothing is known, but for a well that is there
-        furthest = np.minimum(furthest, np.fmax(curve.knots[-1] * whole, own))
+    if curve is None:
+        furthest = WIDEST * np.where(np.isnan(own), whole, own)
+    else:  # beyond its last point nothing is known, but for a well that is there
+        furthest = np.fmax(curve.knots[-1] * whole, own)
     widest = furthest - domes.contact
     if not finger.has_walls:  # walls take the rest
         widest = np.minimum(widest, SHORT_OF_LEVER * 2.0 * finger.segment_height)

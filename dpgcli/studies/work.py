@@ -7,9 +7,10 @@ from time import process_time
 from typing import IO, Any, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
-from dpgcli.sweeps.evaluation import Evaluation, Tables, Values
+from dpgcli.sweeps.evaluation import Evaluation, Tables
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker
+from dpgcli.sweeps.space import DesignValues
 
 
 class ChunkResult(NamedTuple):
@@ -32,7 +33,7 @@ class ChunkTask:
     evaluation: Evaluation
     store: PartStore | None
 
-    def __call__(self, chunk: Chunk, values: dict[str, Values], maker: Maker) -> ChunkResult:
+    def __call__(self, chunk: Chunk, values: DesignValues, maker: Maker) -> ChunkResult:
         """Evaluate a chunk's designs, with these values by key, into a part by this maker."""
         check_maker(maker)
         return self.stored(chunk, self.evaluation(chunk.start, values))

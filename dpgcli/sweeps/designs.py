@@ -17,7 +17,7 @@ from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.metrics import Metrics
 
-ROWS_AT_ONCE = 2**15  # of one design
+ROWS_AT_ONCE = 2**15  # of states, in many batches
 
 
 class Block(NamedTuple):
@@ -38,7 +38,7 @@ def design_states(
 ) -> Iterator[Block]:
     """All states of a batch of designs, design by design, in blocks.
 
-    A block holds several designs, or up to `ROWS_AT_ONCE` states of one: how long one is cut
+    A block holds up to `ROWS_AT_ONCE` states, of several designs or of one: how long one is cut
     depends on its number of units alone.
     """
     units, dropped = exactness.units, exactness.dropped_error
@@ -60,12 +60,16 @@ def design_states(
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
-    for designs in _design_batches(n_designs, n_units):
+    for designs in _groups(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
         pressure = scene.pressure and scene.pressure.take_lanes(designs)
         metrics = Metrics(_designs(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
-            parts = [solved(designs, c + np.uint64(first)) for c in chunks(n_codes, size)]
+            parts = [
+                solved(some, codes + np.uint64(first))
+                for some in _groups(designs, size >> n_units)
+                for codes in chunks(n_codes, size)
+            ]
             rows = _joined(parts)
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
@@ -87,10 +91,11 @@ def designs_at_once(n_units: int) -> int:
     return max(1, lanes_at_once(n_units) >> n_units)
 
 
-def _design_batches(n_designs: int, n_units: int) -> Iterator[Indices]:
-    size = designs_at_once(n_units)
-    for first in range(0, n_designs, size):
-        yield np.arange(first, min(first + size, n_designs))
+def _groups(designs: Indices, size: int) -> Iterator[Indices]:
+    """So many designs at a time, or one."""
+    size = max(size, 1)
+    for first in range(0, len(designs), size):
+        yield designs[first : first + size]
 
 
 def _placement(

@@ -20,9 +20,7 @@ from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import design_states
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import METRICS
-from dpgcli.sweeps.space import Space
-
-Values = NDArray[Any]
+from dpgcli.sweeps.space import DesignValues, Space
 
 
 class DesignStatus(StrEnum):
@@ -85,7 +83,7 @@ class Evaluation:
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
 
-    def __call__(self, start: int, values: Mapping[str, Values]) -> Iterator[Tables]:
+    def __call__(self, start: int, values: DesignValues) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
 
         One design comes in blocks of its states, the row of the design with the last.
@@ -108,7 +106,7 @@ class Evaluation:
         )
 
     def _resolved(
-        self, values: Mapping[str, Values], allowed: Flags
+        self, values: DesignValues, allowed: Flags
     ) -> "tuple[list[tuple[Indices, Scene]], Indices, dict[int, str]]":
         """Designs that share a batch, by their places, with what they describe.
 
@@ -132,9 +130,7 @@ class Evaluation:
             batches += [(places[alike], found.batch(alike)) for alike in found.alike(right)]
         return batches, origins, reasons
 
-    def _designs(
-        self, values: Mapping[str, Values], places: Indices
-    ) -> Iterator[tuple[Indices, Design]]:
+    def _designs(self, values: DesignValues, places: Indices) -> Iterator[tuple[Indices, Design]]:
         """The designs at some places, by their number of units."""
         columns = {key: column[places] for key, column in values.items()}
         units = columns.pop(UNITS, np.full(len(places), self.base.units))
@@ -144,7 +140,7 @@ class Evaluation:
             base = replace(self.base, units=int(n_units), n_designs=len(here))
             yield places[here], base.with_values(own)
 
-    def _are_possible(self, values: Mapping[str, Values]) -> Flags:
+    def _are_possible(self, values: DesignValues) -> Flags:
         """Which designs have only values that their keys can have."""
         own = (key.removeprefix("gripper.") for key in values if key.startswith("gripper."))
         gripper = {*self.base.gripper, *own}
@@ -154,7 +150,7 @@ class Evaluation:
             possible &= are_possible(key.rsplit(".", 1)[-1], column)
         return possible
 
-    def failed(self, design: int, values: Mapping[str, Values]) -> Tables:
+    def failed(self, design: int, values: DesignValues) -> Tables:
         """The rows of one design that cannot be evaluated at all."""
         described = {**self._described(design, values), "calibration": np.array([b""])}
         rows = self._design_rows(described, [], np.array([True]), {0: "its worker died, twice"})
@@ -165,11 +161,11 @@ class Evaluation:
     def _no_designs(self) -> Columns:
         return {c.name: np.zeros(0, _dtype(c.kind)) for c in self.design_columns}
 
-    def _described(self, start: int, values: Mapping[str, Values]) -> Columns:
+    def _described(self, start: int, values: DesignValues) -> Columns:
         numbers = np.arange(start, start + len(next(iter(values.values()))))
         return {"design": numbers, **{self.values[key].name: v for key, v in values.items()}}
 
-    def allowed(self, values: Mapping[str, Values]) -> NDArray[np.bool_]:
+    def allowed(self, values: DesignValues) -> NDArray[np.bool_]:
         """Which designs meet all constraints; names may be dotted keys or their last part."""
         n_designs = len(next(iter(values.values())))
         known: dict[str, Any] = {**self.known, **values}
@@ -180,7 +176,7 @@ class Evaluation:
             allowed &= np.broadcast_to(np.isfinite(met) & (met != 0.0), n_designs)
         return allowed
 
-    def exist(self, values: Mapping[str, Values]) -> tuple[Flags, Flags]:
+    def exist(self, values: DesignValues) -> tuple[Flags, Flags]:
         """Which designs meet all constraints, and which of these can exist; nothing is solved."""
         allowed = self.allowed(values)
         right = allowed & self._are_possible(values)
@@ -188,7 +184,7 @@ class Evaluation:
             right[places] = ~resolve(design).are_wrong
         return allowed, right
 
-    def reason(self, values: Mapping[str, Values]) -> str:
+    def reason(self, values: DesignValues) -> str:
         """Why the first design that constraints allow cannot exist; empty where none is wrong."""
         first = np.flatnonzero(self.allowed(values))[:1]
         if not len(first):
@@ -197,9 +193,7 @@ class Evaluation:
         reasons = self._resolved(one, np.array([True]))[2]
         return reasons.get(0, "")
 
-    def kinds_of_trust(
-        self, values: Mapping[str, Values]
-    ) -> Iterator[tuple[tuple[Trust, ...], int]]:
+    def kinds_of_trust(self, values: DesignValues) -> Iterator[tuple[tuple[Trust, ...], int]]:
         """What outputs of designs that will be solved rest on, and how many of them."""
         right = self.allowed(values) & self._are_possible(values)
         for _, design in self._designs(values, np.flatnonzero(right)):
@@ -280,7 +274,7 @@ REASON = Column("reason", "", "why the design is invalid", kind=Kind.TEXT)
 class _Solved(NamedTuple):
     """Designs at some places of a chunk: rows of their states, and, with the last, metrics."""
 
-    places: Values
+    places: Indices
     rows: Columns
     metrics: Columns | None
 

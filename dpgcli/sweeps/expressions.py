@@ -256,5 +256,6 @@ def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
 
 def _defined(value: Any, parts: list[Any], undefined: list[Any]) -> Any:
     are_finite = reduce(np.logical_and, map(np.isfinite, parts))
-    undefined.append(are_finite & ~np.isfinite(value))
+    are_numbers = ~reduce(np.logical_or, map(np.isnan, parts))
+    undefined.append(are_finite & ~np.isfinite(value) | are_numbers & np.isnan(value))
     return value

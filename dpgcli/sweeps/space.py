@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[Any]
+from dpgcli.arrays import Array
+
+DesignValues = Mapping[str, NDArray[Any]]  # by key, one for each design
 SAMPLES_AT_ONCE = 2**16
 
 
@@ -16,7 +18,7 @@ SAMPLES_AT_ONCE = 2**16
 class Axis:
     """Keys that vary together, each with one value per point."""
 
-    values: Mapping[str, Numbers]
+    values: DesignValues
 
     def __post_init__(self) -> None:
         if len({len(column) for column in self.values.values()}) != 1:
@@ -45,7 +47,7 @@ class Space:
     def size(self) -> int:
         return prod(len(axis) for axis in self.axes)
 
-    def designs(self, start: int, stop: int) -> dict[str, Numbers]:
+    def designs(self, start: int, stop: int) -> DesignValues:
         """Values by key of the designs start … stop − 1."""
         places = np.unravel_index(np.arange(start, stop), [len(axis) for axis in self.axes])
         return {
@@ -78,7 +80,7 @@ class Range:
     last: float
     is_logarithmic: bool = False
 
-    def at(self, fraction: Numbers) -> Numbers:
+    def at(self, fraction: Array) -> Array:
         """Values at fractions 0 … 1 of the range."""
         if self.is_logarithmic:
             low, high = np.log(self.first), np.log(self.last)

@@ -59,8 +59,10 @@ def hulls_of(owner: Indices, points: Array) -> tuple[Indices, Any]:
         order = np.argsort(owner, kind="stable")
         owner = owner[order]
     is_first = np.concatenate(([True], owner[1:] != owner[:-1]))
-    place = np.repeat(np.cumsum(is_first) - 1, 2)  # a line needs two points
-    lines = shapely.linestrings(points[np.repeat(order, 2)], indices=place)
+    is_last = np.concatenate((is_first[1:], [True]))
+    twice = 1 + (is_first & is_last)  # a line needs two points
+    place = np.repeat(np.cumsum(is_first) - 1, twice)
+    lines = shapely.linestrings(points[np.repeat(order, twice)], indices=place)
     return owner[is_first], shapely.convex_hull(lines)
 
 

@@ -191,6 +191,7 @@ def test_a_shard_beside_the_tables_of_another_sweep(space: Path) -> None:
         _ = shard.designs
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "O_NONBLOCK"), reason="orphans stay on Windows")
 def test_what_a_killed_sweep_without_a_folder_leaves_goes_with_the_next(space: Path) -> None:
     (space / "temporary").mkdir()

@@ -15,6 +15,7 @@ import pytest
 from dpgcli.arrays import keep_freed_memory
 from dpgcli.design.scene import Scene
 from dpgcli.files.prediction import write_states
+from dpgcli.files.table_writer import packing
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly
 from dpgcli.mechanics.terms import chain_potential, lattice_potential
@@ -86,19 +87,8 @@ def test_floor_of_that_map_pyarrow_alone(benchmark: Any, tmp_path: Path) -> None
     path = tmp_path / "states.parquet"
     write_states(predict(Scene(uniform_finger(20, **REFERENCE), ())), path, "{}")
     table = pq.read_table(path)
-    floats = [f.name for f in table.schema if str(f.type) == "double"]
-    benchmark.pedantic(
-        lambda: pq.write_table(
-            table,
-            path,
-            compression="zstd",
-            compression_level=3,
-            use_dictionary=["status"],
-            use_byte_stream_split=floats,
-        ),
-        rounds=5,
-        warmup_rounds=1,
-    )
+    layout = packing(table.schema)
+    benchmark.pedantic(lambda: pq.write_table(table, path, **layout), rounds=5, warmup_rounds=1)
     note_rate(benchmark, 2**20)
 
 

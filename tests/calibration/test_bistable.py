@@ -18,6 +18,7 @@ from dpgcli.calibration.bistable import (
 from dpgcli.calibration.choices import Branches, Loss, Quantity, Rule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
+from dpgcli.files.calibration.results import values_of
 from dpgcli.files.measured import read_curve
 
 DATA = Path(__file__).parents[2] / "configs" / "calibration"
@@ -335,3 +336,15 @@ def test_a_well_within_the_data_is_no_extrapolation() -> None:
 def test_a_well_in_a_gap_is_an_extrapolation() -> None:
     found = fitted(curve(Quantity.ENERGY, travel=TRAVEL[(TRAVEL < 2.8) | (TRAVEL > 3.9)]))
     assert warned(found, "the inverted well is not sampled (nothing from 2.75 to 3.9 mm)")
+
+
+def test_a_linearity_of_zero_that_is_found_to_rounding_is_zero() -> None:
+    fits = []
+    for n_points in range(6, 40):
+        opening = np.linspace(0.0, 4.2, n_points)
+        force = law(opening, np.array([12.84, 0.0, 3.5]), Quantity.FORCE)
+        fits.append(fitted(Record(opening, force=force), Quantity.FORCE).fit)
+    assert any(0.0 < fit.values[1] < 1e-12 for fit in fits), "no case of the kind"
+    for fit in fits:
+        linearity = values_of(fit, only_free=False).force_linearity
+        assert linearity is not None and linearity.value == pytest.approx(0.0, abs=1e-9)

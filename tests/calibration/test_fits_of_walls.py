@@ -213,7 +213,7 @@ def test_one_moment_does_not_tell_hinge_and_walls_apart(unit: KnownStates) -> No
     ("free", "targets"),
     [
         ((WALLS, HINGES, LEVER), ALL[:1] + ALL[2:]),
-        ((WALLS, HINGES), ALL[:2]),
+        pytest.param((WALLS, HINGES), ALL[:2], marks=pytest.mark.slow),
     ],
 )
 def test_a_bound_does_not_hide_what_data_do_not_tell(

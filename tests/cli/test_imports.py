@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -23,12 +24,13 @@ PREDICTING = {"scipy", "pandas", "pyarrow", "matplotlib", "numba", "rich", "shap
 Loaded = Callable[..., set[str]]
 
 
-@pytest.fixture
-def loaded(tmp_path: Path) -> Loaded:
-    """Names of the modules that a run has loaded."""
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> Loaded:
+    """Names of the modules that a run has loaded; the same run is not done twice."""
+    report = tmp_path_factory.mktemp("loaded") / "modules.txt"
 
+    @cache
     def modules(*arguments: str) -> set[str]:
-        report = tmp_path / "modules.txt"
         command = [sys.executable, "-c", SCRIPT, str(report), *arguments]
         subprocess.run(command, capture_output=True, check=True)
         return set(report.read_text(encoding="utf-8").split())
@@ -78,10 +80,18 @@ def test_transitions_load_neither_tables_nor_figures_nor_graphs(loaded: Loaded) 
     assert found & (PREDICTING | {"networkx"}) == set()
 
 
-def test_without_pressure_nothing_of_it_is_loaded(loaded: Loaded, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def swept(loaded: Loaded, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, set[str]]:
+    """The folder of a sweep, and what it loaded."""
+    output = tmp_path_factory.mktemp("swept") / "out"
     sweep = str(CONFIGS / "sweeps" / "height_separation.yaml")
-    found = loaded("sweep", sweep, "-o", str(tmp_path / "out"), "-j", "1")
-    found |= loaded("predict", str(CONFIGS / "three_unit.yaml"))
+    return output, loaded("sweep", sweep, "-o", str(output), "-j", "1", "--require", "n_stable > 0")
+
+
+def test_without_pressure_nothing_of_it_is_loaded(
+    loaded: Loaded, swept: tuple[Path, set[str]]
+) -> None:
+    found = swept[1] | loaded("predict", str(CONFIGS / "three_unit.yaml"))
     assert not [name for name in found if name.startswith("dpgcli.actuation")]
 
 
@@ -97,13 +107,12 @@ def test_writing_a_table_loads_no_pandas(loaded: Loaded, tmp_path: Path) -> None
 
 
 def test_a_sweep_with_its_report_loads_nothing_that_it_can_do_without(
-    loaded: Loaded, tmp_path: Path
+    loaded: Loaded, swept: tuple[Path, set[str]]
 ) -> None:
-    sweep = str(CONFIGS / "sweeps" / "height_separation.yaml")
-    arguments = ("sweep", sweep, "-o", str(tmp_path / "out"), "--require", "n_stable > 0")
+    output, found = swept
     heavy = {"scipy", "pandas", "pyarrow.compute", "numpy.ma", "matplotlib", "markdown_it"}
-    assert loaded(*arguments, "-j", "1") & heavy == set()
-    assert loaded("report", str(tmp_path / "out")) & heavy == set()
+    assert found & heavy == set()
+    assert loaded("report", str(output)) & heavy == set()
 
 
 def test_workers_load_no_reader_of_specs() -> None:

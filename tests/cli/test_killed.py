@@ -11,6 +11,7 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
 SWEEP = """base: twenty_unit.yaml
 space:
   - {key: finger.linear_stiffness_N_per_mm, linear: {from: 1.0e3, to: 1.0e5, count: 20}}

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dpgcli.design.outputs import Output
 from dpgcli.files.prediction import write_states
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import canonical_json, read_spec, scene_of
@@ -80,6 +81,17 @@ def test_the_content_hash_is_of_the_values(tmp_path: Path) -> None:
 
     assert content(()) == content(("finger.calibration=published",))
     assert content(()) != content(("finger.linear_stiffness_N_per_mm=1e5",))
+
+
+def test_rows_can_be_skipped_by_what_is_given_and_not_by_what_is_computed(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    computed = Column("tip_x_mm", "mm", "x of the tip", outputs=(Output.SHAPES,))
+    columns = (Column("design", "", "number"), computed)
+    rows = {"design": np.array([3.0, 4.0]), "tip_x_mm": np.array([1.0, 2.0])}
+    write_table(path, schema(columns), [record_batch(columns, rows)], {})
+    group = pq.read_metadata(path).row_group(0)
+    assert (group.column(0).statistics.min, group.column(0).statistics.max) == (3.0, 4.0)
+    assert not group.column(1).is_stats_set
 
 
 def test_a_large_table_has_large_row_groups(tmp_path: Path) -> None:

@@ -115,3 +115,13 @@ def test_a_curve_from_before_rest_is_counted_from_rest(
 def test_too_few_points_from_rest_on() -> None:
     with pytest.raises(ValueError, match="4 or more increasing"):
         spline((-2.0, -1.0, 0.0, 1.0, 2.0), (4.0, 1.0, 0.0, 1.0, 4.0))
+
+
+@pytest.mark.parametrize("end", [(2.4, 3.4, 5.0), (2.3, 2.5), (2.3, 2.5, 2.5), (2.3, 2.5, 2.4)])
+def test_what_comes_after_a_well_does_not_make_it_shallow(end: tuple[float, ...]) -> None:
+    """Beside a ripple of 0.8 mJ, wherever the curve ends, and if its spline turns over there."""
+    energy = [0.0, 5.0, 10.0, 9.0, 9.8, 7.0, 3.5, 2.0, *end]
+    travel = [0.0, 0.5, 1.0, 1.3, 1.6, 2.2, 2.9, 3.5, 3.9, 4.2, 4.5][: len(energy)]
+    found = spline(tuple(travel), tuple(energy))
+    assert found.rests == pytest.approx((1.0, 3.5), abs=0.1)
+    assert len(found.branches) == 2, "the ripple is a branch of its own"

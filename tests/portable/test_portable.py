@@ -56,6 +56,7 @@ def dpg(folder: Path, *arguments: str, hidden: bool = True) -> str:
     return python(folder, "-m", "dpgcli", *arguments, hidden=hidden)
 
 
+@pytest.mark.slow
 def test_every_module_can_be_imported(folder: Path) -> None:
     assert int(python(folder, "-c", ALL_MODULES)) > 100
 

@@ -12,9 +12,12 @@ from dpgcli.design.scene import Scene
 from dpgcli.mechanics.curve import Curve, spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
+from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.states.certify import Status
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.plan import Method, Request, explain
 from dpgcli.states.predict import predict
+from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers, inverted_wells
 
@@ -357,3 +360,13 @@ def test_a_dome_that_does_not_act_brings_no_force_into_play(reference_finger: Fi
     )
     always = Split(UnitSolutions.of(replace(finger, law=PUBLISHED)), 1, 0, 1e-12)
     assert always.strut_force == pytest.approx(both, rel=1e-14)
+
+
+@pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
+def test_domes_that_only_push_on_hinges_without_stiffness(formulate: Formulate) -> None:
+    """Nothing holds a unit in the ground state: a mechanism, in equilibrium but not stable."""
+    finger = uniform_finger(2, **{**STUDY, "hinge_stiffness": 0.0}, linear_stiffness=1e4)
+    units = UnitSolutions.of(replace(finger, law=PushOnly(PUBLISHED)))
+    patterns = np.array([[False, False, True, True], [False, True, False, True]])
+    found = settle(units, formulate, patterns, 1e-12)
+    assert found.status.tolist() == [Status.MARGINAL] * 4

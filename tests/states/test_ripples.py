@@ -200,3 +200,22 @@ def test_a_weak_unit_may_feel_the_rounding_of_its_neighbors(
     there = replace(found.equilibrium, gradient=off, curvature=np.array([1e-9]))
     again = certified(units, found.potential, inverted, there, 1e-6)
     assert again.is_balanced.tolist() == [is_balanced]
+
+
+def test_a_well_beyond_a_ripple_that_the_hinge_takes_away() -> None:
+    """The ripple is the deeper well of the dome alone, but the other falls more steeply."""
+    travel = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.7, 0.8, 0.85, 0.9, 1.0])
+    energy = 0.01 * np.array([0.0, 3.0, 6.0, 7.0, 6.2, 5.2, 5.0, 5.3, 7.0, 9.0, 7.4, 7.6, 9.0])
+    curve = spline(tuple(travel), tuple(energy))
+    finger = replace(uniform_finger(1, **{**STUDY, "hinge_stiffness": 500.0}), law=Tabulated(curve))
+    assert curve.rests[1] == pytest.approx(0.55, abs=0.02)
+    wells = inverted_wells(finger)
+    opening = np.linspace(0.0, 1.0, 200_001) * finger.stroke[0, 0]
+    peer = CubicSpline(travel, energy, bc_type=((1, 0.0), "not-a-knot"))
+    scale = finger.bistable_stiffness[0, 0] * finger.stroke[0, 0] ** 2
+    turn = 2.0 * np.arcsin(opening / 2.0 / finger.segment_height[0, 0])
+    whole = scale * peer(opening / finger.stroke[0, 0]) + 250.0 * turn**2
+    wells_of_it = np.flatnonzero((np.diff(whole[:-1]) < 0.0) & (np.diff(whole[1:]) >= 0.0)) + 1
+    assert len(wells_of_it) == 1
+    assert wells.exists.all()
+    assert wells.extension[0, 0] == pytest.approx(opening[wells_of_it[0]], abs=1e-4)

@@ -245,3 +245,12 @@ def test_the_reference_knows_openings_beyond_the_bars() -> None:
     found = inverted_wells(finger)
     assert found.angle[0, 0] == pytest.approx(float(angle), rel=1e-9)
     assert found.extension[0, 0] - 40.0 * np.sin(found.angle[0, 0]) == pytest.approx(float(wall))
+
+
+@pytest.mark.parametrize("compliance", [5e-324, 1e-300, 1e-30])
+def test_walls_that_hardly_give_way_are_rigid(compliance: float) -> None:
+    """The share that walls take underflows, or what is divided by it overflows."""
+    rigid = uniform_finger(1, **STUDY)
+    finger = rigid.changed(wall_compliance=np.array([[compliance]]))
+    extension = np.array([[0.0, 1.0, 3.5, 21.0]])
+    assert tangent_of(finger, extension) == pytest.approx(tangent_of(rigid, extension), rel=1e-12)

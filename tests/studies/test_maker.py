@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-import dpgcli
-from dpgcli.code import versions_of_libraries
+from dpgcli.code import PACKAGE, sha256_of_code, versions_of_libraries
 from dpgcli.errors import UsageError, WorkplaceError
 from dpgcli.files import table_writer
 from dpgcli.studies import sweep as studies
@@ -18,7 +17,6 @@ from dpgcli.sweeps.executors import Backend, serial
 from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, check_workers, code_of
 from dpgcli.sweeps.pool import processes
 
-PACKAGE = Path(dpgcli.__file__).parent
 HEIGHTS = "{key: finger.geometry.dome_height_mm, values: [6.5, 7, 7.5]}"
 OTHER = HERE._replace(code="f" * 64)
 EVALUATING = """
@@ -59,6 +57,14 @@ def test_work_on_what_is_printed_leaves_the_code_as_it_is(package: Path) -> None
     for name in ("cli/sweep.py", "reports/summary.py", "hard_cases/verdicts.py"):
         (package / name).write_text("changed = True\n")
     assert code_of(package) == HERE.code
+
+
+def test_a_calibration_that_ships_is_part_of_the_version(package: Path) -> None:
+    """A sweep knows it by its content, a Makefile by the version."""
+    path = package / "finite_elements" / "domes.yaml"
+    path.write_text(path.read_text() + "\n")
+    assert code_of(package) == HERE.code
+    assert sha256_of_code(package) != sha256_of_code(PACKAGE)
 
 
 def test_no_module_that_evaluates_designs_is_left_out(study: Any, tmp_path: Path) -> None:

@@ -184,6 +184,11 @@ def test_evaluation_leaves_the_values_alone() -> None:
         ("a ** -1", [0.5, 0.5]),
         ("n * n * n > 0", [True, True]),
         ("n % 0 == 0", [np.nan, np.nan]),
+        ("e - e != 0", [np.nan, np.nan]),
+        ("not e % 5 > 1", [np.nan, np.nan]),
+        ("not e / e > 2", [np.nan, np.nan]),
+        ("e * c != 3", [np.nan, 1.0]),
+        ("e > 5", [True, True]),
         ("n / 2", [2.0e9, 0.5]),
         ("a - b * c", [2.0, -13.0]),
         ("min(a, b, c)", [0.0, 2.0]),
@@ -197,6 +202,7 @@ def test_values_of_arrays(text: str, value: list[float]) -> None:
         "b": np.array([3.0, 3.0]),
         "c": np.array([0.0, 5.0]),
         "n": np.array([4_000_000_000, 1]),
+        "e": np.array([np.inf, np.inf]),
     }
     np.testing.assert_array_equal(expression(text)(arrays), value)
 

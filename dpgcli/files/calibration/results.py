@@ -103,6 +103,8 @@ def values_of(fit: Fit, *, only_free: bool) -> Values:
         if only_free and not parameter.is_free:
             continue
         value = float(fit.values[place])
+        if parameter.key == "force_linearity" and value < SMALLEST:
+            value = 0.0  # found to rounding
         if parameter.is_free and not (value == 0.0 or SMALLEST <= value <= LARGEST):
             raise FitError(
                 f"{parameter.key} = {value:g} is not from {SMALLEST:g} to {LARGEST:g}: "

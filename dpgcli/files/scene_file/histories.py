@@ -19,6 +19,8 @@ from dpgcli.text import dotted
 
 MOST_NUMBERS = MAX_NODES * 9 // 10  # as many as a spec holds beside the rest of it
 FEWEST_ROWS = 2
+WITHOUT_CONTENT = ('""', "none")
+TO_SEE = "dpg actuate shows it with --pressure FILE"
 UNIT = "_MPa"  # may end the name of a column
 
 
@@ -34,9 +36,10 @@ def with_history(document: Document, folder: Path) -> Document:
         return document
     path = beside(Path() if document.place(HISTORY) == SETTING else folder, name)
     lines = pressure.get(LINES[-1]) if isinstance(pressure, dict) else None
+    lines = [*lines] if isinstance(lines, dict) else [DEFAULT_LINE]
     said, problems = None, document.problems
     try:
-        columns = read_history(path, [*lines] if isinstance(lines, dict) else [DEFAULT_LINE])
+        columns = read_history(path, lines)
         n_numbers = sum(map(len, columns.values()))
         if n_numbers <= MOST_NUMBERS:
             said = {column: values.tolist() for column, values in columns.items()}
@@ -45,9 +48,20 @@ def with_history(document: Document, folder: Path) -> Document:
             wrong = document.problem(HISTORY, expected, f"{n_numbers:,} in {name}")
             problems = (*problems, wrong)
     except SpecError as error:
-        problems = (*problems, *error.problems)
+        problems = (*problems, *(_concealed(problem, lines) for problem in error.problems))
     embedded = changed(document, {dotted(HISTORY): said})
     return replace(embedded, problems=problems, files=(*document.files, path))
+
+
+def _concealed(problem: Problem, lines: Sequence[str]) -> Problem:
+    """The problem without what the file says there, or what it calls its columns.
+
+    Whoever names a file in a spec, and lines as its columns, need not be allowed to read it.
+    """
+    key = problem.key if problem.key in (*lines, TIME, "file") else "header"
+    is_said = problem.key == "file" or problem.found in WITHOUT_CONTENT
+    found = problem.found if is_said else "something else"
+    return replace(problem, key=key, found=found, hint=problem.hint if is_said else TO_SEE)
 
 
 def read_history(source: Tabular, lines: Sequence[str]) -> dict[str, Array]:
@@ -55,8 +69,7 @@ def read_history(source: Tabular, lines: Sequence[str]) -> dict[str, Array]:
 
     Each column is that of a line, named as it is, or with _MPa behind; units in brackets, as in
     A (kPa), or below the header count. Raises SpecError for other columns, cells without a number,
-    unknown units, times that go back and fewer than two rows, all at once. Nothing is quoted from a
-    file without a line: any may have been named.
+    unknown units, times that go back and fewer than two rows, all at once.
 
     >>> table = {"time": [0, 1], "A_MPa": [0, 0.15], "B (kPa)": [0, 100]}
     >>> read_history(table, ["A", "B"])["B"].tolist()

@@ -58,17 +58,17 @@ class Sample(Part):
 
 Whole = Annotated[int, Field(ge=-(2**63), le=2**63 - 1)]
 Number = Whole | Annotated[float, Field(allow_inf_nan=True, ge=-math.inf)]  # .inf: rigid bars
-Numbers = Annotated[list[Number], Field(min_length=1, max_length=MOST_POINTS)]
+NumberList = Annotated[list[Number], Field(min_length=1, max_length=MOST_POINTS)]
 
 
 class AxisSpec(Part):
     """One axis of the space: exactly one kind."""
 
     key: str | None = Field(default=None, description="a key of the spec, parts joined by dots")
-    values: Numbers | None = Field(default=None, description="a list of numbers")
+    values: NumberList | None = Field(default=None, description="a list of numbers")
     linear: Between | None = Field(default=None, description="from, to and count")
     log: Between | None = Field(default=None, description="from, to and count, above zero")
-    paired: Annotated[dict[str, Numbers], Field(min_length=1)] | None = Field(
+    paired: Annotated[dict[str, NumberList], Field(min_length=1)] | None = Field(
         default=None, description="lists of numbers by key, equally long"
     )
     sample: Sample | None = Field(default=None, description="method, count, seed and ranges")

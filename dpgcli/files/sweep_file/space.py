@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
 OPTIONAL = ("gripper", "pressure")  # sections that a base may leave out
+ASIDE = ("uncertainty", "model_error")  # sections that a sweep leaves aside
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs, or a folder of such"
 
@@ -265,9 +266,11 @@ def _numbers(values: Sequence[int | float]) -> Any:
 
 
 def numbers_of(data: dict[str, Any], prefix: str = "") -> dict[str, float]:
-    """The numbers in nested data by dotted key."""
+    """The numbers in nested data by dotted key, but for those that say how exact others are."""
     flat: dict[str, float] = {}
     for key, value in data.items():
+        if not prefix and key in ASIDE:
+            continue
         if isinstance(value, dict):
             flat |= numbers_of(value, f"{prefix}{key}.")
         elif type(value) in (int, float):

@@ -24,6 +24,7 @@ LARGEST_WHOLE = 2**63 - 1
 PARQUET = b"PAR1"
 TOP = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\n)+")
 COMMENT = re.compile(rb"^[ \t]*#+(?:[ \t][^\n]*)?$", re.MULTILINE)
+EMPTY_LINE = re.compile(rb"\n[ \t]*\n")
 UNNAMED = re.compile(r"__index_level_[0-9]+__")  # an index of pandas, which is no column
 FIRST = 1000  # rows
 SAMPLE = 2**16  # bytes
@@ -105,11 +106,13 @@ def _csv(content: bytes) -> pd.DataFrame:
     Lines end as pandas ends them: where a comment went on behind a lone CR, rows would be lost.
     """
     content = _utf8(content).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    given = content
     if b"#" in content:
         content = TOP.sub(lambda top: b"\n" * top[0].count(b"\n"), content)
         content = COMMENT.sub(b"", content)
     ends = _ends(content)
     separator = separator_of(ends)
+    _check_gaps(given, separator)
     mark = separator if separator.strip() else "\t"
     if b'"' in content:  # pandas reads "3"4 as 34
         for _ in csv.reader(io.StringIO(content.decode()), delimiter=mark, strict=True):
@@ -168,6 +171,20 @@ def _without_ends(content: bytes, separator: str) -> bytes:
         longer = rows[0].count(mark) > head.count(mark) or head.rstrip().endswith(mark)
         return end.sub(b"", content) if longer else content
     return content
+
+
+def _check_gaps(content: bytes, separator: str) -> None:
+    """Raise NoTableError for an empty line among rows of one cell: that cell is empty."""
+    if not EMPTY_LINE.search(content.strip()):
+        return
+    lines = content.rstrip().split(b"\n")
+    is_row = [bool(line.strip()) and not COMMENT.fullmatch(line) for line in lines]
+    header = is_row.index(True)
+    if separator.encode() in lines[header].strip():
+        return
+    for number, line in enumerate(lines[header:], header + 1):
+        if not line.strip():
+            raise NoTableError(f"an empty cell in line {number}", "no text, no gaps")
 
 
 def _check_rows(content: bytes, mark: str) -> None:

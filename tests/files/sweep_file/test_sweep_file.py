@@ -912,3 +912,26 @@ def test_a_damaged_table_is_refused(read: Read, tmp_path: Path) -> None:
     content[50] ^= 1
     (tmp_path / "t.parquet").write_bytes(content)
     assert 'found "damaged: its bytes are not those' in problems(read, "table: t.parquet")[0]
+
+
+def test_what_says_how_exact_a_key_is_cannot_be_meant(read: Read, tmp_path: Path) -> None:
+    base = tmp_path / "base.yaml"
+    text = base.read_text(encoding="utf-8")
+    base.write_text(
+        f"{text}uncertainty: {{stroke_mm: 0.1, dome_height_mm: 0.1}}\n", encoding="utf-8"
+    )
+    axis = f"{{key: {HEIGHT}, values: [6, 6.5]}}"
+    assert read(axis, constraints="[dome_height_mm > 1]").constraints
+    assert problems(read, axis, constraints="[stroke_mm > 1]")
+
+
+@pytest.mark.parametrize("gap", ["", " ", "\t"])
+def test_an_empty_line_among_rows_of_one_cell_is_an_empty_cell(
+    read: Read, tmp_path: Path, gap: str
+) -> None:
+    table, head = tmp_path / "t.csv", f"# note\n\n{HEIGHT}\n6\n"
+    table.write_text(f"{head}{gap}\n6.5\n", encoding="utf-8")
+    (problem,) = problems(read, "table: t.csv")
+    assert "found an empty cell in line 5 (no text, no gaps)" in problem
+    table.write_text(f"{head}# note\n6.5\n\n\n", encoding="utf-8")
+    assert read("table: t.csv").space.size == 2
