@@ -32,8 +32,8 @@ def hindrances(
         yield f"{ranges} of peaks led to no certified state, or the finger folds onto itself there"
     if not pairs:
         yield (
-            "units by themselves (independent hysterons) could be brought there: bars, walls or "
-            "contacts between them are in the way"
+            "units by themselves (independent hysterons) could be brought there: bars, walls, "
+            "hinges or contacts between them are in the way"
         )
         return
     for line in sorted({int(line_of[pair.inverted]) for pair in pairs}):

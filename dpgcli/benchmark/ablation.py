@@ -8,6 +8,7 @@ import numpy as np
 
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.mechanics.finger import SHARED
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.predict import predict
 
@@ -120,9 +121,8 @@ def _with_every_unit(plan: Plan) -> Trial | None:
     scene, finger = plan.scene, plan.scene.finger
     if plan.n_unit_solves == finger.n_units:
         return None
-    shared = ("segment_height", "linear_stiffness")
     arrays = {
-        name: values if name in shared else np.repeat(values, finger.n_units // len(values), axis=0)
+        name: values if name in SHARED else np.repeat(values, finger.n_units // len(values), axis=0)
         for name, values in finger.arrays().items()
     }
     return Trial(replace(scene, finger=finger.changed(**arrays)), _request(plan))

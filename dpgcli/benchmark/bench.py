@@ -122,7 +122,8 @@ class Bench:
         reference = extended_states(self.finger, patterns, digits=REFERENCE_DIGITS)
         yield from self._ladder(patterns, reference)
         yield from self._alone(patterns, reference)
-        if not (self.finger.is_rigid or self.finger.has_walls):  # third parties know neither
+        finger = self.finger
+        if not (finger.is_rigid or finger.has_walls or finger.is_coupled):  # peers know none
             most = max(1, PEER_STATES // math.ceil(self.finger.n_units / MANY_UNITS))
             few = slice(None, None, -(-patterns.shape[1] // most))
             for method in third_party_methods(self.finger, patterns[:, few]):

@@ -107,6 +107,9 @@ def _energy(finger: Finger, shape: Internal, openings: Array) -> Array:
     if finger.has_walls:
         yielding = np.where(finger.wall_compliance > 0.0, finger.wall_compliance, 1.0)
         energy = energy + total(0.5 * shape.wall**2 / yielding)
+    if finger.is_coupled:
+        turn = shape.near_angle + shape.far_angle
+        energy = energy - total(finger.hinge_coupling * turn[:-1] * turn[1:])
     if finger.is_rigid:
         return energy
     bars = 0.5 * finger.linear_stiffness * (shape.chord**2 + shape.strut**2)

@@ -72,14 +72,14 @@ class SnapCase:
         ]
 
     def followers(self) -> Iterator[Follower]:
-        """This package, one finger and many; third parties where bars give way, but no walls."""
+        """This package, one finger and many; third parties where only bars give way."""
         for n, name in (
             (1, "this package, one way"),
             (BATCH, f"this package, {BATCH} ways at once"),
         ):
             yield Follower(name, self._package(n), n)
         finger = self.pressed.finger
-        if finger.is_rigid or finger.has_walls:
+        if finger.is_rigid or finger.has_walls or finger.is_coupled:
             return
         yield Follower(
             "SciPy root, small steps", lambda: _stepped(finger, self.pushes) * self.threshold, 1

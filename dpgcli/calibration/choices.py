@@ -11,6 +11,7 @@ STIFFNESS, LINEARITY, STROKE = LAW_KEYS = (
 MOST_RESAMPLES = 100_000  # of a bootstrap: minutes
 HINGES = "hinge_stiffness_N_mm_per_rad"
 WALLS = "wall_compliance_mm_per_N"
+COUPLING = "hinge_coupling_N_mm_per_rad"
 LEVER = "segment_height_mm"
 FITTED_BY_DEFAULT = LEVER  # what is fitted to known states if nothing is named
 

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss, Target
+from dpgcli.calibration.choices import COUPLING, HINGES, LEVER, WALLS, Loss, Target
 from dpgcli.calibration.comparison import Comparison, compare, frame_misfit
 from dpgcli.calibration.fits import Fit, fit
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.calibration.observations import SMALLEST_ERROR, Observations, rms
 from dpgcli.calibration.search import Parameter
+from dpgcli.design.coupling import is_bounded
 from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.states.certify import Status
@@ -44,6 +45,7 @@ BAR_STIFFNESS_RATIOS = (
 
 
 FIRST_YIELD = 0.1  # of H²/k_θ, what a hinge yields at the dome's axis, or 1/k_b without one
+FIRST_COUPLING, LARGEST_COUPLING = 0.01, 0.499  # of k_θ, where the search begins and may end
 TOGETHER = (HINGES, WALLS, LEVER)  # of an opened gap: each may stand for the others
 NEARLY_ALIKE = 1e-2  # of unit columns: a smaller singular value is nearly none
 ALIKE = 0.95  # correlation: beyond it data hardly tell values apart
@@ -84,6 +86,8 @@ class FingerFit:
                 )
             if not np.isfinite(values[key]).all():
                 raise FitError(Field("free"), f" {key}: is infinite, start from a finite value")
+            if key == COUPLING and not self.finger.hinge_stiffness.all():
+                raise FitError(Field("free"), f" {key}: hinges have no stiffness to couple")
 
     def fit(self, resamples: int = 0, seed: int = 0) -> Fit:
         """The least-squares fit.
@@ -95,6 +99,7 @@ class FingerFit:
         try:
             found = self._fit(self.observations, resamples, seed)
             self._check_apart(found)
+            self._check_bounded(found)
         except FitError as error:
             if {WALLS, HINGES} <= {*self.free} and "apart" in error.message:
                 raise FitError(f"{error.message}; {TELL_APART}") from None
@@ -112,6 +117,15 @@ class FingerFit:
         if least < NEARLY_ALIKE:
             keys = " and ".join(found.parameters[place].key for place in places)
             raise FitError(f"the data cannot tell {keys} apart: fix one of them")
+
+    def _check_bounded(self, found: Fit) -> None:
+        """Raise FitError where hinges and their neighbors would run away together."""
+        finger = self.finger.with_values(found.by_key)
+        if not is_bounded(finger.hinge_coupling, finger.hinge_stiffness).all():
+            raise FitError(
+                f"{COUPLING} ended at {float(finger.hinge_coupling[0, 0]):g}, half of {HINGES} or "
+                "more: the data do not know it, fix it"
+            )
 
     def _fit(self, observed: Observations, resamples: int = 0, seed: int = 0) -> Fit:
         return fit(
@@ -206,11 +220,16 @@ class FingerFit:
         parameters = [
             _parameter(key, float(value[0, 0]), key in self.free, stiffest)
             for key, value in values.items()
-            if key != WALLS and value.size == 1 and np.isfinite(value).all() and self._has(key)
+            if key not in (WALLS, COUPLING)
+            and value.size == 1
+            and np.isfinite(value).all()
+            and self._has(key)
         ]
         walls = self.finger.wall_compliance
         if WALLS in self.free or (walls.size == 1 and walls.any()):
             parameters.append(self._walls(float(walls[0, 0])))
+        if COUPLING in self.free or self.finger.hinge_coupling.any():
+            parameters.append(self._coupling(float(self.finger.hinge_coupling[0, 0])))
         return tuple(parameters)
 
     def _walls(self, start: float) -> Parameter:
@@ -221,6 +240,13 @@ class FingerFit:
         begin = start or FIRST_YIELD / float(holds.max())
         is_free = WALLS in self.free
         return Parameter(WALLS, begin if is_free else start, 0.0, LARGEST_YIELD * begin, is_free)
+
+    def _coupling(self, start: float) -> Parameter:
+        """Hinges may turn out not to turn each other; the sign is that of the data."""
+        hinge = float(self.finger.hinge_stiffness.min())
+        most, is_free = LARGEST_COUPLING * hinge, COUPLING in self.free
+        begin = start or FIRST_COUPLING * hinge
+        return Parameter(COUPLING, begin if is_free else start, -most, most, is_free)
 
     def _has(self, key: str) -> bool:
         """A law with a curve of its own has no force linearity."""

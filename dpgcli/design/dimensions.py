@@ -20,6 +20,7 @@ from dpgcli.text import KeyPath, dotted
 UNITS = "finger.units"
 LINEAR_STIFFNESS = "linear_stiffness_N_per_mm"
 WALL_COMPLIANCE = "wall_compliance_mm_per_N"
+HINGE_COUPLING = "hinge_coupling_N_mm_per_rad"
 SMALLEST, LARGEST, STIFFEST = 1e-12, 1e12, 1e18
 MAX_UNITS = 64
 AGREEMENT = 1e-6  # of a value given twice
@@ -29,6 +30,7 @@ BOUNDS = {  # where they are not those of a length
     "force_linearity": (0.0, 1.0),
     "hinge_stiffness_N_mm_per_rad": (0.0, LARGEST),
     WALL_COMPLIANCE: (0.0, LARGEST),
+    HINGE_COUPLING: (-LARGEST, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
 }
 SUFFIXES = {  # units in the names of keys
@@ -116,6 +118,7 @@ class Design:
     tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
     model_error: float | str | None = None
     pressure: GivenPressure | None = None
+    hinge_coupling: Array | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -139,6 +142,8 @@ class Design:
             return replace(self, pressure=given.with_value(path[1:], column))
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
+        if path == ["finger", HINGE_COUPLING]:
+            return replace(self, hinge_coupling=column)
         section = parents.pop() if key != WALL_COMPLIANCE else "lattice"
         if len(parents) == 1:
             return replace(self, finger=_changed(self.finger, section, key, column))
@@ -177,7 +182,7 @@ class UnitGroup:
     def path(self, section: str, key: str) -> KeyPath:
         """Where the spec sets, or would set, a value of these units."""
         own = self.own_geometry if section == "geometry" else self.own_lattice
-        at = (key,) if key == WALL_COMPLIANCE else (section, key)
+        at = (key,) if key in (WALL_COMPLIANCE, HINGE_COUPLING) else (section, key)
         if self.override is not None and key in own:
             return ("finger", "overrides", self.override, *at)
         return ("finger", *at)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, distinct
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import WALL_COMPLIANCE, Design, agree, without_unit
+from dpgcli.design.dimensions import HINGE_COUPLING, WALL_COMPLIANCE, Design, agree, without_unit
 from dpgcli.design.domes import Domes
 from dpgcli.design.outputs import BASES, Basis, Output
 from dpgcli.design.problems import of_design
@@ -148,7 +148,7 @@ class Case:
     def known_by(self, output: Output, footing: Footing) -> str:
         """What the file behind one value knows of an output's error; empty if nothing."""
         file = footing.calibration
-        if file is None or self.lacks_walls_of(file) or output.key not in file.known_errors:
+        if file is None or self.lacks_any_of(file) or output.key not in file.known_errors:
             return ""
         known = file.known_errors[output.key]
         elsewhere = ELSEWHERE if footing.origin in MOVED else ""
@@ -159,9 +159,15 @@ class Case:
 
         A segment height, or a hinge, stands for something else then.
         """
-        walls = self.footings.get(WALL_COMPLIANCE)
-        is_taken = walls is not None and walls.calibration is file
-        return file.has(WALL_COMPLIANCE) and not is_taken
+        return self._lacks(file, WALL_COMPLIANCE)
+
+    def lacks_any_of(self, file: Calibration) -> bool:
+        """The same, or beside a coupling of hinges: what a file knows of errors is of all of it."""
+        return self._lacks(file, WALL_COMPLIANCE) or self._lacks(file, HINGE_COUPLING)
+
+    def _lacks(self, file: Calibration, key: str) -> bool:
+        own = self.footings.get(key)
+        return file.has(key) and (own is None or own.calibration is not file)
 
 
 def kinds(values: Values, designs: Indices) -> list[tuple[int, int]]:

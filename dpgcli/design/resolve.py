@@ -8,7 +8,9 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.calibrations import Calibration
+from dpgcli.design.coupling import coupling_of
 from dpgcli.design.dimensions import (
+    HINGE_COUPLING,
     LEAVE_ONE_OUT,
     LINEAR_STIFFNESS,
     WALL_COMPLIANCE,
@@ -27,7 +29,15 @@ from dpgcli.design.model_error import model_error_of
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
 from dpgcli.design.problems import Issue, Problems, number, of_design
-from dpgcli.design.rules import FORCE_LINEARITY, SEGMENT_HEIGHT, STROKE, WALLS, Value, all_by
+from dpgcli.design.rules import (
+    FORCE_LINEARITY,
+    HINGE_STIFFNESS,
+    SEGMENT_HEIGHT,
+    STROKE,
+    WALLS,
+    Value,
+    all_by,
+)
 from dpgcli.design.scene import (
     ORIGINS,
     Chambers,
@@ -159,13 +169,20 @@ class Resolution:
         return Scene(finger, (), gripper, thickness, pressure=pressure)
 
     def alike(self, designs: Indices) -> list[Indices]:
-        """Some of the designs, none of them wrong, apart by whether bars or all walls are rigid."""
+        """Some of the designs, none of them wrong, apart by which kinds of energy they have.
+
+        Bars or all walls may be rigid, hinges turn each other or not.
+        """
         if not len(designs):
             return []
         kind = np.isinf(_picked(self.lattice["linear_stiffness"], designs)[0]).astype(int)
         if "wall_compliance" in self.lattice:
             kind += 2 * (_picked(self.lattice["wall_compliance"], designs) > 0.0).any(axis=0)
-        return [part for part in (designs[kind == k] for k in (1, 0, 3, 2)) if len(part)]
+        if "hinge_coupling" in self.lattice:
+            kind += 4 * (_picked(self.lattice["hinge_coupling"], designs)[0] != 0.0)
+        return [
+            part for part in (designs[kind == k] for k in (1, 0, 3, 2, 5, 4, 7, 6)) if len(part)
+        ]
 
     def _chambers(self) -> Chambers:
         """Sizes of the chambers of the first design."""
@@ -264,6 +281,9 @@ def resolve(design: Design) -> Resolution:
     walls = [(group, value) for group, value in found if value is not None]
     if any(_may_yield(value, WALL_COMPLIANCE in design.tolerances) for _, value in walls):
         values[WALL_COMPLIANCE] = walls
+    coupling = coupling_of(design, base, values[HINGE_STIFFNESS.key], problems)
+    if coupling is not None and _may_yield(coupling, HINGE_COUPLING in design.tolerances):
+        values[HINGE_COUPLING] = [(base, coupling)]
     answers: Mapping[str, Pairs] = {}
     if design.pressure is not None:
         answers = answers_to_pressure(design.pressure, domes, groups, problems)
@@ -314,7 +334,7 @@ def _walls(group: UnitGroup, problems: Problems) -> Value | None:
 
 
 def _may_yield(value: Value, is_tolerated: bool) -> bool:
-    """Whether walls give way, or may do so by a standard error or a tolerance of what they have."""
+    """Whether a value counts, or may by a standard error or a tolerance of what there is."""
     assumed = ORIGINS.index(Origin.ASSUMED)
     is_known = bool((value.origin != assumed).any())
     return bool(value.numbers.any() or _error(value).any() or (is_tolerated and is_known))

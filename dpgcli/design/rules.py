@@ -11,7 +11,13 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design import geometry
 from dpgcli.design.calibrations import Calibration
-from dpgcli.design.dimensions import LARGEST, SMALLEST, WALL_COMPLIANCE, UnitGroup
+from dpgcli.design.dimensions import (
+    HINGE_COUPLING,
+    LARGEST,
+    SMALLEST,
+    WALL_COMPLIANCE,
+    UnitGroup,
+)
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.scene import ORIGINS, Origin
 
@@ -125,6 +131,13 @@ WALLS = Derivation(  # rigid unless given or calibrated: geometry alone yields n
     geometry.softness,
     "1 / E (elasticity)",
     bounds=(0.0, LARGEST),
+)
+COUPLING = Derivation(  # none unless given or calibrated; elsewhere as large a part of the hinge
+    HINGE_COUPLING,
+    HINGE_STIFFNESS.needs,
+    geometry.hinge_stiffness,
+    HINGE_STIFFNESS.rule,
+    bounds=(-LARGEST, LARGEST),
 )
 DERIVATIONS = (
     SEGMENT_LENGTH,

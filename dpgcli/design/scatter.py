@@ -12,7 +12,9 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.by_unit import size_by_unit, unit_by_unit
+from dpgcli.design.coupling import is_bounded
 from dpgcli.design.dimensions import (
+    HINGE_COUPLING,
     LINEAR_STIFFNESS,
     Design,
     GivenPressure,
@@ -24,6 +26,7 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.geometry import REFERENCE, snap_pressure
 from dpgcli.design.problems import Issue
 from dpgcli.design.resolve import Resolution, resolve
+from dpgcli.design.rules import HINGE_STIFFNESS
 from dpgcli.design.scene import Scene
 from dpgcli.design.snap_pressures import SNAP, SNAP_PRESSURE
 from dpgcli.design.uncertainty import tolerance_issues
@@ -49,6 +52,7 @@ OF_FINGERS = (
     "limiting_layer_thickness_mm",
     "segment_height_mm",
     LINEAR_STIFFNESS,
+    HINGE_COUPLING,
 )
 SCATTERED = (*OF_UNITS, *OF_FINGERS)
 
@@ -115,6 +119,11 @@ def scattered(
         value = resolution.lattice[KEYS[key]]
         moves[key] = spread[key].of(value) * drawn[key]
         are_wrong = are_wrong | ~are_possible(key, value + moves[key]).all(axis=0)
+    hinge, coupling = (
+        resolution.lattice.get(KEYS[key], np.zeros((1, 1))) + moves.get(key, np.zeros((1, 1)))
+        for key in (HINGE_STIFFNESS.key, HINGE_COUPLING)
+    )
+    are_wrong = are_wrong | ~is_bounded(coupling, hinge).all(axis=0)
     return Scattered(resolution, moves, are_wrong)
 
 

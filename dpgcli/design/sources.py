@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from dpgcli.design.dimensions import LINEAR_STIFFNESS, UnitGroup, unit_text
+from dpgcli.design.dimensions import HINGE_COUPLING, LINEAR_STIFFNESS, UnitGroup, unit_text
 from dpgcli.design.problems import of_design
 from dpgcli.design.rules import SEGMENT_HEIGHT, Value
 from dpgcli.design.scene import ORIGINS, Source
 
-SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS)  # by all units
+SHARED = (SEGMENT_HEIGHT.key, LINEAR_STIFFNESS, HINGE_COUPLING)  # by all units
 
 
 def sources_of(

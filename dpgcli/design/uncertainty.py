@@ -9,6 +9,7 @@ import numpy as np
 from dpgcli.arrays import COMPLEX_STEP, Array
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import (
+    HINGE_COUPLING,
     WALL_COMPLIANCE,
     Design,
     GivenValues,
@@ -85,6 +86,8 @@ def _missing(key: str) -> str:
         return "there is no gripper"
     if key == WALL_COMPLIANCE:
         return "walls are rigid: give finger.wall_compliance_mm_per_N, 0 perhaps"
+    if key == HINGE_COUPLING:
+        return f"hinges do not turn each other: give finger.{HINGE_COUPLING}, 0 perhaps"
     return "the law has none" if key in KEYS else "finger.geometry does not give it"
 
 
@@ -94,6 +97,8 @@ def given(design: Design, key: str) -> list[Array]:
     found = [part[key] for s in sections for part in (s.geometry, s.lattice) if key in part]
     if key == "linear_stiffness_N_per_mm" and design.linear_stiffness is not None:
         found.append(design.linear_stiffness)
+    if key == HINGE_COUPLING and design.hinge_coupling is not None:
+        found.append(design.hinge_coupling)
     if key in design.gripper:
         found.append(design.gripper[key])
     return found

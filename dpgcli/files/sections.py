@@ -16,6 +16,7 @@ from dpgcli.design.problems import Issue, Problems
 EXPECTED = {  # where it is not a length
     "linear_stiffness_N_per_mm": "a stiffness > 0 in N/mm, or .inf",
     "wall_compliance_mm_per_N": "a compliance >= 0 in mm/N",
+    "hinge_coupling_N_mm_per_rad": "a number in N mm/rad, less than half the hinge stiffness",
     "force_linearity": "a number from 0 to 1",
     "hinge_stiffness_N_mm_per_rad": "a stiffness >= 0 in N mm/rad",
     "bistable_stiffness_N_per_mm": "a stiffness > 0 in N/mm",

@@ -24,10 +24,13 @@ LONG_FINGER = 30  # units, from which on one pattern has to do: extended precisi
 FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
 WALL_RATIOS = (1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6)  # c_w k_b
+COUPLING_RATIOS = (-0.499, -0.1, 1e-9, 1e-3, 0.05, 0.3, 0.499, 0.4999999)  # κ/k_θ
+STIFF_HINGES = (1.0, 4.0)  # times the study's: the stiffer ones nearly lose their second wells
 PRESSED_RATIOS = (1.0, 10.0, 1e2, 1e3, 1e4, 1e6, 1e8, 1e10, 1e12, 1e13, 1e14, 1e15)
 NEARLY_EQUAL = (1e-3, 3e-6, 1e-6, 1e-9)  # thresholds of two units, relative
 PRESSED_DISTANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)  # of α from its limit
 PRESSED_WALLS = (1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3)  # c_w k_b
+PRESSED_COUPLINGS = (-0.3, 0.05, 0.49)  # κ/k_θ
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
 FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
     "straight": ((0.0, 0.0), "0"),
@@ -295,6 +298,19 @@ def _walls(base: Finger) -> Iterator[Variant]:
         yield from _both(f"{label}, first unit", changed(finger, wall_compliance=first))
 
 
+def _coupling(base: Finger) -> Iterator[Variant]:
+    """Hinges that turn their neighbors, up to where the energy has no bottom; walls as well."""
+    finger = repeated(base, N_GRADED)
+    softness = 0.1 / float(base.bistable_stiffness.min())
+    for factor, ratio in product(STIFF_HINGES, COUPLING_RATIOS):
+        hinges = factor * finger.hinge_stiffness[:, 0]
+        stiff = changed(finger, hinge_stiffness=hinges, hinge_coupling=ratio * hinges.min())
+        label = f"k_θ × {factor:g}, κ/k_θ = {ratio:g}"
+        yield from _both(label, stiff)
+        if factor > 1.0:
+            yield from _both(f"{label}, walls", changed(stiff, wall_compliance=softness))
+
+
 def _mirror(base: Finger) -> Iterator[Variant]:
     """One unit from impossible shapes, each next to a minimum of the equations."""
     unit = base.with_units([0])
@@ -331,6 +347,11 @@ def _pressure(base: Finger) -> Iterator[Variant]:
         walled = changed(finger, wall_compliance=ratio * softness)
         label = f"{n_units} unit{'s' * (n_units > 1)}, c_w k_b = {ratio:g}"
         yield from _driven(label, walled, alternating=False)
+    for ratio, (bars, finger) in product(PRESSED_COUPLINGS, _stiff_and_rigid(unit).items()):
+        coupling = ratio * float(unit.hinge_stiffness.min())
+        graded = _with_strokes(finger, np.linspace(1.0, 1.1, 2))
+        coupled = changed(graded, hinge_coupling=coupling)
+        yield from _driven(f"κ/k_θ = {ratio:g}, {bars}", coupled, alternating=False)
 
 
 def _driven(label: str, finger: Finger, *, alternating: bool = True) -> Iterator[Variant]:
@@ -364,6 +385,7 @@ FAMILIES = (
     Family("fold", _fold),  # α, k_θ and d at the loss of bistability, to 1e-12 of it
     Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
     Family("walls", _walls),  # c_w k_b from 1e-9 to 1e6, of all units or one
+    Family("coupling", _coupling),  # κ/k_θ from −0.499 to 0.4999999
     Family("pressure", _pressure),  # thresholds of pressure, at the ends of what there is
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

@@ -79,7 +79,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
     >>> float(scaled(study_finger(), 1e-3).segment_length[0, 0])  # m
     0.0135
     """
-    lengths = ("segment_length", "segment_height", "stroke", "hinge_stiffness")
+    lengths = ("segment_length", "segment_height", "stroke", "hinge_stiffness", "hinge_coupling")
     arrays = finger.arrays()
     changes = {name: arrays[name] * scale for name in lengths}
     changes |= {name: arrays[name] / scale for name in ("bistable_stiffness", "linear_stiffness")}

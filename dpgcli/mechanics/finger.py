@@ -19,7 +19,9 @@ ARRAYS = (
     "linear_stiffness",
     "dome_travel",
     "wall_compliance",
+    "hinge_coupling",
 )
+SHARED = ("segment_height", "linear_stiffness", "hinge_coupling")  # by all units of a finger
 
 KEYS = {  # names with units, as files say them
     "segment_length_mm": "segment_length",
@@ -30,6 +32,7 @@ KEYS = {  # names with units, as files say them
     "hinge_stiffness_N_mm_per_rad": "hinge_stiffness",
     "linear_stiffness_N_per_mm": "linear_stiffness",
     "wall_compliance_mm_per_N": "wall_compliance",
+    "hinge_coupling_N_mm_per_rad": "hinge_coupling",
 }
 
 
@@ -46,6 +49,8 @@ class Finger:
     - `hinge_stiffness` k_θ: N mm/rad, of one hinge (two corners in series)
     - `linear_stiffness` k_L: N/mm of every bar, infinite where bars are rigid
     - `wall_compliance` c_w: mm/N, of the walls that a dome pushes against; 0 where they are rigid
+    - `hinge_coupling` κ: N mm/rad, of neighboring hinges, by which one that opens turns the other;
+      between −k_θ/2 and k_θ/2, shared by all units
     - `dome_travel` D: mm, of the pole of the inverted dome at rest, where the law is of its own
       travel; 0 where the opening stands for it
 
@@ -66,6 +71,7 @@ class Finger:
     linear_stiffness: Array
     dome_travel: Array = field(default_factory=lambda: np.zeros((1, 1)))
     wall_compliance: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    hinge_coupling: Array = field(default_factory=lambda: np.zeros((1, 1)))
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
     branch: Array = field(default_factory=lambda: np.zeros((1, 1)))
     end_moment: Array = field(default_factory=lambda: np.zeros((1, 1)))
@@ -75,8 +81,8 @@ class Finger:
         for name, values in self.arrays().items():
             if values.ndim != 2 or values.shape[0] not in (1, self.n_units):
                 raise ValueError(f"{name} has shape {values.shape}, not (1 or n_units, designs)")
-        if self.segment_height.shape[0] != 1 or self.linear_stiffness.shape[0] != 1:
-            raise ValueError("segment_height and linear_stiffness are shared by all units")
+        if any(getattr(self, name).shape[0] != 1 for name in SHARED):
+            raise ValueError(f"{', '.join(SHARED)} are shared by all units")
         rigid = np.isinf(self.linear_stiffness)
         if rigid.any() and not rigid.all():
             raise ValueError("rigid and flexible bars cannot share a batch")
@@ -103,6 +109,11 @@ class Finger:
     def has_walls(self) -> bool:
         """Whether any unit's walls give way."""
         return bool(self.wall_compliance.any())
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether any hinge turns its neighbors."""
+        return self.n_units > 1 and bool(self.hinge_coupling.any())
 
     @property
     def wall_ratio(self) -> Array:

@@ -12,6 +12,7 @@ from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.lattice import Lattice
+from dpgcli.mechanics.neighbors import NeighborTurns
 from dpgcli.mechanics.walls import Walled
 
 Formulate = Callable[[Finger], FingerPotential]
@@ -66,8 +67,8 @@ class DeadLoad:
 def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     """The terms of a finger: domes; walls; two corners per hinge, each of 2 k_θ; bars; loads.
 
-    Rigid walls, hinges without stiffness, rigid bars and loads of zero are no terms. Two springs
-    of 2 k_θ in series are the hinge's k_θ.
+    Rigid walls, hinges without stiffness or coupling, rigid bars and loads of zero are no terms.
+    Two springs of 2 k_θ in series are the hinge's k_θ.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> [term.kind for term in finger_terms(Chain(uniform_finger(1, **STUDY)))]  # rigid bars
@@ -81,9 +82,19 @@ def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
         Term("bistable", coordinates.dome, domes),
         *(Term("wall", yielding, wall) for yielding in coordinates.walls),
         *(Term("hinge", angle, corner) for angle in hinges),
+        *_couplings(coordinates),
         *(Term("bar", extension, bar) for extension in coordinates.bars),
         *_loads(coordinates),
     )
+
+
+def _couplings(coordinates: FingerCoordinates) -> tuple[Term, ...]:
+    """The term −κ θ_i θ_{i+1} of neighboring hinges, if they have one."""
+    finger = coordinates.finger
+    if not finger.is_coupled:
+        return ()
+    turns = NeighborTurns(coordinates.corners)
+    return (Term("hinge coupling", turns, DeadLoad(finger.hinge_coupling)),)
 
 
 def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:

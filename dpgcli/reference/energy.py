@@ -4,7 +4,7 @@ Of the package it shares nothing but the finger's parameters. The unknowns are t
 (B_1x, B_1y, T_1x, T_1y, B_2x, …) in mm, for rigid bars the corner angles (a_1, b_1, a_2, …) in
 rad. Unit i has the chord c = B_i − B_{i-1}, the top t = T_i − T_{i-1}, and the struts
 p = T_{i-1} − B_{i-1} (near) and q = T_i − B_i (far). Its corners open by a = ∠p − ∠c − π/2 and
-b = ∠c + π/2 − ∠q.
+b = ∠c + π/2 − ∠q, its hinge turns by θ = a + b = ∠p − ∠q. Neighboring hinges may have −κ θ θ'.
 """
 
 from collections.abc import Iterator, Sequence
@@ -183,6 +183,7 @@ class ElasticBars:
     """The energy of a finger whose bars are springs; its unknowns are the nodes."""
 
     units: list[Unit]
+    coupling: "mpf" = 0
 
     @property
     def base(self) -> list["mpf"]:
@@ -206,11 +207,14 @@ class ElasticBars:
     def at(self, unknowns: list["mpf"], walls: Sequence["mpf"] = ()) -> Expansion:
         """The energy at nodes, expanded along the curved update `moved`; domes behind `walls`."""
         size = len(unknowns) + len(walls)
-        expansion = Expansion(size, *((8, 4) if walls else (7, 0)))
+        bandwidth = (13 if walls else 11) if self.coupling else (8 if walls else 7)
+        expansion = Expansion(size, bandwidth, 4 if walls else 0)
         shape = list(cells(self.base, unknowns))
         for i, (unit, cell) in enumerate(zip(self.units, shape, strict=True)):
             _add_springs(expansion, i, unit, cell, walls[i] if walls else 0)
             _add_corners(expansion, i, unit, cell)
+        if self.coupling:
+            _add_couplings(expansion, self.coupling, shape)
         _add_swings(expansion, shape)
         return expansion
 
@@ -271,6 +275,40 @@ def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
         expansion.add_bend(corner.force, chord, along_chord)
 
 
+def _add_couplings(expansion: Expansion, coupling: "mpf", shape: list[Cell]) -> None:
+    """−κ θ θ' of neighbors, θ = ∠p − ∠q; a direction bends by −(g hᵀ + h gᵀ), its `_rates`."""
+    turns = [sum(corners(cell)) for cell in shape]
+    struts = [
+        [
+            [_spread(i, (ends, rate)) for rate in _rates(vector)]
+            for ends, vector in ((ENDS.near, cell.near), (ENDS.far, cell.far))
+        ]
+        for i, cell in enumerate(shape)
+    ]
+    rates = [_combined(near[0], far[0], -1) for near, far in struts]
+    for first, second in pairwise(range(len(shape))):
+        _add_pair(expansion, coupling, (turns[first], turns[second]), (rates[first], rates[second]))
+        for own, other in ((first, second), (second, first)):
+            moment = -coupling * turns[other]
+            near, far = struts[own]
+            expansion.add_bend(-moment, *near)
+            expansion.add_bend(moment, *far)
+
+
+def _add_pair(
+    expansion: Expansion, coupling: "mpf", turns: tuple["mpf", "mpf"], rates: tuple[Rate, Rate]
+) -> None:
+    """−κ θ θ' = κ/4 [(θ − θ')² − (θ + θ')²] as two springs, one of which pushes."""
+    for sign in (-1, 1):
+        spring = linear(-sign * coupling / 2, turns[0] + sign * turns[1])
+        expansion.add(spring, _combined(*rates, sign))
+
+
+def _combined(one: Rate, other: Rate, sign: int) -> Rate:
+    """The sum of two rates, or their difference."""
+    return {row: one.get(row, 0) + sign * other.get(row, 0) for row in {**one, **other}}
+
+
 def _add_swings(expansion: Expansion, shape: list[Cell]) -> None:
     """Add the second-order term of the curved update `moved`: gradient · ∂²nodes/∂step².
 
@@ -304,6 +342,7 @@ class RigidBars:
     """The energy of a finger whose bars keep their lengths; its unknowns are the corner angles."""
 
     units: list[Unit]
+    coupling: "mpf" = 0
     scale = 1
 
     def unknowns(self, nodes: list["mpf"]) -> list["mpf"]:
@@ -331,7 +370,8 @@ class RigidBars:
         from mpmath import cos, sin
 
         size = len(unknowns) + len(walls)
-        expansion = Expansion(size, *((2, 2) if walls else (1, 0)))
+        bandwidth = (4 if walls else 3) if self.coupling else (2 if walls else 1)
+        expansion = Expansion(size, bandwidth, 2 if walls else 0)
         for i, unit in enumerate(self.units):
             a, b = unknowns[2 * i : 2 * i + 2]
             rise_near, rise_far = unit.height * sin(a), unit.height * sin(b)
@@ -349,6 +389,10 @@ class RigidBars:
             for (row, bend), angle in zip(bends.items(), (a, b), strict=True):
                 expansion.add(linear(2 * unit.hinge, angle), {row: 1})
                 expansion.add_square(spring.force * _dot(n, bend), {row: 1})
+        turns = [sum(unknowns[2 * i : 2 * i + 2]) for i in range(len(self.units))]
+        for i, pair in enumerate(pairwise(turns) if self.coupling else ()):
+            rates = {2 * i: 1, 2 * i + 1: 1}, {2 * i + 2: 1, 2 * i + 3: 1}
+            _add_pair(expansion, self.coupling, pair, rates)
         return expansion
 
     def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":

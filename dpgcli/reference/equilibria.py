@@ -133,7 +133,8 @@ def pushed(units: list[Unit], push: Array | None) -> list[Unit]:
 
 def energy_of(finger: Finger, units: list[Unit], walls: list["mpf"]) -> Energy:
     """The energy of a finger's units; where walls give way, the search begins at `walls`, mm."""
-    frame = RigidBars(units) if finger.is_rigid else ElasticBars(units)
+    (coupling,) = extended(finger.hinge_coupling[0])
+    frame = (RigidBars if finger.is_rigid else ElasticBars)(units, coupling)
     return YieldingWalls(frame, walls) if finger.has_walls else frame
 
 

@@ -31,14 +31,13 @@ def omissions(
         left_out.append(Omission(f"walls and {n} unknowns of them", "the walls are rigid"))
     if finger.is_rigid:
         why = "the target error allows it" if exactness.drops_bars else "k_L is infinite"
-        left_out.append(
-            Omission(
-                f"bar terms and {2 * n} bar extensions of {4 * n} unknowns",
-                f"{why}; units do not feel each other, "
-                "so the guess is the solution and Newton only certifies it",
-                "bars",
+        if not finger.is_coupled:
+            why += (
+                "; units do not feel each other, "
+                "so the guess is the solution and Newton only certifies it"
             )
-        )
+        what = f"bar terms and {2 * n} bar extensions of {4 * n} unknowns"
+        left_out.append(Omission(what, why, "bars"))
     if not finger.hinge_stiffness.any():
         left_out.append(Omission("hinge terms", "the hinge stiffness is zero", "hinges"))
     if units.wells.exists.size < n:

@@ -30,9 +30,11 @@ class UnitSolutions:
     def are_soft(self) -> Flags:
         """Units that with rigid bars do not show what the finger does, (unit, design).
 
-        Bars turn them too far or are strained too much, or give way before a stiff hinge turns, or
-        a stroke leads to where only bars that give way can follow.
+        Neighbors turn them, bars turn them too far or are strained too much, or give way before a
+        stiff hinge turns, or a stroke leads to where only bars that give way can follow.
         """
+        if self.finger.is_coupled:
+            return np.ones((1, 1), bool)
         if self.finger.is_rigid:
             return np.zeros((1, 1), bool)
         finger, known = self.finger, self.first_order
@@ -70,8 +72,8 @@ class UnitSolutions:
     def have_no_well(self) -> Flags:
         """Units that certainly have no second well, (unit, design).
 
-        Between soft bars one may exist where there is none between rigid ones, unless the dome
-        by itself has none.
+        Between soft bars, or beside neighbors, one may exist where there is none between rigid
+        ones, unless the dome by itself has none.
         """
         has_none, soft = ~self.wells.exists, self.are_soft
         if soft.any():

@@ -44,9 +44,10 @@ def test_every_follower_finds_the_snap() -> None:
     [
         (finger(linear_stiffness=np.inf), []),
         (finger().changed(wall_compliance=np.array([[0.1]])), []),
+        (finger().changed(hinge_coupling=np.array([[1.0]])), []),
     ],
 )
-def test_third_parties_know_neither_rigid_bars_nor_walls(own: Finger, names: list[str]) -> None:
+def test_third_parties_know_only_bars_that_give_way(own: Finger, names: list[str]) -> None:
     assert [f.name for f in case_of(own).followers()][2:] == names
 
 

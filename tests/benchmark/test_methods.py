@@ -42,6 +42,18 @@ def test_errors_of_the_ladder() -> None:
     assert seen["units looked up, poses composed"] > 1e-10, "and what is of second order"
 
 
+def test_units_looked_up_are_first_guesses_where_hinges_turn_each_other() -> None:
+    """The energy is that of their shape, neighbors and all: off by the square of what is missed."""
+    missed = {}
+    for coupling in (1.0, 0.1):
+        coupled = finger(1e4).changed(hinge_coupling=np.array([[coupling]]))
+        reference = extended_states(coupled, PATTERNS)
+        found = next(m for m in package_methods(coupled, PATTERNS) if "looked up" in m.name).run()
+        missed[coupling] = np.abs(found.energy - reference.energy).max()
+    assert missed[1.0] < 3e-3
+    assert missed[0.1] < 0.02 * missed[1.0]
+
+
 def test_rigid_bars_have_fewer_ways() -> None:
     names = [method.name for method in package_methods(finger(np.inf), PATTERNS)]
     assert names == ["rigid bars, unit by unit", *(n for n in WORST if n.startswith("chain, ")

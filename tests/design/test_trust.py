@@ -448,6 +448,23 @@ def test_a_fitted_height_is_known_as_far_as_its_file_says() -> None:
     )
 
 
+def test_errors_of_a_fit_are_those_beside_its_coupling() -> None:
+    """A finger that does not take the coupling of its file is not as near as the fit."""
+    key = "hinge_coupling_N_mm_per_rad"
+    values = {"hinge_stiffness_N_mm_per_rad": 32.0, WALL: 0.8, key: 1.2}
+    errors = {"forces": KnownError(0.01, None, "unseen states")}
+    file = replace(fitted("all.yaml", **values), leave_one_out=(0.007, 0.008), known_errors=errors)
+    known = with_files(PUSHED, file)
+    for design, is_known in (
+        (known, True),
+        (known.with_values({f"finger.{key}": np.array([1.0])}), False),
+        (known.with_values({f"finger.{key}": np.array([0.0])}), False),
+    ):
+        found = trusts(design)
+        assert ("all.yaml" in found[Output.SHAPES].known_error) == is_known
+        assert ("unseen states" in found[Output.FORCES].known_error) == is_known
+
+
 def test_a_calibration_s_own_errors_come_first() -> None:
     """Such as of one that ships: by output, with what it was compared with."""
     names = {

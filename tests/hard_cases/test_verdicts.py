@@ -180,8 +180,9 @@ def test_the_unit_of_length_does_not_matter(formulation: str, scale: float) -> N
 
 
 def test_scaled_lengths_leave_forces_alone() -> None:
-    finger = study_finger()
+    finger = study_finger().changed(hinge_coupling=np.array([[1.2]]))
     in_meters = scaled(finger, 1e-3)
+    assert in_meters.hinge_coupling.item() == pytest.approx(0.0012)  # N m/rad
     assert in_meters.stroke.item() == pytest.approx(3.5e-3)
     assert in_meters.bistable_stiffness.item() == pytest.approx(12840.0)  # N/m
     assert in_meters.hinge_stiffness.item() == pytest.approx(0.0242)  # N m/rad

@@ -83,8 +83,11 @@ def test_a_single_unit_with_rigid_bars() -> None:
     assert alone.stiffness < 0.0, "the barrier's, not the well's"
 
 
-def energy_in_complex_numbers(units: list[Unit], nodes: list[mpmath.mpf]) -> mpmath.mpf:
+def energy_in_complex_numbers(
+    units: list[Unit], nodes: list[mpmath.mpf], coupling: float = 0.0
+) -> mpmath.mpf:
     """The model's energy; rigid bars must have kept their lengths."""
+    last_turn = mpmath.mpf(0)
     base, top = mpmath.mpc(0), mpmath.mpc(0, units[0].height)
     energy = mpmath.mpf(0)
     for i, unit in enumerate(units):
@@ -95,6 +98,9 @@ def energy_in_complex_numbers(units: list[Unit], nodes: list[mpmath.mpf]) -> mpm
         turns = [mpmath.arg(strut / chord / 1j) for strut in (near, far)]
         energy += unit.bistable * unit.stroke**2 * well / 2
         energy += unit.hinge * (turns[0] ** 2 + turns[1] ** 2)
+        turn = turns[0] - turns[1]
+        energy -= coupling * turn * last_turn
+        last_turn = turn
         extensions = abs(chord) - unit.length, abs(far) - unit.height
         if mpmath.isinf(unit.bar):
             assert max(map(abs, extensions)) < mpmath.mpf("1e-55")
@@ -105,21 +111,25 @@ def energy_in_complex_numbers(units: list[Unit], nodes: list[mpmath.mpf]) -> mpm
 
 
 @pytest.mark.parametrize("linear_stiffness", [30.0, np.inf])
-def test_energy_and_derivatives_are_those_of_the_model(linear_stiffness: float) -> None:
-    finger = graded_finger(2, linear_stiffness)
+@pytest.mark.parametrize(("n", "coupling"), [(2, 0.0), (3, 5.0)])
+def test_energy_and_derivatives_are_those_of_the_model(
+    linear_stiffness: float, n: int, coupling: float
+) -> None:
+    finger = graded_finger(n, linear_stiffness)
     random = np.random.default_rng(7)
     with mpmath.workdps(60):
         units = extended_units(finger)
-        bars = RigidBars(units) if finger.is_rigid else ElasticBars(units)
-        bent = RigidBars(units).nodes([mpmath.mpf(v) for v in random.uniform(-0.2, 0.5, 4)])
+        bars = (RigidBars if finger.is_rigid else ElasticBars)(units, mpmath.mpf(coupling))
+        bent = RigidBars(units).nodes([mpmath.mpf(v) for v in random.uniform(-0.2, 0.5, 2 * n)])
         if not finger.is_rigid:
-            bent = [value + mpmath.mpf(v) for value, v in zip(bent, random.random(8), strict=True)]
+            off = random.random(4 * n)
+            bent = [value + mpmath.mpf(v) for value, v in zip(bent, off, strict=True)]
         here = bars.unknowns(bent)
         size, h = len(here), mpmath.mpf("1e-12")
 
         def energy(*changes: tuple[int, int]) -> mpmath.mpf:
             step = [h * sum(sign for row, sign in changes if row == k) for k in range(size)]
-            return energy_in_complex_numbers(units, bars.nodes(bars.moved(here, step)))
+            return energy_in_complex_numbers(units, bars.nodes(bars.moved(here, step)), coupling)
 
         expansion = bars.at(here)
         assert abs(expansion.energy - energy()) < 1e-50
@@ -262,7 +272,7 @@ def test_tip_angle_counts_full_turns(n_units: int, linear_stiffness: float) -> N
 @pytest.mark.parametrize("linear_stiffness", [1e4, np.inf])
 def test_the_unit_of_length_does_not_matter(linear_stiffness: float) -> None:
     finger, inverted, scale = graded_finger(2, linear_stiffness), units_of("11", "01"), 2.0**10
-    powers = dict(zip(ARRAYS, (-1, -1, -1, 1, 0, -1, 1, -1, -1), strict=True))
+    powers = dict(zip(ARRAYS, (-1, -1, -1, 1, 0, -1, 1, -1, -1, -1), strict=True))
     scaled = {name: values * scale ** powers[name] for name, values in finger.arrays().items()}
     one, other = extended_states(finger, inverted), extended_states(Finger(2, **scaled), inverted)
     rows = np.array([[scale], [scale], [1.0]])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dpgcli.arrays import Flags
 from dpgcli.design.scene import Scene
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import SHARED, Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import certify
 from dpgcli.states.plan import Request
@@ -33,6 +33,7 @@ def in_other_units(finger: Finger, length: float, force: float) -> Finger:
         "linear_stiffness": force / length,
         "dome_travel": length,
         "wall_compliance": length / force,
+        "hinge_coupling": force * length,
     }
     return Finger(
         finger.n_units, **{name: v * factors[name] for name, v in finger.arrays().items()}
@@ -64,9 +65,8 @@ def test_states_do_not_depend_on_the_units_of_measure(
 
 def test_a_uniform_finger_may_be_stored_unit_by_unit(reference_finger: Fingers) -> None:
     finger = reference_finger(5, 1e4)
-    shared = ("segment_height", "linear_stiffness")
     spread = {
-        name: v if name in shared else np.repeat(v, 5, axis=0)
+        name: v if name in SHARED else np.repeat(v, 5, axis=0)
         for name, v in finger.arrays().items()
     }
     request = Request(columns=("all",))

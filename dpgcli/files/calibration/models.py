@@ -52,6 +52,10 @@ class FittedFraction(Fitted[Fraction]):
     """A fitted share."""
 
 
+class FittedBounded(Fitted[Bounded]):
+    """A fitted value of either sign."""
+
+
 class FittedBars(Fitted[BarStiffness]):
     """A fitted stiffness of bars, which may be rigid."""
 
@@ -67,6 +71,7 @@ class Values(Section):
     segment_length_mm: FittedPositive | None = None
     linear_stiffness_N_per_mm: FittedBars | None = None
     wall_compliance_mm_per_N: FittedNotNegative | None = None
+    hinge_coupling_N_mm_per_rad: FittedBounded | None = None
 
 
 Measurements = Annotated[list[Bounded | None], Field(min_length=2)]

@@ -61,6 +61,11 @@ class FingerSpec(Section):
         description="How far the wall that a dome pushes against gives way, c_w in mm/N: 0, rigid "
         "walls, unless given or calibrated.",
     )
+    hinge_coupling_N_mm_per_rad: Bounded | None = Field(
+        default=None,
+        description="By how much hinges turn their neighbors, kappa in N mm/rad, less than half "
+        "the hinge stiffness: 0 unless given or calibrated.",
+    )
     calibration: str | Read | list[str | Read] | None = Field(
         default=None,
         description="Where values come from that the lattice section leaves out: published, "
@@ -142,6 +147,7 @@ class Spec(Section):
         """The spec as a batch of one design."""
         finger = self.finger
         bars = finger.linear_stiffness_N_per_mm
+        coupling = finger.hinge_coupling_N_mm_per_rad
         said = self.model_error
         return Design(
             finger.units,
@@ -154,6 +160,7 @@ class Spec(Section):
             tolerances={} if self.uncertainty is None else self.uncertainty.by_key,
             model_error=said if (share := share_of(said)) is None else share,
             pressure=None if self.pressure is None else self.pressure.known,
+            hinge_coupling=None if coupling is None else np.array([coupling], float),
         )
 
 

@@ -73,6 +73,7 @@ HINTS = {
     "stroke_mm": "stroke is dome height minus unit separation",
     "linear_stiffness_N_per_mm": "1.0e+4 is assumed where it is left out; .inf is rigid",
     "wall_compliance_mm_per_N": "0 is a rigid wall; those of the study's finger have about 0.8",
+    "hinge_coupling_N_mm_per_rad": "0 is none; that of the study's finger is about 1.2",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
     "segment_height_mm": "half the chamber width + half the limiting layer",
@@ -207,14 +208,16 @@ def _unknown(path: KeyPath) -> tuple[str, str, str]:
 
 def _nearest(key: str, known: list[str]) -> str:
     """The key that was probably meant: here, else elsewhere, else all that are known here."""
-    if close := get_close_matches(key, known, n=1):
-        return f"did you mean {close[0]}?"
     elsewhere = {
         name: dotted((*section, name))
         for section, model in reversed(SECTIONS.items())
         if "*" not in section
         for name in model.model_fields
     }
+    if key in elsewhere:
+        return f"did you mean {elsewhere[key]}?"
+    if close := get_close_matches(key, known, n=1):
+        return f"did you mean {close[0]}?"
     if close := get_close_matches(key, list(elsewhere), n=1):
         return f"did you mean {elsewhere[close[0]]}?"
     return "known here: " + ", ".join(known)

@@ -7,7 +7,7 @@ from typing import Any
 
 import dpgcli
 from dpgcli.design.calibrations import FINITE_ELEMENTS, PUBLISHED
-from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
+from dpgcli.design.dimensions import HINGE_COUPLING, LINEAR_STIFFNESS, WALL_COMPLIANCE
 from dpgcli.design.rules import DERIVATIONS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.calibration import Calibration, calibration_in, read_calibration
@@ -67,7 +67,7 @@ def recalibrated(document: Document, calibration: Calibration | str) -> Document
 
     listed = PUBLISHED if calibration == PUBLISHED else [calibration, *before]
     changes = {**without(finger), "calibration": listed}
-    for key in (LINEAR_STIFFNESS, WALL_COMPLIANCE):
+    for key in (LINEAR_STIFFNESS, WALL_COMPLIANCE, HINGE_COUPLING):
         if is_given(key):
             changes.pop(key, None)
     overrides = finger.get("overrides") or {}

@@ -76,6 +76,7 @@ class Tolerances(Section):
     hinge_stiffness_N_mm_per_rad: Tolerated = None
     linear_stiffness_N_per_mm: Tolerated = None
     wall_compliance_mm_per_N: Tolerated = None
+    hinge_coupling_N_mm_per_rad: Tolerated = None
     base_spacing_mm: Tolerated = None
     mounting_angle_deg: Tolerated = None
 

@@ -104,6 +104,7 @@ def test_the_study_s_finger_has_the_published_lattice_exactly():
         "linear_stiffness": [[1e4]],
         "dome_travel": [[0.0]],
         "wall_compliance": [[0.0]],
+        "hinge_coupling": [[0.0]],
     }
 
 
