@@ -59,7 +59,10 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
         }
         return _of_table(ramps, known.lines)
     parts = each_of(pressure)
-    if parts and not any(isinstance(part, str | Path) for part in parts):
+    are_texts = [isinstance(part, str | Path) for part in parts]
+    if not all(are_texts):
+        if any(are_texts) or np.ndim(pressure) == 0:  # type: ignore[arg-type]
+            raise UsageError(FIELD, f" {pressure}: expected two numbers or more, ", RAMP)
         return _of_table({known.lines[0]: list(parts)}, known.lines)
     texts = [part if isinstance(part, str) else str(path_of("pressure", part)) for part in parts]
     if len(texts) == 1 and _is_file(texts[0]):

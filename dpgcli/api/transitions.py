@@ -247,7 +247,7 @@ def graph_path(path: str | Path) -> Path:
     """The path of a graph. Raises UsageError for a name that says something else."""
     file = path_of("path", path)
     if file.suffix.lower() != ".graphml":
-        raise UsageError(f"path {path}: writes GraphML, give a name that ends in .graphml")
+        raise UsageError(f"{path}: expected a name that ends in .graphml, for a graph")
     return file
 
 

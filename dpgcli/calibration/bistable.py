@@ -358,7 +358,7 @@ def _unsampled_points(found: BistableFit) -> Iterator[str]:
     if np.isnan(top):
         return
     height = float(law(at_rest.top, found.fit.values, Quantity.ENERGY))
-    barrier = f"the fitted barrier, {height:.4g} mJ at {top:.4g} mm, is an extrapolation"
+    barrier = f"the barrier of the fitted law, {height:.4g} mJ at {top:.4g} mm, is an extrapolation"
     for start, end in found.gaps:
         if start < top < end:
             yield f"nothing is sampled from {start:.4g} to {end:.4g} mm: {barrier}"

@@ -135,3 +135,9 @@ def test_names_of_lines_do_not_hide_files(tmp_path: Path, monkeypatch: pytest.Mo
     for name in ("pressures", "./A=1.csv", "0.csv"):
         Path(name).write_text("A\n0\n0.1\n")
         assert named(name).tolist() == [[0.0], [0.1]]
+
+
+@pytest.mark.parametrize("given", [[0, "a"], 5, ["0:1", 0.1]])
+def test_numbers_beside_something_else_are_no_ramp(given: Any) -> None:
+    with pytest.raises(UsageError, match="expected two numbers or more, pressures in MPa such as"):
+        history_input(given, ONE)
