@@ -147,10 +147,11 @@ class PulsesResult:
         elif not found.pulses:
             yield f"{self.start} is the state to start from: no pulse is needed"
         else:
-            smallest = min(pulse.margin for pulse in found.pulses)
+            smallest, size = min((pulse.margin, abs(pulse.peak)) for pulse in found.pulses)
             yield (
                 f"{counted(len(found.pulses), 'pulse')} {way}, the fewest there are; smallest "
-                f"margin {smallest:.4g} MPa; replayed from {self.start}, it ends there"
+                f"margin {smallest:.4g} MPa, {100.0 * smallest / size:.2g}% of its peak; "
+                f"replayed from {self.start}, it ends there"
             )
             yield from _notes(found)
         if self.scattered is not None:

@@ -153,7 +153,10 @@ class Drawing:
             axes.plot(*place, MARKS[event.kind], color="black", mfc="white", ms=6, zorder=6)
             if self.way.points.cycle[event.before] == 1:
                 said = {"textcoords": "offset points", "fontsize": 7, "zorder": 7}
-                axes.annotate(f"{number}: {numbered(event.units)}", place, (6, -4), **said)
+                is_right = place[0] > points[:, 0].mean() and len(self.pressure.lines) > 1
+                beside = (-6, -9) if is_right else (6, -4)
+                said["ha"] = "right" if is_right else "left"
+                axes.annotate(f"{number}: {numbered(event.units)}", place, beside, **said)
 
     def _draw_key(self, figure: Any, page: tuple[float, float]) -> None:
         """What colors and marks mean, above the curves."""

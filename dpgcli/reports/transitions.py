@@ -15,8 +15,8 @@ LAYER, PLACE = 2.2, 0.62  # inches between layers, and between states of a layer
 WIDENING = 0.1  # inches between layers more for each state of the largest
 BENDS = {"+": 0.10, "-": 0.16}  # of an edge, to its left: so that both directions are seen
 STYLES = {"+": "-", "-": "--"}
-LABEL = {"+": 0.36, "-": 0.30}  # of a layer along an edge, and further for some of several
-FURTHER = (0.0, 0.08, 0.16)
+TRIED = (0.36, 0.3, 0.44, 0.24, 0.52, 0.6, 0.68)  # of a layer along an edge, for its label
+ROOM = np.array([0.55, 0.13])  # inches of a label
 MARGIN = 15  # points between an edge's end and the middle of its state's name
 
 
@@ -80,16 +80,27 @@ def _draw_edges(
         transitions["pressure_MPa"].tolist(),
         strict=True,
     )
-    for k, (source, target, direction, line, tie, pressure) in enumerate(rows):
+    taken = [np.array(place) * inches for place in places.values()]
+    for source, target, direction, line, tie, pressure in rows:
         if target and target != source:
             color = colors[line] if is_reached[source] else OTHER
             ends = np.array([places[source], places[target]])
             text = f"{pressure:.4g}" + (" tie" if tie else "")
             n_layers = max(1.0, abs(ends[1, 0] - ends[0, 0]))
-            share = (LABEL[direction] + FURTHER[k % len(FURTHER)]) / n_layers
-            place = _along(ends * inches, BENDS[direction], share) / inches
+            bend = BENDS[direction]
+            tries = [_along(ends * inches, bend, share / n_layers) for share in TRIED]
+            taken.append(_with_most_room(np.array(tries), np.array(taken)))
             _draw_edge(axes, ends, direction, color)
-            _draw_label(axes, place, color, text)
+            _draw_label(axes, taken[-1] / inches, color, text)
+
+
+def _with_most_room(tries: Array, taken: Array) -> Array:
+    """The first place at which a label covers nothing that is there, else that which covers least.
+
+    Places (place, 2) in inches; those taken are the middles of labels and names.
+    """
+    apart = (np.abs(tries[:, None] - taken) / ROOM).max(axis=2).min(axis=1)
+    return np.asarray(tries[np.minimum(apart, 1.0).argmax()])
 
 
 def _draw_edge(axes: Any, ends: Array, direction: str, color: str) -> None:
