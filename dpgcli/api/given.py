@@ -38,17 +38,18 @@ def scene_or_sweep(given: SpecInput, settings: Settings = ()) -> SceneInput | Sw
     dpgcli.errors.SpecError: spec: fingers: expected a spec, with the key finger, or a sweep, with \
 the keys base and space, found fingers (did you mean finger?)
     """
+    texts = setting_texts(settings)
     if isinstance(given, SceneInput | Scene | Finger):
-        return scene_input(given, settings)
+        return scene_input(given, texts)
     if isinstance(given, Mapping):
         own = without_free_keys({str(key): value for key, value in given.items()})
         is_swept = is_sweep(Document("spec", own, {}))
-        return sweep_input(given, settings) if is_swept else scene_input(given, settings)
+        return sweep_input(given, texts) if is_swept else scene_input(given, texts)
     path = path_of("spec", given)
     document = read_document(given)
     if is_sweep(document):
-        return sweep_of(document, path, setting_texts(settings))
-    return scene_input_in(document, path, settings)
+        return sweep_of(document, path, texts)
+    return scene_input_in(document, path, texts)
 
 
 def sweep_input(sweep: SweepInput, settings: Settings = ()) -> Sweep:
@@ -63,7 +64,7 @@ def sweep_input(sweep: SweepInput, settings: Settings = ()) -> Sweep:
     if not isinstance(base, Mapping):
         return sweep_in(Document("sweep", data, {}), Path(), texts)
     document = Document("sweep", {**data, "base": "base"}, {})
-    return sweep_in(document, Path(), texts, base=spec_document(base, settings))
+    return sweep_in(document, Path(), texts, base=spec_document(base, texts))
 
 
 def _axes(space: Any) -> Any:

@@ -148,10 +148,10 @@ def sweep(
     """
     place = Place(executor, jobs, scheduler, wait)
     check_flags(restart=restart, force=force, strict=strict)
-    part = shard_of(shard)
+    texts, part = setting_texts(settings), shard_of(shard)
     _check_part(part, output, require)
     with _folder(output) as folder:
-        study = study_of(sweep, folder, settings, tolerance, target_error)
+        study = study_of(sweep, folder, texts, tolerance, target_error)
         check_not_read(study.sweep.files, [path for path, _ in outputs(folder)])
         rules, _ = rules_of(study, require, strict=strict)
         with sole_use(folder):
@@ -163,7 +163,7 @@ def sweep(
                 restart=restart,
                 force=force,
                 is_sent=place.is_sent,
-                settings=setting_texts(settings),
+                settings=texts,
                 warn=silent,
                 tell=silent,
             )

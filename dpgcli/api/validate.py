@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dpgcli.api.given import scene_or_sweep
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, setting_texts
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Location, located
 from dpgcli.files.sweep_file import Sweep
@@ -22,10 +22,11 @@ def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     >>> [problem.key for problem in validate({"base": {"finger": {"units": 0}}, "space": []})]
     ['space', 'finger.units']
     """
+    texts = setting_texts(settings)
     problems: list[Problem] = []
     for spec in specs:
         try:
-            given = scene_or_sweep(spec, settings)
+            given = scene_or_sweep(spec, texts)
         except SpecError as error:
             problems += error.problems
         else:

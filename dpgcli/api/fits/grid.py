@@ -1,12 +1,19 @@
 """`fit_grid`: quantities over geometries, as scaling laws or interpolated."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dpgcli.api.fits.result import FitResult, GeometryInput, fit_result, geometry_from, sizes
-from dpgcli.api.inputs import chosen, files_of, setting_texts
+from dpgcli.api.fits.result import (
+    FitResult,
+    GeometryInput,
+    fit_result,
+    geometry_from,
+    geometry_texts,
+    sizes,
+)
+from dpgcli.api.inputs import chosen, files_of
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.grid import GridLaw, Points
 from dpgcli.errors import Field, UsageError
@@ -14,7 +21,6 @@ from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import grid_doubts, grid_of
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.measured import read_table
-from dpgcli.files.sections import Geometry
 from dpgcli.reports.fits import grid_summary, quantity_rows
 
 
@@ -38,8 +44,9 @@ def fit_grid(
     [2.0]
     """
     read = read_table(table)
-    _check_apart(geometry, (*read.over, *read.constant))
-    shared = sizes(geometry_from(geometry, spec))
+    texts = geometry_texts(geometry)
+    _check_apart(texts, (*read.over, *read.constant))
+    shared = sizes(geometry_from(texts, spec))
     way = chosen(GridMethod, "method", method)
     law = GridLaw(way, Points(read.over, read.geometry, read.quantities))
     for key in read.quantities:
@@ -61,10 +68,9 @@ def fit_grid(
     )
 
 
-def _check_apart(geometry: GeometryInput, columns: Container[str]) -> None:
+def _check_apart(texts: Sequence[str], columns: Container[str]) -> None:
     """Raise UsageError for dimensions that the table has itself."""
-    given = sizes(geometry) if isinstance(geometry, Geometry) else geometry
-    for text in () if given is None else setting_texts(given, "geometry"):
+    for text in texts:
         key = text.partition("=")[0].strip()
         if key in columns:
             raise UsageError(Field("geometry"), f" {text}: the table has a column {key}")

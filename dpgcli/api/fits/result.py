@@ -109,10 +109,14 @@ def geometry_from(
 
 def with_geometry(geometry: GeometryInput, base: Geometry | None) -> Geometry | None:
     """A base geometry with values changed or added."""
-    if isinstance(geometry, Geometry):
-        geometry = sizes(geometry)
-    texts = () if geometry is None else setting_texts(geometry, "geometry")
+    texts = geometry_texts(geometry)
     return geometry_of(texts, base) if texts else base
+
+
+def geometry_texts(geometry: GeometryInput) -> tuple[str, ...]:
+    """Dimensions as "key=value" texts."""
+    given = sizes(geometry) if isinstance(geometry, Geometry) else geometry
+    return () if given is None else setting_texts(given, "geometry")
 
 
 def sizes(geometry: Geometry | None) -> dict[str, float]:
