@@ -38,6 +38,7 @@ from dpgcli.states.solved import Surroundings
 from dpgcli.text import counted, enumerated
 
 MOST_CYCLES = 100_000
+MOST_PRESSURES = 1_000_000  # by step and unit: their path takes some 4 GB of memory
 LARGEST_STEP = 0.05  # of a stroke: points near enough for a figure
 LARGE = 10.0  # MPa: what is larger may be kPa
 WHY = {
@@ -242,9 +243,16 @@ def followed(
     """The same, of what was read before."""
     check_whole(cycles=cycles)
     check_flags(unstable=unstable)
-    if not 1 <= cycles <= MOST_CYCLES:
+    if cycles is None or not 1 <= cycles <= MOST_CYCLES:
         raise UsageError(Field("cycles"), f" {cycles}: expected 1 to {MOST_CYCLES:,}")
     by_unit = history.history.pressure[:, given.pressure.line_of]
+    if (n := cycles * by_unit.size) > MOST_PRESSURES:
+        n_steps, n_units = by_unit.shape
+        raise UsageError(
+            f"{n:,} pressures, of {n_steps:,} steps of {counted(n_units, 'unit')}, ",
+            Field("cycles"),
+            f" {cycles:,}: expected at most {MOST_PRESSURES:,}, as the path is held in memory",
+        )
     way = travel(given.pressed, _start(given, start), by_unit, cycles, LARGEST_STEP)
     result = ActuateResult(given, history, way)
     if result.problem:

@@ -130,6 +130,29 @@ def test_cycles_close_to_a_billionth_of_a_millimeter(graded: ActuateResult) -> N
     assert not any("cycles" in line for line in graded.summary)
 
 
+@pytest.mark.parametrize(
+    ("pressure", "cycles", "found"),
+    [
+        ("0:0.1:0.2:0:0", 50_000, "1,250,000 pressures, of 5 steps of 5 units, cycles 50,000"),
+        (np.zeros(200_001), 1, "1,000,005 pressures, of 200,001 steps of 5 units, cycles 1"),
+    ],
+)
+def test_a_path_that_memory_may_not_hold_is_refused_before_the_work(
+    pressure: Any, cycles: int, found: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dpgcli.api.actuate.travel", lambda *_: pytest.fail("worked"))
+    said = f"{found}: expected at most 1,000,000, as the path is held in memory"
+    with pytest.raises(dpg.UsageError, match=f"^{said}$"):
+        dpg.actuate(GRADED, pressure=pressure, cycles=cycles)
+
+
+def test_the_largest_path_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """200,000 pressures of five units, whatever follows them."""
+    monkeypatch.setattr("dpgcli.api.actuate.travel", lambda *_: pytest.fail("worked"))
+    with pytest.raises(pytest.fail.Exception, match="worked"):
+        dpg.actuate(GRADED, pressure="0:0.1:0.2:0", cycles=50_000)
+
+
 def test_the_summary_says_the_end_the_loss_ties_and_what_pressures_rest_on(
     graded: ActuateResult,
 ) -> None:
