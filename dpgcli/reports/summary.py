@@ -36,6 +36,7 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "smallest_threshold_gap_MPa": True,
 }
 SHORT_HEAD = ("metric", "best", "of design (best)", "worst", "of design (worst)")
+N_UNITS = "n_units"
 STIFFEST = "stiffness_max_N_per_mm"
 ERRORS = ("max_residual_N", "max_numerical_error_mm")
 STATUSES = ("stable", "partly_stable", "invalid", "excluded", "failed")
@@ -208,11 +209,13 @@ def _extremes_of(space: DesignSpace, name: str, is_largest_best: bool) -> Iterat
 def bars_alone(space: DesignSpace, rows: Indices) -> Flags:
     """Rows whose largest stiffness is that of the straight finger's bars in series, k_L/n.
 
-    It says what was assumed of the bars, and nothing of the design.
+    It says what was assumed of the bars, and nothing of the design. None where the table lacks the
+    number of units.
     """
     bars = space.designs.get(LINEAR_STIFFNESS)
     stiffness = bar_stiffness(space.metadata) if bars is None else bars[rows]
-    in_series = stiffness / space.designs["n_units"][rows]
+    n_units = space.designs[N_UNITS][rows] if N_UNITS in space.designs else np.nan
+    in_series = stiffness / n_units
     return np.isclose(space.designs[STIFFEST][rows], in_series, rtol=BARS_ALONE, atol=0)
 
 
@@ -279,6 +282,11 @@ def _trust(space: DesignSpace) -> Iterator[PageSection]:
 def _left_out(space: DesignSpace) -> Iterator[str]:
     """What is not ranked, since it only shows an assumption."""
     rows = space.known(STIFFEST, space.usable) if STIFFEST in space.designs else np.zeros(0, int)
+    if len(rows) and N_UNITS not in space.designs:
+        yield (
+            f"{STIFFEST} may be that of the straight finger's bars, k_L/n: the table has no "
+            f"numbers {N_UNITS} to tell by."
+        )
     if len(rows) and (n_alone := int(bars_alone(space, rows).sum())):
         which = "any design" if n_alone == len(rows) else f"{n_alone:,} designs"
         yield (

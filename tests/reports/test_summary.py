@@ -378,6 +378,16 @@ def test_a_table_that_says_nothing_of_its_base_is_ranked_as_it_is() -> None:
     assert "| stiffness_max_N_per_mm | best |" in markdown(with_bars(np.linspace(2500, 2501, 8)))
 
 
+@pytest.mark.parametrize("bars", [{}, {"linear_stiffness_N_per_mm": np.linspace(1e3, 1e4, 8)}])
+def test_without_the_number_of_units_nothing_tells_bars_alone(bars: dict[str, Any]) -> None:
+    designs = with_bars(np.linspace(2500, 2501, 8), **bars).drop(columns="n_units")
+    text = markdown(designs, **BASE)
+    assert "| stiffness_max_N_per_mm | best |" in text
+    assert "bars, k_L/n: the table has no numbers n_units to tell by." in text
+    assert "n_units" not in markdown(space())
+    assert "stiffness max" in html(designs, **BASE)
+
+
 @pytest.mark.parametrize("metric", ["aperture_min_mm", "reach_min_mm", "n_stable"])
 def test_every_metric_that_varies_has_a_map(metric: str) -> None:
     texts = svg_texts(space(**{metric: np.arange(1, 9)}))
