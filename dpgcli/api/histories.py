@@ -1,5 +1,6 @@
 """Pressures over steps, however they are given: ramps, numbers, tables, or the spec's own."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -60,8 +61,8 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
         return _of_table(ramps, known.lines)
     parts = each_of(pressure)
     are_texts = [isinstance(part, str | Path) for part in parts]
-    if not all(are_texts):
-        if any(are_texts) or np.ndim(pressure) == 0:  # type: ignore[arg-type]
+    if not (parts and all(are_texts)):
+        if not parts or any(are_texts) or not _is_array(pressure):
             raise UsageError(FIELD, f" {pressure}: expected two numbers or more, ", RAMP)
         return _of_table({known.lines[0]: list(parts)}, known.lines)
     texts = [part if isinstance(part, str) else str(path_of("pressure", part)) for part in parts]
@@ -70,13 +71,22 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
     return _of_ramps(texts, known.lines)
 
 
+def _is_array(values: Any) -> bool:
+    """Whether values are in an order, and their parts of one length."""
+    try:
+        return np.ndim(values) > 0
+    except ValueError:
+        return False
+
+
 def _is_ramp(said: object) -> bool:
     return isinstance(said, str) and all(map(NUMBER.fullmatch, said.split(":")))
 
 
 def _is_file(text: str) -> bool:
     is_other = OF_LINE.fullmatch(text) is not None or _is_ramp(text)
-    return not is_other and (Path(text).suffix.lower() in TABLES or Path(text).is_file())
+    is_there = os.path.isfile(text)  # noqa: PTH113  which takes names too long for a file
+    return not is_other and (Path(text).suffix.lower() in TABLES or is_there)
 
 
 def _of_table(table: Any, lines: Sequence[str]) -> GivenHistory:

@@ -88,6 +88,8 @@ WRONG: dict[str, tuple[Pressure, Any, list[str]]] = {
     "huge": (ONE, "0:1e99", ["expected pressures of at most"]),
     "commas": (ONE, "0,15:0", ['found "0,15"']),
     "no file": (ONE, "missing.csv", ["missing.csv: file: expected a readable file"]),
+    "a long text": (ONE, "0:0.15," * 50, ["expected pressures in MPa such as 0:0.15:0, found"]),
+    "a long one of two": (TWO, ["left=0:1", "B" * 300], ["expected the line before the pressures"]),
     "no ramp": (ONE, "missing", ['found "missing" (or the name of a CSV file that is there)']),
     "another line": (ONE, "C=0:1", ["C=0:1: expected a line: A, found C"]),
     "nearly a line": (TWO, ["lefd=0:1", "B=0:1"], ["found lefd (did you mean left?)"]),
@@ -137,7 +139,17 @@ def test_names_of_lines_do_not_hide_files(tmp_path: Path, monkeypatch: pytest.Mo
         assert named(name).tolist() == [[0.0], [0.1]]
 
 
-@pytest.mark.parametrize("given", [[0, "a"], 5, ["0:1", 0.1]])
+@pytest.mark.parametrize("given", [[0, "a"], 5, ["0:1", 0.1], [[0, 1], [0]], {0, 0.1}])
 def test_numbers_beside_something_else_are_no_ramp(given: Any) -> None:
     with pytest.raises(UsageError, match="expected two numbers or more, pressures in MPa such as"):
         history_input(given, ONE)
+
+
+@pytest.mark.parametrize(
+    "nothing",
+    [np.array([]), pd.Series([], dtype=float), set(), iter([]), range(0), b"", frozenset()],
+)
+def test_what_is_empty_is_not_that_of_the_spec(nothing: Any) -> None:
+    known = Pressure(("A",), np.zeros(1, int), None, None, None, History(np.array([[0.0], [0.1]])))
+    with pytest.raises(UsageError, match=r"pressures in MPa such as 0:0\.15:0"):
+        history_input(nothing, known)
