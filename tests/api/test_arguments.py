@@ -128,6 +128,12 @@ def fit(**given: Any) -> Any:
         (lambda: dpg.report("x", format=pd.NA), "format <NA>: expected md or html"),
         (lambda: dpg.predict(FINGER).draw("x.svg", overlay="no"), "overlay 'no': expected True"),
         (lambda: dpg.bench(FINGER, repeats=None), "repeats None: expected from 1 to"),
+        (lambda: dpg.actuate(BASE, pressure="0:0.1", cycles=None), "cycles None: expected 1 to"),
+        (lambda: dpg.read_calibration(None), "path None: expected a path"),
+        (lambda: dpg.read_calibration(5), "path 5: expected a path"),
+        (lambda: dpg.read_calibration([]), r"path \[\]: expected a path"),
+        (lambda: dpg.read_calibration({}), "path {}: expected a path"),
+        (lambda: dpg.read_calibration(b"\xff"), r"path b'\\xff': expected a path"),
         (lambda: dpg.predict(FINGER, settings=pd.NA), "settings <NA>: expected a text"),
         (lambda: dpg.stress(settings=pd.NA), "settings <NA>: expected a text"),
         (lambda: dpg.landscape(FINGER, start=None, end="11"), "start None: expected 2 digits"),
@@ -163,6 +169,24 @@ def test_numbers_of_numpy_are_numbers() -> None:
 def test_patterns_of_a_series(tmp_path: Path) -> None:
     chosen = pd.Series(["01", "10"])
     assert dpg.predict(FINGER, patterns=chosen).table["pattern"].tolist() == ["01", "10"]
+
+
+def test_settings_that_can_be_read_once_change_all_that_they_are_for() -> None:
+    soft, wrong = "finger.lattice.hinge_stiffness_N_mm_per_rad=30", "finger.lattice.hinges=30"
+    found = dpg.sweep(SWEEP, settings=iter([soft]), jobs=1).designs
+    changed = dpg.sweep(SWEEP, settings=[soft], jobs=1).designs
+    pd.testing.assert_frame_equal(found.to_pandas(), changed.to_pandas())
+    with pytest.raises(dpg.SpecError, match="hinges"):
+        dpg.explain(SWEEP, settings=iter([wrong]))
+    problems = dpg.validate(SWEEP, BASE, SWEEP, settings=iter([wrong]))
+    assert [problem.key for problem in problems] == ["finger.lattice.hinges"] * 3
+
+
+def test_dimensions_that_can_be_read_once_are_kept() -> None:
+    fitted = dpg.fit_grid(GRID, geometry=iter(["dome_thickness_mm=0.75"])).calibration
+    assert fitted.geometry is not None and fitted.geometry.dome_thickness_mm == 0.75
+    with pytest.raises(dpg.UsageError, match="the table has a column dome_height_mm"):
+        dpg.fit_grid(GRID, geometry=iter(["dome_height_mm=2"]))
 
 
 def test_a_data_frame_is_an_axis() -> None:

@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 
 from dpgcli import __version__
 from dpgcli.design.dimensions import AGREEMENT
-from dpgcli.errors import Field, FitError, Problem, SpecError
+from dpgcli.errors import Field, FitError, Problem, SpecError, UsageError
 from dpgcli.files.calibration.models import (
     Calibration,
     Curve,
@@ -110,12 +110,17 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 def read_calibration(path: str | Path) -> Calibration:
     """Read and check a calibration. Raises SpecError with every problem and its place.
 
+    Raises UsageError for what is no path.
     What `dpg fit` wrote has its SHA-256 in the last line: values that were cut off would else be
     taken from the next calibration, in silence. Files of an earlier version have none.
 
     >>> read_calibration("configs/calibration/push_3.5mm.yaml").values.stroke_mm.value
     3.5
     """
+    try:
+        Path(path)
+    except TypeError:
+        raise UsageError(f"path {path!r}: expected a path") from None
     file, text = read_text(path)
     is_whole = is_whole_text(text)
     if is_whole is False:
