@@ -10,8 +10,9 @@ STROKE ?= 3.5
 DPG_VERSION := $(shell $(DPG) --version)
 export SPEC MESH STROKE DPG_VERSION
 
-# Make's own rules would write a spec `finger` anew from a `finger.sh` beside it.
-MAKEFLAGS += --no-builtin-rules
+# Make's own rules would write a spec `finger` anew from a `finger.sh` beside it. A link
+# set to another file is newer than that file may be.
+MAKEFLAGS += --no-builtin-rules --check-symlink-times
 
 .DELETE_ON_ERROR:
 .PHONY: all clean force

@@ -16,13 +16,14 @@ T = TypeVar("T")
 HEAD = "# dpg sweep: what its tables are made from"
 # Make's own rules make `finger` from a newer `finger.sh`, and hand names to a shell as they are. An
 # empty recipe for each file would stop them too, and with them a rule that makes a calibration.
-NO_BUILTIN_RULES = "MAKEFLAGS += --no-builtin-rules"
+# A link set to another file is newer than that file may be: Make looks at both where it is told to.
+FLAGS = "MAKEFLAGS += --no-builtin-rules --check-symlink-times"
 
 
 def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> str:
     """Targets, what they were made from, and an empty rule for each of those, as gcc -MP does.
 
-    Make's own rules are put aside, with which it would remake what was read.
+    Make's own rules are put aside, with which it would remake what was read; links count too.
     Make knows a target by its letters: `folder` is as it was typed, and the targets are in it
     as a rule has them that names `$(OUT)/states.parquet`, and as they are commonly spelled.
     Raises UsageError for a name that Make would read as something else than a name.
@@ -33,7 +34,7 @@ def depfile_text(folder: str, tables: Iterable[str], files: Iterable[Path]) -> s
     _check_members(sources)
     text = f"{HEAD}\n{' '.join(targets)}: {' '.join(map(_spelled, sources))}\n"
     text += "".join(f"\n{_target(source)}:\n" for source in sources)
-    return f"{text}\n{NO_BUILTIN_RULES}\n"
+    return f"{text}\n{FLAGS}\n"
 
 
 @dataclass(frozen=True)

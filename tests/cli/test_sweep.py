@@ -264,7 +264,8 @@ def test_a_depfile_in_the_output_folder(call: Any, sweep: Path) -> None:
     assert (sweep.parent / "out" / "sweep.d").read_text() == (
         "# dpg sweep: what its tables are made from\n"
         "out/states.parquet out/designs.parquet: sweep.yaml three_unit.yaml\n"
-        "\nsweep.yaml:\n\nthree_unit.yaml:\n\nMAKEFLAGS += --no-builtin-rules\n"
+        "\nsweep.yaml:\n\nthree_unit.yaml:\n\n"
+        "MAKEFLAGS += --no-builtin-rules --check-symlink-times\n"
     )
 
 

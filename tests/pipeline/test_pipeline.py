@@ -100,6 +100,24 @@ def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path,
 
 
 @pytest.mark.slow
+def test_a_base_that_is_a_link_set_to_another_older_file_is_judged_anew(checkout: Path) -> None:
+    said = "base: ../base.yaml\nspace: [{key: finger.geometry.dome_height_mm, values: [6, 6.5]}]\n"
+    (checkout / "configs" / "sweeps" / "s.yaml").write_text(said, encoding="utf-8")
+    for name in ("three_unit.yaml", "five_unit.yaml"):
+        os.utime(checkout / "configs" / name, (1e9, 1e9))
+    link = checkout / "configs" / "base.yaml"
+    link.symlink_to("three_unit.yaml")
+    gate = ("SWEEP=../sweeps/s.yaml", "REQUIRE='n_units < 4'")
+    first = make(checkout, *gate)
+    assert first.returncode == 0, first.stderr
+    assert "dpg sweep" not in make(checkout, *gate).stdout
+    link.unlink()
+    link.symlink_to("five_unit.yaml")
+    changed = make(checkout, *gate)
+    assert changed.returncode == 2, changed.stdout
+    assert "not met: n_units < 4" in changed.stdout
+
+
 def test_other_code_judges_anew(checkout: Path) -> None:
     """Tables that are as they were are not computed again, but what is said of them is."""
     assert make(checkout).returncode == 0
