@@ -31,7 +31,7 @@ class Between(Part):
     first: Bound = Field(alias="from", description="the first value, a number")
     last: Bound = Field(alias="to", description="the last value, a number")
     count: Annotated[int, Field(ge=2, le=MOST_POINTS)] = Field(
-        description="how many values, a whole number from 2"
+        description=f"how many values, a whole number from 2 to {MOST_POINTS:,}"
     )
 
 
@@ -48,7 +48,7 @@ class Sample(Part):
 
     method: Literal["sobol", "latin_hypercube"] = Field(description="sobol or latin_hypercube")
     count: Annotated[int, Field(ge=1, le=MOST_POINTS)] = Field(
-        description="how many samples, a whole number from 1"
+        description=f"how many samples, a whole number from 1 to {MOST_POINTS:,}"
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="a whole number from 0")
     ranges: Annotated[dict[str, SampleRange], Field(min_length=1)] = Field(

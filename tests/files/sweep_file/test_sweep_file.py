@@ -220,8 +220,22 @@ WRONG_AXES = [
     (f"{{key: {HEIGHT}, values: [a]}}", 'found "a"'),
     (f"{{key: {HEIGHT}, values: [true]}}", "found true"),
     (f"{{key: {HEIGHT}, values: [.nan]}}", "found .nan"),
-    (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 0}}}}", "a whole number from 2, found 0"),
-    (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 1.5}}}}", "whole number from 2, found 1"),
+    (
+        f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 0}}}}",
+        "a whole number from 2 to 10,000,000, found 0",
+    ),
+    (
+        f"{{key: {HEIGHT}, log: {{from: 1, to: 2, count: 10000001}}}}",
+        "10,000,000, found 10000001",
+    ),
+    (
+        f"sample: {{method: sobol, count: 20000000, ranges: {{{HEIGHT}: {{from: 1, to: 2}}}}}}",
+        "a whole number from 1 to 10,000,000, found 20000000",
+    ),
+    (
+        f"{{key: {HEIGHT}, linear: {{from: 1, to: 2, count: 1.5}}}}",
+        "whole number from 2 to 10,000,000, found 1",
+    ),
     (f"{{key: {HEIGHT}, linear: {{from: 1, to: 2}}}}", "count: expected how many values"),
     (f"{{key: {HEIGHT}, linear: {{from: 1, too: 2, count: 3}}}}", "did you mean to?"),
     (f"{{key: {HEIGHT}, log: {{from: 0, to: 2, count: 3}}}}", "bounds above zero, found 0 and 2"),
