@@ -19,7 +19,7 @@ from dpgcli.mechanics.finger import KEYS, STUDY
 ELSEWHERE = " (at the study's dimensions)"
 KEYS_OF_FILES = (*KEYS, WALL_COMPLIANCE)
 MOVED = (Origin.SCALED, Origin.EXTRAPOLATED)
-Values = Mapping[str, Sequence[Value]]
+ValuesByKey = Mapping[str, Sequence[Value]]
 """By key, one for each group of units."""
 
 
@@ -55,9 +55,9 @@ class Case:
 
     design: Design
     domes: Domes
-    values: Values
+    values: ValuesByKey
     place: int = 0
-    answers: Values = field(default_factory=dict)
+    answers: ValuesByKey = field(default_factory=dict)
 
     @cached_property
     def footings(self) -> dict[str, Footing]:
@@ -207,7 +207,7 @@ class Case:
         return known is None or not agree(np.array(numbers), np.array([known.value])).all()
 
 
-def kinds(values: Values, designs: Indices) -> list[tuple[int, int]]:
+def kinds(values: ValuesByKey, designs: Indices) -> list[tuple[int, int]]:
     """Designs that differ in what their values rest on: one of each kind, and how many there are.
 
     >>> one = Value(np.array([3.0, 3.5, 4.0]), np.array([2, 4, 4]), ("", ""), np.array([0, 1, 1]))
