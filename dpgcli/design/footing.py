@@ -17,8 +17,9 @@ from dpgcli.design.scene import ORIGINS, Origin
 from dpgcli.mechanics.finger import KEYS, STUDY
 
 ELSEWHERE = " (at the study's dimensions)"
+KEYS_OF_FILES = (*KEYS, WALL_COMPLIANCE)
 MOVED = (Origin.SCALED, Origin.EXTRAPOLATED)
-Values = Mapping[str, Sequence[Value]]
+ValuesByKey = Mapping[str, Sequence[Value]]
 """By key, one for each group of units."""
 
 
@@ -54,9 +55,9 @@ class Case:
 
     design: Design
     domes: Domes
-    values: Values
+    values: ValuesByKey
     place: int = 0
-    answers: Values = field(default_factory=dict)
+    answers: ValuesByKey = field(default_factory=dict)
 
     @cached_property
     def footings(self) -> dict[str, Footing]:
@@ -101,6 +102,11 @@ class Case:
         return bool(walls) and all(of_design(w.numbers, self.place) > 0.0 for w in walls)
 
     @property
+    def is_pushed_by_curve(self) -> bool:
+        """Whether domes only push, by a curve of their own."""
+        return not self.pulls and self.domes.calibration is not None
+
+    @property
     def pulls(self) -> bool:
         """Whether domes pull at rest."""
         return self.domes.law.pulling is self.domes.law
@@ -122,13 +128,17 @@ class Case:
     def has_fitted_walls(self) -> bool:
         """Whether it is a finger such as was compared: pushing domes of a curve, fitted walls.
 
-        And the geometric segment height, or one that is fitted too.
+        And the geometric segment height, or one that was fitted beside walls.
         """
-        is_pushed = not self.pulls and self.domes.calibration is not None
-        is_fitted = self.has_walls and self.footings[WALL_COMPLIANCE].basis is Basis.FITTED
+        if not (self.is_pushed_by_curve and self.has_walls):
+            return False
+        walls = self.footings[WALL_COMPLIANCE]
+        file = walls.calibration
+        if walls.basis is not Basis.FITTED or file is None or not self.is_as_fitted(file):
+            return False
         height = self.footings[SEGMENT_HEIGHT.key]
-        is_compared = self.has_geometric_height or height.basis is Basis.FITTED
-        return is_pushed and is_fitted and is_compared
+        is_beside = height.calibration is not None and height.calibration.has(WALL_COMPLIANCE)
+        return self.has_geometric_height or (height.basis is Basis.FITTED and is_beside)
 
     def is_study_s(self, key: str) -> bool:
         """Whether the first value of a key is that of the study's finger."""
@@ -146,13 +156,29 @@ class Case:
         return next(filter(None, (self.known_by(output, footing) for footing in footings)), "")
 
     def known_by(self, output: Output, footing: Footing) -> str:
-        """What the file behind one value knows of an output's error; empty if nothing."""
+        """What the file behind one value knows of an output's error; empty if nothing.
+
+        Such errors are those of domes that only push, by a curve.
+        """
         file = footing.calibration
-        if file is None or self.lacks_any_of(file) or output.key not in file.known_errors:
+        if file is None or not self.is_pushed_by_curve or output.key not in file.known_errors:
+            return ""
+        if not self.is_as_fitted(file):
             return ""
         known = file.known_errors[output.key]
         elsewhere = ELSEWHERE if footing.origin in MOVED else ""
         return f"{known.text}, against {known.against}{elsewhere}"
+
+    def is_as_fitted(self, file: Calibration) -> bool:
+        """Whether this is a finger as a file knows errors of: with all of its values.
+
+        And with those of the file whose curve its domes have; with walls only if the file has them,
+        but where it is about a dome alone.
+        """
+        files = {id(known): known for known in (file, self.domes.calibration) if known is not None}
+        if any(self._lacks(known, key) for known in files.values() for key in KEYS_OF_FILES):
+            return False
+        return file.has(WALL_COMPLIANCE) or file.curve is not None or not self.gives_way
 
     def lacks_walls_of(self, file: Calibration) -> bool:
         """Whether a file's values were fitted beside walls that this finger does not take from it.
@@ -161,16 +187,27 @@ class Case:
         """
         return self._lacks(file, WALL_COMPLIANCE)
 
-    def lacks_any_of(self, file: Calibration) -> bool:
-        """The same, or beside a coupling of hinges: what a file knows of errors is of all of it."""
-        return self._lacks(file, WALL_COMPLIANCE) or self._lacks(file, HINGE_COUPLING)
+    @cached_property
+    def gives_way(self) -> bool:
+        """Whether the walls of any unit do."""
+        walls = self.values.get(WALL_COMPLIANCE, ())
+        return any(of_design(w.numbers, self.place) > 0.0 for w in walls)
 
     def _lacks(self, file: Calibration, key: str) -> bool:
+        """Whether a file has a key whose value is not from it here, nor derived from it."""
+        if not file.has(key):
+            return False
         own = self.footings.get(key)
-        return file.has(key) and (own is None or own.calibration is not file)
+        if own is None:
+            return key in (WALL_COMPLIANCE, HINGE_COUPLING)
+        if own.calibration is file or own.origin is Origin.DERIVED:
+            return False
+        numbers = [of_design(value.numbers, self.place) for value in self.values[key]]
+        known = file.values.get(key)
+        return known is None or not agree(np.array(numbers), np.array([known.value])).all()
 
 
-def kinds(values: Values, designs: Indices) -> list[tuple[int, int]]:
+def kinds(values: ValuesByKey, designs: Indices) -> list[tuple[int, int]]:
     """Designs that differ in what their values rest on: one of each kind, and how many there are.
 
     >>> one = Value(np.array([3.0, 3.5, 4.0]), np.array([2, 4, 4]), ("", ""), np.array([0, 1, 1]))

@@ -40,7 +40,9 @@ def model_error_of(case: Case) -> ModelError:
         return ModelError(f"{100.0 * said:.3g} % of the deflection, as the spec says", said)
     for place, file in enumerate(case.design.calibrations):
         own = [v for values in case.values.values() for v in values if v.file == place]
-        if not own or not isinstance(file, Calibration) or case.lacks_any_of(file):
+        if not own or not isinstance(file, Calibration) or not case.is_as_fitted(file):
+            continue
+        if file.leave_one_out is None and not case.is_pushed_by_curve:
             continue
         if file.shape_error is not None:
             return _left_out(file, file.shape_error, own, case.place)

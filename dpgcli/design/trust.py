@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
-from dpgcli.design.footing import Case, Footing
+from dpgcli.design.footing import MOVED, Case, Footing
 from dpgcli.design.model_error import model_error_of, shapes_in
 from dpgcli.design.outputs import Basis, Output, Trust
 from dpgcli.design.rules import (
@@ -81,6 +81,11 @@ def _energies(case: Case) -> Trust:
     if case.has_published_domes:
         found = Trust(Output.ENERGIES, lead.basis, SHALLOW, source)
         return replace(found, doubt=SHALLOW_DOUBT, instead=TAKE_A_CURVE)
+    if case.pulls and lead.origin in MOVED and not _is_of_grid(lead):
+        lead = replace(
+            lead, basis=Basis.EXTRAPOLATED
+        )  # the scaling is that of domes that only push
+        return _checked(Trust(Output.ENERGIES, lead.basis, UNKNOWN, source), lead)
     error = case.known_error(Output.ENERGIES, *DOMES, STROKE.key) or _fit_error(lead)
     return _checked(Trust(Output.ENERGIES, lead.basis, error, source), lead)
 
@@ -158,6 +163,9 @@ def _of_walls(case: Case, output: Output, error: str) -> Trust:
     lead, known = case.gravest(*keys), case.known_error(output, *keys)
     if not known and case.has_fitted_walls:
         known = error + case.elsewhere(WALL_COMPLIANCE, HINGE_STIFFNESS.key, SEGMENT_HEIGHT.key)
+    if case.has_published_domes:
+        said = Trust(output, lead.basis, UNKNOWN, str(lead))
+        return replace(said, doubt=SHALLOW_DOUBT, instead=TAKE_A_CURVE)
     return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
 
 
@@ -200,6 +208,11 @@ def _checked(found: Trust, footing: Footing) -> Trust:
     if footing.basis is not Basis.EXTRAPOLATED:
         return found
     return replace(found, doubt=f"nothing backs it here: {footing}", instead=CALIBRATE_HERE)
+
+
+def _is_of_grid(footing: Footing) -> bool:
+    """Whether a value is from a file over several geometries."""
+    return footing.calibration is not None and footing.calibration.grid is not None
 
 
 def _fit_error(lead: Footing) -> str:

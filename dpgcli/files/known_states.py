@@ -63,6 +63,7 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         problems += error.problems
     if problems:
         raise SpecError(in_order(problems))
+    moments = _moments(sheet, patterns)
     known = KnownStates(
         patterns=np.array([[digit == "1" for digit in pattern] for pattern in patterns]).T,
         tip=_columns(sheet, TIP),
@@ -70,8 +71,8 @@ def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) ->
         openings=_columns(sheet, _by_unit("opening{}_mm", n_units)),
         pushes=_columns(sheet, _by_unit("push{}_N", n_units)),
         seconds=_columns(sheet, [SECONDS])[0],
-        moments=_moments(sheet, patterns),
-        shapes=() if shapes is None else _read_shapes(shapes, patterns, n_units),
+        moments=moments,
+        shapes=() if shapes is None else _read_shapes(shapes, patterns, moments, n_units),
         unused=_unused(sheet, n_units),
         sha256=sheet.sha256,
         first_station=frame.get(STATION),
@@ -306,8 +307,13 @@ def _angles(sheet: Sheet, n_units: int) -> Array:
     return angles
 
 
-def _read_shapes(source: Tabular, patterns: Sequence[str], n_units: int) -> tuple[Array, ...]:
-    """Points by state, in the order of the file; none for a state that is not in it."""
+def _read_shapes(
+    source: Tabular, patterns: Sequence[str], moments: Array, n_units: int
+) -> tuple[Array, ...]:
+    """Points by state, in the order of the file; none for a state that is not in it.
+
+    They are of states without a moment: none for those under one.
+    """
     sheet = read_sheet(source, ("pattern", *POINT))
     sheet.check_names(("pattern", *POINT))
     problems = _pattern_problems(sheet, n_units)
@@ -327,4 +333,8 @@ def _read_shapes(source: Tabular, patterns: Sequence[str], n_units: int) -> tupl
     if problems:
         raise SpecError(tuple(problems))
     together = np.stack([points[name] for name in POINT])
-    return tuple(together[:, rows.get(pattern, [])] for pattern in patterns)
+    free = (
+        [] if moment else rows.get(pattern, [])
+        for pattern, moment in zip(patterns, moments, strict=True)
+    )
+    return tuple(together[:, own] for own in free)

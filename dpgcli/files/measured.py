@@ -139,7 +139,8 @@ def read_moments(source: Tabular, where: str | None = None, choice: Choice = AS_
     known = {MOMENT: "moment", rotation: "rotation"}
     own = in_own_units(sheet, known, given)
     columns = own.values
-    problems = list(other_scales(sheet, columns, known, None))
+    unsaid = {name: columns[name] for name, kind in known.items() if kind not in given}
+    problems = list(other_scales(sheet, unsaid, known, None))
     if problems:
         raise SpecError(in_order(problems))
     texts = {name: tuple(sheet.cells(name)) for name in sheet.names if not _is_numeric(sheet, name)}

@@ -62,6 +62,8 @@ def other_scales(
         low, high = ranges[kind]
         if not low <= largest <= high:
             hint = GUESSES[kind][largest > high]
+            if kind == "moment":  # no geometry tells how large a hinge is
+                hint = Message(hint, " if it is right, say so: ", asked_for(kind))
             needed = BEHIND.get(kind, ())
             if missing := [key for key in needed if key not in (geometry or {})]:
                 hint = Message(hint, " if it is right, say how large the dome is:")

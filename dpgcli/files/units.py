@@ -122,4 +122,5 @@ def _plain(unit: str) -> str:
 
 def asked_for(quantity: str) -> Message:
     """What answers the question for a quantity's unit."""
-    return Message(Field("units"), f" {quantity}={OWN[quantity]}")
+    said = f"{quantity}={OWN[quantity]}"
+    return Message(Field("units"), f" '{said}'" if " " in said else f" {said}")

@@ -20,7 +20,7 @@ LARGEST_NUMBER = 1e300  # just below the largest double
 MOST_LEVELS = 50  # of nesting, well below Python's own limit
 DIGITS_PREFIX = "number_"  # before a part of a dotted name that is a number
 
-Values = Mapping[str, Any]
+Operands = Mapping[str, Any]
 
 _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -83,7 +83,7 @@ class Expression:
     names: frozenset[str]
     is_comparison: bool
 
-    def __call__(self, values: Values) -> Any:
+    def __call__(self, values: Operands) -> Any:
         """The value for these names, numbers or arrays.
 
         NaN where any part of it has no finite value, as in a division by zero: then neither a
@@ -230,7 +230,7 @@ def _as_number(value: Any) -> Any:
     return np.multiply(value, 1.0)
 
 
-def _value(node: ast.expr, values: Values, undefined: list[Any]) -> Any:
+def _value(node: ast.expr, values: Operands, undefined: list[Any]) -> Any:
     """The value of a node; `undefined` collects flags of finite parts without a finite value."""
     if (number := _constant(node)) is not None:
         return float(number)

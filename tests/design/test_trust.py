@@ -491,9 +491,8 @@ def test_a_calibration_s_own_errors_come_first() -> None:
         "shapes by walls.yaml are off by 1 % of the deflection (rms), 2 % at most, against finite "
         "elements; not given"
     )
-    assert (
-        resolve(replace(PUSHED, calibrations=(walls, PUBLISHED, known))).model_error.share == 0.01
-    )
+    for files, share in (((walls, known, PUBLISHED), 0.01), ((walls, PUBLISHED, known), None)):
+        assert resolve(replace(PUSHED, calibrations=files)).model_error.share == share
 
 
 def test_walls_beside_a_height_that_is_fitted_too() -> None:
@@ -632,3 +631,48 @@ def test_a_record_comes_back() -> None:
     for wrong in ({}, {**record, "basis": "hearsay"}, {**record, "from": 3}):
         with pytest.raises((KeyError, TypeError, ValueError)):
             Trust.of_record(wrong)
+
+
+KNOWN = {key: KnownError(0.1, 0.05, "finite elements") for key in ("shapes", "inverted_stiffness")}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"calibrations": (PUBLISHED, replace(WALLS, known_errors=KNOWN), dome())},
+        {"lattice": {"bistable_stiffness_N_per_mm": 4.0}},
+        {"lattice": {"hinge_stiffness_N_mm_per_rad": 300.0}},
+        {"law": "tabulated"},
+        {"law": "published"},
+    ],
+    ids=["published first", "another dome", "another hinge", "tabulated", "published law"],
+)
+def test_errors_of_a_file_are_those_of_fingers_with_all_of_it(change: dict[str, Any]) -> None:
+    """In which domes only push, by the curve as it is."""
+    walls = replace(WALLS, known_errors=KNOWN)
+    whole = replace(PUSHED, calibrations=(walls, dome(), PUBLISHED))
+    assert "5 % (rms)" in trusts(whole)[Output.INVERTED].known_error
+    lattice = change.pop("lattice", None)
+    other = replace(whole, **change)
+    if lattice is not None:
+        other = replace(other, finger=GivenValues(arrays(SIZES), arrays(lattice)))
+    found = trusts(other)
+    assert found[Output.INVERTED].known_error == "unknown"
+    assert found[Output.SHAPES].known_error == "unknown"
+
+
+def test_a_height_fitted_with_rigid_walls_says_nothing_beside_walls() -> None:
+    height = replace(HEIGHT, leave_one_out=(0.05, 0.08))
+    alone = trusts(with_files(PUSHED, height))[Output.SHAPES]
+    assert alone.known_error.startswith("states that height.yaml was not fitted to are off by 5 %")
+    for beside in (with_files(PUSHED, height, WALLS), walled(with_files(PUSHED, height))):
+        assert trusts(beside)[Output.SHAPES].known_error == "unknown"
+
+
+def test_energies_scaled_for_another_law_are_extrapolated() -> None:
+    """How they go with height was found for domes that only push."""
+    small = sized(TABULATED, dome_height_mm=4.5)
+    energies = trusts(small)[Output.ENERGIES]
+    assert (energies.basis, energies.known_error) == (Basis.EXTRAPOLATED, "unknown")
+    assert energies.doubt
+    assert not trusts(PUSHED)[Output.ENERGIES].doubt

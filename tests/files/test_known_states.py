@@ -297,3 +297,9 @@ def test_many_states_and_many_points_are_read_in_time(write):
     known = read_states(files[0], 14, files[1])
     assert time.process_time() - began < 5
     assert [shape.tolist() for shape in known.shapes] == [[[0, 1, 2, 3], [0] * 4]] * 2**13
+
+
+def test_shapes_are_those_of_states_without_a_moment(write):
+    states = "pattern,moment_N_mm,tip_x_mm,tip_y_mm\n00,0,27,0\n00,5,,\n"
+    known = read_states(write(states), 2, write("pattern,x_mm,y_mm\n00,0,0\n00,27,0\n", "s.csv"))
+    assert [shape.shape for shape in known.shapes] == [(2, 2), (2, 0)]

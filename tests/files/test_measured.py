@@ -8,6 +8,7 @@ import pytest
 
 from dpgcli.errors import SpecError
 from dpgcli.files import csv_file
+from dpgcli.files.csv_file import Choice
 from dpgcli.files.measured import read_curve, read_moments, read_table
 
 DOME = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "elastic_modulus_MPa": 26.0}
@@ -256,7 +257,7 @@ def test_moments_of_one_variant(path: Path) -> None:
         ("moment_N_m,rotation_rad\n1,1\n", None, "expected a column moment_N_mm"),
         ("moment_N_mm,angle\n1,1\n", None, "expected a column rotation_rad or rotation_mid"),
         ("moment_N_mm,rotation_rad\n5,10.3\n", None, "found 10.3 (degrees?)"),
-        ("moment_N_mm,rotation_rad\n0.005,0.2\n", None, "found 0.005 (N m?)"),
+        ("moment_N_mm,rotation_rad\n0.005,0.2\n", None, "found 0.005 (N m? if it is right"),
         ("moment_N_mm,rotation_rad\n5,\n", None, '2: rotation_rad: expected a number, found ""'),
     ],
 )
@@ -337,3 +338,15 @@ def test_grouped_thousands_are_no_texts_that_tell_hinges_apart(tmp_path: Path) -
     found = read_moments(path)
     assert found.moment.tolist() == [1133.2, 2250.8]
     assert found.doubts == ()
+
+
+@pytest.mark.parametrize("moment", [0.006, 2e6])
+def test_a_hinge_of_another_size_is_taken_when_its_unit_is_said(
+    tmp_path: Path, moment: float
+) -> None:
+    path = tmp_path / "hinge.csv"
+    path.write_text(f"moment_N_mm,rotation_rad\n{moment / 2},0.1\n{moment},0.2\n")
+    with pytest.raises(SpecError, match=r"if it is right, say so: .*'moment=N mm'"):
+        read_moments(path)
+    said = read_moments(path, choice=Choice(units={"moment": "N mm"}))
+    assert said.moment.tolist() == [moment / 2, moment]

@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.design.lines import DEFAULT_LINE, HISTORY, LINES, TIME
-from dpgcli.errors import Problem, SpecError
+from dpgcli.errors import Field, Message, Problem, SpecError
 from dpgcli.files.content import beside
 from dpgcli.files.csv_file import Sheet, Tabular, read_sheet
 from dpgcli.files.places import few, in_order, shown
@@ -20,7 +20,7 @@ from dpgcli.text import dotted
 MOST_NUMBERS = MAX_NODES * 9 // 10  # as many as a spec holds beside the rest of it
 FEWEST_ROWS = 2
 WITHOUT_CONTENT = ('""', "none")
-TO_SEE = "dpg actuate shows it with --pressure FILE"
+TO_SEE = Message("dpg actuate shows it with ", Field("pressure"), " FILE")
 UNIT = "_MPa"  # may end the name of a column
 
 
