@@ -38,7 +38,7 @@ from dpgcli.states.solved import Surroundings
 from dpgcli.text import counted, enumerated
 
 MOST_CYCLES = 100_000
-MOST_PRESSURES = 1_000_000  # by step and unit: their path takes some 4 GB of memory
+MOST_PRESSURES = 1_000_000  # by step and unit: 1 to 5 GB, or more far beyond thresholds
 LARGEST_STEP = 0.05  # of a stroke: points near enough for a figure
 LARGE = 10.0  # MPa: what is larger may be kPa
 WHY = {
