@@ -134,6 +134,7 @@ def both(one: Array, other: Array) -> Array:
     return np.concatenate((one, other), axis=1)
 
 
+@pytest.mark.slow
 def test_designs_in_one_batch_do_not_feel_each_other(
     study: Study, pressed: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:

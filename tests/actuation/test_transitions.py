@@ -236,6 +236,7 @@ def test_the_size_of_batches_changes_no_bit(
         ([3.5, 3.4, 3.6, 3.7], [0, 0, 0, 0]),
     ],
 )
+@pytest.mark.slow
 def test_states_are_reached_as_the_graph_of_pulses_says(
     study: Study, pressed: Made, strokes: list[float], lines: list[int]
 ) -> None:

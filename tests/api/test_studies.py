@@ -53,6 +53,7 @@ def test_a_calibration_changes_specs_alone(folder: Path) -> None:
         dpg.compare(scene, "tips.csv", calibration=PUSH)
 
 
+@pytest.mark.slow
 def test_a_bench_in_a_table_and_a_record(quick: None, folder: Path) -> None:
     seen: list[str] = []
     found = dpg.bench(
@@ -77,6 +78,7 @@ def test_a_bench_in_a_table_and_a_record(quick: None, folder: Path) -> None:
         dpg.bench("study.yaml", settings={"finger.units": 2}, compare="bench.json")
 
 
+@pytest.mark.slow
 def test_hard_cases_as_by_the_command(printed: Rows, folder: Path) -> None:
     rows = printed("stress", "--only", "scale", "-q")
     seen: list[str] = []

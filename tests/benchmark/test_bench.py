@@ -54,6 +54,7 @@ def test_every_row_has_every_column_and_sound_times() -> None:
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_third_parties_are_left_out_where_hinges_turn_each_other() -> None:
     coupled = finger(2).changed(hinge_coupling=np.array([[1.0]]))
     rows = list(Bench(Scene(coupled, ()), 1, ("every-unit",)).rows())
@@ -63,6 +64,7 @@ def test_third_parties_are_left_out_where_hinges_turn_each_other() -> None:
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_the_models_error_stands_beside_the_solvers() -> None:
     patterns = np.array([[True, True], [False, True]])
     tips = np.array([[26.0, 25.0], [-4.0, -7.0]])

@@ -11,6 +11,8 @@ import pytest
 from dpgcli.benchmark import bench as module
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
+
 BENCH = ("bench", "three_unit.yaml", "--repeats", "1")
 
 

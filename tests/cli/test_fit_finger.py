@@ -20,7 +20,7 @@ LEVER = "segment_height_mm"
 GEOMETRY = ("-g", "chamber_width_mm=20", "-g", "limiting_layer_thickness_mm=1.5")
 
 
-pytestmark = pytest.mark.usefixtures("study")
+pytestmark = [pytest.mark.usefixtures("study"), pytest.mark.slow]
 
 
 @pytest.fixture

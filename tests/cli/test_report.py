@@ -56,6 +56,7 @@ def test_the_kind_of_file_follows_from_its_name(call: Call, swept: Path, folder:
     assert "dome height (mm)" in page
 
 
+@pytest.mark.slow
 def test_what_differs_between_runs_is_in_no_report(call: Call, swept: Path, folder: Path) -> None:
     """The same tables give the same bytes, as Markdown and as a page, whatever run.json says."""
 

@@ -9,6 +9,8 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SMALL = (
     ("predict", "three_unit.yaml"),
     ("predict", "three_unit.yaml", "--format", "json"),

@@ -18,6 +18,8 @@ from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Verdict
 from dpgcli.hard_cases.table import STRESS_COLUMNS
 
+pytestmark = pytest.mark.slow
+
 Call = Callable[..., Any]
 QUICK = ("--only", "mirror")
 N_QUICK = 18

@@ -31,6 +31,8 @@ KILLS = (
 )
 FAILS = """
 from dpgcli.hard_cases.outcomes import Outcome
+
+pytestmark = pytest.mark.slow
 Outcome.is_failure = property(lambda self: True)
 """
 BREAKS = (
@@ -188,7 +190,6 @@ def test_a_pipe_that_does_not_wait_gets_all() -> None:
         assert read.result(30) == content
 
 
-@pytest.mark.slow
 def test_who_only_prints_stops_when_nobody_reads(unread: Unread) -> None:
     words = ("predict", "twenty_unit.yaml", "--format", "csv")
     done = unread(*words, before=FEW)

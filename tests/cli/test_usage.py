@@ -87,6 +87,7 @@ def test_descriptions_are_whole(run: Run, arguments: tuple[str, ...], width: str
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name.split()[0] not in SLOW])
 @pytest.mark.usefixtures("study")
+@pytest.mark.slow
 def test_the_examples_run(folder: Path, name: str) -> None:
     carry_out(folder, name)
 

@@ -23,6 +23,8 @@ from dpgcli.states.margins import limits
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 
+pytestmark = pytest.mark.slow
+
 NAMES = [family.name for family in FAMILIES]
 
 

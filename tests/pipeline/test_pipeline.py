@@ -15,7 +15,10 @@ from ruamel.yaml import YAML
 
 Done = subprocess.CompletedProcess[str]
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+pytestmark = [
+    pytest.mark.skipif(shutil.which("make") is None, reason="needs make"),
+    pytest.mark.slow,
+]
 
 
 @pytest.fixture
@@ -99,7 +102,6 @@ def test_a_base_is_never_forgotten_however_the_folder_is_spelled(checkout: Path,
     assert "not met: reach_max_mm < 41" in changed.stdout
 
 
-@pytest.mark.slow
 def test_a_base_that_is_a_link_set_to_another_older_file_is_judged_anew(checkout: Path) -> None:
     said = "base: ../base.yaml\nspace: [{key: finger.geometry.dome_height_mm, values: [6, 6.5]}]\n"
     (checkout / "configs" / "sweeps" / "s.yaml").write_text(said, encoding="utf-8")
@@ -134,7 +136,6 @@ def test_other_code_judges_anew(checkout: Path) -> None:
     assert "dpg" not in make(checkout).stdout
 
 
-@pytest.mark.slow
 def test_a_part_that_is_new_in_an_inner_folder_is_judged(checkout: Path) -> None:
     inner = checkout / "configs" / "sweeps" / "designs" / "a"
     inner.mkdir(parents=True)
@@ -156,7 +157,6 @@ def test_a_gate_that_is_not_met_fails_the_build(checkout: Path) -> None:
     assert not (checkout / "configs" / "pipeline" / "out" / "checked").exists()
 
 
-@pytest.mark.slow
 def test_a_stricter_gate_is_held_against_the_tables_that_are_there(checkout: Path) -> None:
     assert make(checkout, "REQUIRE='min_barrier_mJ > 0.1'").returncode == 0
     for _ in range(2):
@@ -250,7 +250,6 @@ def test_the_workflow_installs_dpg_wherever_it_was_copied_to(tmp_path: Path, job
     assert shell(guard, ROOT, tmp_path, DPG="git+https://example.org/dpg").returncode == 0
 
 
-@pytest.mark.slow
 def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
     jobs, sweep = workflow()["jobs"], workflow()["env"]["SWEEP"]
     summary = checkout / "summary.md"
@@ -276,7 +275,6 @@ def test_the_workflow_s_steps_run_in_order(checkout: Path) -> None:
         )
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="needs CalculiX")
 def test_from_geometry_by_finite_elements_to_all_states(checkout: Path) -> None:
     """A coarse mesh: dome and hinge in minutes, springs from both, eight certified states."""

@@ -115,6 +115,7 @@ def test_settings_that_cannot_be_read_are_a_message(tmp_path: Path) -> None:
     assert "matplotlibrc" in done.stderr and "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_notebook_keeps_its_settings(tmp_path: Path) -> None:
     """Also those of the plots that it draws later, and its backend."""
     states = dpg.predict(SPEC)

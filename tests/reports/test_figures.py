@@ -132,6 +132,7 @@ def test_panels_are_titled_by_patterns_in_their_order(draw: Any) -> None:
     assert titles == ["000", "001", "010", "100", "011", "101", "110", "111"]
 
 
+@pytest.mark.slow
 def test_long_patterns_are_titles_of_several_lines(draw: Any) -> None:
     titles = [axes.get_title() for axes in draw("sixty-four units").axes]
     assert titles[-1].replace("\n", "") == "0" * 58 + "1" * 6
@@ -146,6 +147,7 @@ def test_inverted_units_are_filled(draw: Any) -> None:
         assert colors == [filled[digit] for digit in axes.get_title()]
 
 
+@pytest.mark.slow
 def test_a_gripper_has_two_fingers_and_its_aperture_measured(draw: Any) -> None:
     spec = dpg.predict(CONFIGS / "gripper.yaml", columns="default")
     apertures = dict(zip(spec.table["pattern"], spec.table["aperture_mm"], strict=True))

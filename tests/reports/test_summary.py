@@ -389,6 +389,7 @@ def test_without_the_number_of_units_nothing_tells_bars_alone(bars: dict[str, An
 
 
 @pytest.mark.parametrize("metric", ["aperture_min_mm", "reach_min_mm", "n_stable"])
+@pytest.mark.slow
 def test_every_metric_that_varies_has_a_map(metric: str) -> None:
     texts = svg_texts(space(**{metric: np.arange(1, 9)}))
     words = {"aperture_min_mm": "aperture min (mm)", "n_stable": "stable"}

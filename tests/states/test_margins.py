@@ -158,6 +158,7 @@ def with_walls(compliance: float, **changes: float) -> Finger:
     return unit(**changes).changed(wall_compliance=np.array([[compliance]]))
 
 
+@pytest.mark.slow
 def test_walls_that_hold_a_well_by_themselves_lose_it_to_no_hinge_and_no_stroke() -> None:
     """k_θ → ∞, x → 0: the wall stands for the hinge, κ = 1/(k_b c_w), α < 1 − 8/9 (1 + κ)."""
     holding = 1.0 / (12.84 * (9.0 / 8.0 * (1.0 - 0.043) - 1.0))
