@@ -14,6 +14,8 @@ from dpgcli.actuation.staircase import Events, driven
 from dpgcli.api.pressure import pressed_input
 from dpgcli.arrays import Array
 
+pytestmark = pytest.mark.slow
+
 Made = Callable[..., Pressed]
 SPEC = """\
 finger:
@@ -174,7 +176,6 @@ def test_a_ground_dome_meets_its_neighbor_where_it_has_crossed_the_gap(
     assert snap[1] > 0.14951, "the neighbor holds it back"
 
 
-@pytest.mark.slow
 def test_going_down_from_a_fold_ends_in_the_next_well(made: Made) -> None:
     """Pushed beyond its samples a dome has small wells: none is stepped over on the way down."""
     travel = 13.7077958

@@ -9,6 +9,8 @@ import pytest
 
 from dpgcli.cli.exits import ExitCode
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[2] / "configs" / "calibration"
 NAMES = ("three_gap_finger.yaml", "three_gap_finger.csv", "push_3.5mm.yaml")
 FRAME = ("--first-station", "5.375,0.75", "--tip-offset", "5.375,-0.75")

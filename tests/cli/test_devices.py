@@ -18,6 +18,8 @@ from dpgcli.files.parts import SAID, PartStore
 from dpgcli.files.table_reader import read_record, read_undamaged
 from dpgcli.files.table_writer import read_metadata
 
+pytestmark = pytest.mark.slow
+
 Call = Callable[..., Any]
 CONFIGS = Path(__file__).parents[2] / "configs"
 SWEEP = "base: three_unit.yaml\nspace:\n  - {key: finger.units, values: [1, 2]}\n"

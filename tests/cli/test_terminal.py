@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 Shown = Callable[..., tuple[int, str]]
 ESCAPES = re.compile(r"\x1b\[[0-9;]*m")
 COLORFUL = (

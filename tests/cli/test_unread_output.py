@@ -11,6 +11,8 @@ import pytest
 
 from dpgcli.cli.streams import Stream
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 SWEEP = """base: three_unit.yaml
 space:
@@ -31,8 +33,6 @@ KILLS = (
 )
 FAILS = """
 from dpgcli.hard_cases.outcomes import Outcome
-
-pytestmark = pytest.mark.slow
 Outcome.is_failure = property(lambda self: True)
 """
 BREAKS = (

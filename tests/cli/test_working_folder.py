@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 NAMES = ("random", "tempfile", "logging", "queue", "selectors", "socket", "numpy", "filelock")

@@ -8,6 +8,8 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 ALL_MODULES = """
 import importlib, pkgutil, signal, dpgcli
@@ -56,7 +58,6 @@ def dpg(folder: Path, *arguments: str, hidden: bool = True) -> str:
     return python(folder, "-m", "dpgcli", *arguments, hidden=hidden)
 
 
-@pytest.mark.slow
 def test_every_module_can_be_imported(folder: Path) -> None:
     assert int(python(folder, "-c", ALL_MODULES)) > 100
 
@@ -70,7 +71,6 @@ def test_predicting(folder: Path) -> None:
     assert not list(folder.glob(".*.tmp"))
 
 
-@pytest.mark.slow
 def test_a_sweep_by_spawned_workers_and_what_is_made_of_it(folder: Path) -> None:
     sweep = ("sweep", "sweep.yaml", "-q", "-j", "2", "-o")
     dpg(folder, *sweep, "out")

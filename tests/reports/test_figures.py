@@ -16,6 +16,8 @@ from dpgcli.reports import comparison, figures
 from dpgcli.reports.drawing import own_figure
 from dpgcli.reports.fingers import INVERTED, MEASURE, REST, TIP
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"
 SHALLOW = {"finger.geometry.dome_height_mm": 4.2, "finger.geometry.dome_thickness_mm": 0.4}
@@ -109,7 +111,6 @@ def check_seen(figure: Any) -> None:
     assert min(sizes) >= 5.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("overlay", [False, True], ids=["panels", "overlay"])
 @pytest.mark.parametrize("case", CASES)
 def test_nothing_is_cut_off_or_hidden(draw: Any, case: str, overlay: bool) -> None:
@@ -132,7 +133,6 @@ def test_panels_are_titled_by_patterns_in_their_order(draw: Any) -> None:
     assert titles == ["000", "001", "010", "100", "011", "101", "110", "111"]
 
 
-@pytest.mark.slow
 def test_long_patterns_are_titles_of_several_lines(draw: Any) -> None:
     titles = [axes.get_title() for axes in draw("sixty-four units").axes]
     assert titles[-1].replace("\n", "") == "0" * 58 + "1" * 6
@@ -147,7 +147,6 @@ def test_inverted_units_are_filled(draw: Any) -> None:
         assert colors == [filled[digit] for digit in axes.get_title()]
 
 
-@pytest.mark.slow
 def test_a_gripper_has_two_fingers_and_its_aperture_measured(draw: Any) -> None:
     spec = dpg.predict(CONFIGS / "gripper.yaml", columns="default")
     apertures = dict(zip(spec.table["pattern"], spec.table["aperture_mm"], strict=True))

@@ -18,6 +18,8 @@ from dpgcli.sweeps.executors import Backend, serial
 from dpgcli.sweeps.extent import BYTES_PER_STATE
 from dpgcli.sweeps.pool import processes
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 AXES = (
     "{key: finger.geometry.dome_height_mm, linear: {from: 2.5, to: 7, count: 19}}",
