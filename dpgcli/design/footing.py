@@ -17,7 +17,6 @@ from dpgcli.design.scene import ORIGINS, Origin
 from dpgcli.mechanics.finger import KEYS, STUDY
 
 ELSEWHERE = " (at the study's dimensions)"
-KEYS_OF_FILES = (*KEYS, WALL_COMPLIANCE)
 MOVED = (Origin.SCALED, Origin.EXTRAPOLATED)
 ValuesByKey = Mapping[str, Sequence[Value]]
 """By key, one for each group of units."""
@@ -175,8 +174,8 @@ class Case:
         And with those of the file whose curve its domes have; with walls only if the file has them,
         but where it is about a dome alone.
         """
-        files = {id(known): known for known in (file, self.domes.calibration) if known is not None}
-        if any(self._lacks(known, key) for known in files.values() for key in KEYS_OF_FILES):
+        curve = self.domes.calibration or file
+        if any(self._lacks(known, key) for known in (file, curve) for key in KEYS):
             return False
         return file.has(WALL_COMPLIANCE) or file.curve is not None or not self.gives_way
 

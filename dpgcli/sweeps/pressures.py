@@ -46,7 +46,7 @@ class PressedDesigns:
         return Thresholds(snap, reset, np.broadcast_to(found.furthest, self.n_designs))
 
     @cached_property
-    def both(self) -> Array:
+    def snap_and_reset(self) -> Array:
         """Snap and reset pressures (2, unit, design), NaN for units that hold but one state."""
         found = np.stack([self.thresholds.snap, self.thresholds.reset])
         return np.where(np.isnan(found).any(axis=0), np.nan, found)
