@@ -29,7 +29,7 @@ Family = LoadedPotential[FingerCoordinates, PressedDomes]
 
 
 def about_to_touch(family: Family, coordinates: Array) -> Flags | None:
-    """Which domes are in touch as the load begins to rise, (unit, batch); None where all always are.
+    """Which domes are in touch as the load begins to rise, (unit, batch); None where all are.
 
     Others than those between both remain as they are.
     """
@@ -37,9 +37,7 @@ def about_to_touch(family: Family, coordinates: Array) -> Flags | None:
     if law.touching is None:
         return None
     value = family.measure(coordinates).value
-    is_level = _level(law, value)
-    rises = np.broadcast_to(law.change, is_level.shape)
-    touching = np.where(is_level & (rises != 0.0), rises > 0.0, law.touching)
+    is_level, touching = _level(law, value), law.touching.copy()
     lanes = np.flatnonzero(is_level.any(axis=0))
     for count in range(PASSES * len(value)):
         if not len(lanes):

@@ -210,7 +210,8 @@ def _one_step(
     is_away = walk.margin > AWAY
     meets = is_away & (np.abs(margin) <= AWAY)
     is_crossed = margin < np.where(is_away, -TOLERANCE, -AWAY)
-    crossed = np.where(is_crossed, margin / (walk.margin - margin), 0.0)
+    by_secant = np.where(is_away, margin / (walk.margin - margin), SHRINKING - 1.0)
+    crossed = np.where(is_crossed, by_secant, 0.0)
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
