@@ -110,7 +110,13 @@ class TransitionsResult:
             tied = counted(n_tied, "transition")
             yield f"ties in {tied}: the model does not say which of these units goes first"
         yield f"reachable from rest: {_listed(self.reachable)}"
-        yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
+        if graph.n_unknown:
+            yield (
+                f"not found to be reachable from rest: {_listed(self.unreachable)}; "
+                f"{failed_searches(graph.n_unknown)}, which may lead there"
+            )
+        else:
+            yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
         if self.draws is not None:
             yield from self.draws.lines
         yield from pressure_lines(self.given)
@@ -165,6 +171,16 @@ class TransitionsResult:
         codes = np.flatnonzero(which).astype(np.uint64)
         n_units = self.given.pressed.finger.n_units
         return tuple(texts(inverted_units(codes, n_units)).astype(str).tolist())
+
+
+def failed_searches(n_directions: int) -> str:
+    """In how many directions searches failed, for summaries.
+
+    >>> failed_searches(1)
+    'no equilibrium or no certified state is found in 1 direction of pressure'
+    """
+    directions = counted(n_directions, "direction")
+    return f"no equilibrium or no certified state is found in {directions} of pressure"
 
 
 _COUNTED = {
