@@ -173,3 +173,15 @@ def test_it_is_the_one_choice_of_all_that_is_right(seed: int, study: Study) -> N
         assert found is not None
         assert any((found == one).all() for one in right)
         assert len(right) == 1 or (change == 0.0).any()  # at no rate both are
+
+
+@pytest.mark.parametrize("travel", [0.0, 16.0])
+def test_gaps_close_onto_domes_at_rest_where_these_are(travel: float) -> None:
+    """By the published energy at once; by a curve of its travel a ground dome is far away."""
+    own = uneven(-COUPLING)
+    finger = own.finger.changed(dome_travel=np.full((2, 1), travel))
+    own = Pressed(UnitSolutions.of(finger), own.volumes)
+    shapes, settled = at_rest(own, np.array([[False], [True]]))
+    assert own.extensions(shapes.coordinates)[0, 0] < -0.1
+    is_closed = travel == 0.0
+    assert settled.status.tolist() == [Status.GAP_CLOSED if is_closed else Status.STABLE]
