@@ -42,6 +42,11 @@ class GivenLoads:
             return np.array(self.masses, float)[:, None]
         return self.values.get(MASS, np.zeros(1))[None]
 
+    def act(self, design: int) -> bool:
+        """Whether one design bears any load."""
+        mass = bool(np.any(self.mass[:, design if self.mass.shape[1] > 1 else 0]))
+        return mass or any(of_design(self.values[key], design) for key in self.values)
+
     @property
     def along(self) -> tuple[float, float]:
         """The direction of gravity, of length 1.

@@ -174,9 +174,7 @@ class Resolution:
         """The dead loads by name; none where the spec says nothing of them."""
         if self.design.loads is None:
             return {}
-        gripper = self._gripper(designs)
-        angle = np.zeros(1) if gripper is None else np.asarray(gripper.mounting_angle)
-        loads = self.design.loads.arrays(angle).items()
+        loads = self.design.loads.arrays(self._mounting_angle).items()
         return {name: _picked(values, designs) for name, values in loads}
 
     def _are_loaded(self, designs: Indices) -> Flags:
@@ -212,8 +210,13 @@ class Resolution:
         given = self.design.gripper
         if not given:
             return None
-        angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
-        return Gripper(_picked(given["base_spacing_mm"], designs), _picked(angle, designs))
+        angle = _picked(self._mounting_angle, designs)
+        return Gripper(_picked(given["base_spacing_mm"], designs), angle)
+
+    @property
+    def _mounting_angle(self) -> Array:
+        """The tilt of the fingers of a gripper, rad; 0 of a finger by itself."""
+        return np.asarray(np.radians(self.design.gripper.get("mounting_angle_deg", np.zeros(1))))
 
     def _pressure(self, designs: Indices) -> Pressure | None:
         given, units = self.design.pressure, self.design.units

@@ -71,9 +71,9 @@ def grown(units: UnitSolutions, formulate: Formulate, inverted: Flags, start: Ar
         share[lanes] = np.where(is_first, load[lanes], share[lanes])
         here[:, lanes] = _downhill(family.take_lanes(np.flatnonzero(folds)), ends, folds)
         load[lanes] *= 1.0 + BEYOND
-        extension = family.coordinates.take_lanes(np.flatnonzero(folds)).dome(here[:, lanes]).value
-        barrier = units.take_lanes(lanes).wells.spring_barrier
-        now[:, lanes] = extension > barrier
+        springs = family.coordinates.take_lanes(np.flatnonzero(folds)).springs(here[:, lanes])
+        now[:, lanes] = springs.extension > units.take_lanes(lanes).wells.spring_barrier
+        lanes = lanes[~springs.is_folded]  # no finger takes such a shape, now or later
     return Grown(here, arrived, unit, share)
 
 

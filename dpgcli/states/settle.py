@@ -131,9 +131,12 @@ def _followed(
 ) -> Settled:
     """Follow lanes without a state from their unloaded states, where they have one, and certify.
 
-    They end in what the finger has become under its full load, in another pattern perhaps.
+    What is folded in its own wells is so however it got there. The others end in what the finger
+    has become under its full load, in another pattern perhaps.
     """
-    lanes = np.flatnonzero(settled.status != Status.STABLE)
+    is_elsewhere = ((settled.reached != settled.inverted) | settled.strayed).any(axis=0)
+    is_missed = (settled.status != Status.STABLE) & (is_elsewhere | ~settled.is_folded)
+    lanes = np.flatnonzero(is_missed)
     if not len(lanes):
         return settled
     few, inverted = units.take_lanes(lanes), np.take(settled.inverted, lanes, axis=1)
