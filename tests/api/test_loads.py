@@ -133,6 +133,15 @@ def test_long_fingers_fall_into_halves_only_without_forces() -> None:
 
     assert method(ZERO) == "pairs of half-fingers"
     assert method({"tip_force_N": [0.0, 0.01]}) == method({"unit_mass_g": 1.0}) == "direct"
+    couple = {"tip_moment_N_mm": 15.0}
+    assert method(couple) == "pairs of half-fingers"
+    given = spec(couple)
+    given["finger"] |= {"units": 14}
+    whole = table(given, columns=["states", "energies"]).set_index("pattern")
+    some = [whole.index[place] for place in (0, 77, 9999, 16383)]
+    alone = table(given, columns=["states", "energies"], patterns=some).set_index("pattern")
+    for column in ("tip_y_mm", "energy_mJ", "load_energy_mJ"):
+        assert whole.loc[some, column].to_numpy() == pytest.approx(alone[column], abs=1e-9)
 
 
 def test_uncertainties_are_those_of_the_loaded_finger() -> None:
