@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dpgcli.design.loads import GRAVITY
+from dpgcli.design.resolve import resolve
 from dpgcli.errors import SpecError
 from dpgcli.files.scene_file import canonical_json, checked, json_schema, scene_of
 from dpgcli.files.scene_file.problems import unknown_key
@@ -195,3 +196,15 @@ def test_the_schema_knows_the_keys() -> None:
     text = json.dumps(schema)
     for key in ("tip_force_N", "tip_moment_N_mm", "unit_mass_g", "gravity_direction"):
         assert f'"{key}"' in text
+
+
+def test_designs_with_and_without_loads_are_no_batch() -> None:
+    """So that those without are solved, to the last bit, as if there were no loads at all."""
+    key = "loads.tip_force_y_N"
+    design = read("").design.with_values({key: np.array([0.0, 0.1, 0.0, -0.2])})
+    parts = resolve(design).alike(np.arange(4))
+    assert [part.tolist() for part in parts] == [[0, 2], [1, 3]]
+    weighed = read("unit_mass_g: [0, 1, 0]").design.with_values({key: np.array([0.0, 0.1])})
+    assert [part.tolist() for part in resolve(weighed).alike(np.arange(2))] == [[0, 1]]
+    again = weighed.with_values({"loads.unit_mass_g": np.array([0.0, 3.0])})
+    assert resolve(again).batch(np.arange(2)).finger.unit_weight[:, 1] == pytest.approx(3 * GRAVITY)
