@@ -122,6 +122,7 @@ def test_workers_load_no_reader_of_specs() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     unneeded = {"pydantic", "ruamel.yaml", "typer", "pandas", "scipy", "pyarrow.parquet"}
+    unneeded |= {f"dpgcli.states.{name}" for name in ("barriers", "uncertainty", "pairs.halves")}
     assert set(done.stdout.split()) & unneeded == set()
 
 
