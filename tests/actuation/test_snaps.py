@@ -58,7 +58,7 @@ def test_commands_agree_on_a_snap_that_folds() -> None:
         dpg.actuate(spec, pressure="0:2:0")
 
 
-STIFFNESSES = [30.0, *(pytest.param(k, marks=pytest.mark.slow) for k in (5.0, 300.0, 1e4))]
+STIFFNESSES = [300.0, *(pytest.param(k, marks=pytest.mark.slow) for k in (5.0, 30.0, 1e4))]
 
 
 class First(NamedTuple):
