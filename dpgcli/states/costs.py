@@ -1,8 +1,12 @@
 """Estimates of a plan's run time and memory, good to a factor of two either way."""
 
+from typing import TYPE_CHECKING
+
 from dpgcli.states.columns import Group
-from dpgcli.states.pairs.halves import Split
 from dpgcli.states.settle import lanes_at_once
+
+if TYPE_CHECKING:
+    from dpgcli.states.pairs.halves import Split
 
 # Measured on one core of a 2020s server, in seconds.
 UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
@@ -16,7 +20,7 @@ COLUMNS_WRITTEN = 32
 
 
 def seconds(
-    formulation: str, split: Split | None, n: int, n_states: int, groups: set[Group]
+    formulation: str, split: "Split | None", n: int, n_states: int, groups: set[Group]
 ) -> float:
     """Run time of a plan, seconds: its states, once the program has started."""
     per_unit = UNIT_STATE_SECONDS[formulation]
@@ -33,7 +37,7 @@ def rows_at_once(n_columns: int) -> int:
     return ROWS_WRITTEN * COLUMNS_WRITTEN // max(n_columns, COLUMNS_WRITTEN)
 
 
-def peak_bytes(split: Split | None, n: int, n_states: int, n_columns: int) -> int:
+def peak_bytes(split: "Split | None", n: int, n_states: int, n_columns: int) -> int:
     """Interpreter and libraries, one batch with its temporaries, tables and rows to be written."""
     batch = min(lanes_at_once(n), n_states) * n * 8 * 150
     row = n_columns * 8 + 4 * n
