@@ -21,8 +21,9 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     Only those whose status is stable are states; others begin no way. Domes that only push do not
     act in units that are not inverted, whatever their gaps do: stable states leave them out. Under
     pressure they act, and rest where their own energy says. A state with a gap closed beyond that
-    is one of the first model and none of the second: `GAP_CLOSED`. It takes hinges that turn each
-    other the other way (κ < 0) and a dome whose energy is not a curve by its own travel.
+    is one of the first model and none of the second: `GAP_CLOSED`. It takes loads that close gaps,
+    or hinges that turn each other the other way (κ < 0), and a dome whose energy is not a curve by
+    its own travel.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
@@ -34,8 +35,10 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     ([[0.0], [0.0]], [0])
     """
     settled = settle(pressed.units, chain_potential, inverted, DEFAULT_TOLERANCE)
-    touching = None if pressed.limits is None else inverted.copy()
     coordinates = settled.equilibrium.coordinates
+    touching, finger = None if pressed.limits is None else inverted.copy(), pressed.finger
+    if touching is not None and finger.is_loaded:  # a gap may be open further than a dome reaches
+        touching &= pressed.extensions(coordinates) <= finger.law.touching(finger.domes).highest
     shapes = Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching)
     if touching is not None:
         is_closed = (settled.status == Status.STABLE) & _closed(pressed, shapes)
