@@ -18,7 +18,8 @@ pytestmark = pytest.mark.slow
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = [
-    *("n_reachable", "reachable_patterns", "snap_pressure_min_MPa", "snap_pressure_max_MPa"),
+    *("n_reachable", "reachable_patterns", "n_unknown_directions"),
+    *("snap_pressure_min_MPa", "snap_pressure_max_MPa"),
     *("reset_pressure_min_MPa", "reset_pressure_max_MPa", "smallest_threshold_gap_MPa"),
 ]
 FIRST = "finger.geometry.dome_height_mm"
@@ -85,7 +86,7 @@ def test_designs_that_cannot_be_have_none(pressed: Pressed, tables: Any) -> None
     assert len(invalid) == 2
     assert (invalid["n_reachable"] == 0).all()
     assert (invalid["reachable_patterns"] == "").all()
-    assert invalid[NAMES[2:]].isna().all(axis=None)
+    assert invalid[NAMES[3:]].isna().all(axis=None)
 
 
 def test_without_pressure_nothing_of_it_is_computed(
@@ -125,7 +126,7 @@ def test_areas_and_snap_pressures_may_vary(pressed: Pressed, tables: Any) -> Non
     axis = "{key: pressure.effective_area_mm2, values: [30, 15]}"
     _, designs = tables(pressed(axis, section="{effective_area_mm2: 31}"))
     whole, half = (designs.loc[k] for k in (0, 1))
-    for name in NAMES[2:6]:
+    for name in NAMES[3:7]:
         assert half[name] == pytest.approx(2.0 * whole[name], rel=1e-9)
     assert whole["n_reachable"] == half["n_reachable"] == 2
 
@@ -174,6 +175,6 @@ def test_units_that_hold_but_one_state_leave_no_numbers_for_all(
     """With 0.1 a unit still snaps, but holds no shape without pressure; with 0.2 it does not."""
     axis = f"{{key: finger.overrides.1.lattice.force_linearity, values: [0.02, {linearity}]}}"
     _, designs = tables(pressed(axis))
-    bistable, other = designs[NAMES[2:6]].to_numpy(float)
+    bistable, other = designs[NAMES[3:7]].to_numpy(float)
     assert np.isfinite(bistable).all()
     assert np.isnan(other).all()
