@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import Response, take_lanes
+from dpgcli.equilibrium.contracts import Measured, Response, WideMeasured, take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import Dome, PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
@@ -56,7 +56,7 @@ class PressedDomes:
         push = -self.change * self.volumes.swept(scalar, self._domes).area
         return push if self.touching is None else np.where(self.touching, push, 0.0)
 
-    def margin(self, scalar: Array, load: Array) -> Array | None:
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> Array | None:
         """Push of domes in touch, and what keeps the others from it, over the forces in play.
 
         A dome that is apart rests where its own force is zero, before its neighbor; it is further
@@ -65,6 +65,7 @@ class PressedDomes:
         if self.touching is None:
             return None
         assert self.inverted is not None and self.peak is not None, "given beside touching"
+        scalar = measured.value
         force = free_force(self.finger, self.volumes, scalar, self.pressures(load))
         is_away = ~self.touching & ~self.inverted & (scalar > self.peak)
         margin = np.where(self.touching, -force, force) / self.finger.force_scale

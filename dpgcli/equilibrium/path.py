@@ -164,8 +164,8 @@ def _begin(
 
 
 def _margin(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) -> Array:
-    margin = family.law.margin(here.measured.value, here.load)
-    return np.full(here.measured.value.shape, np.inf) if margin is None else margin
+    margin = family.law.margin(here.loaded, here.load)
+    return np.full(here.loaded.value.shape, np.inf) if margin is None else margin
 
 
 class _Trial(NamedTuple):
@@ -354,7 +354,7 @@ def _turn(
     """
     motion, by = motion_by(family, here, cell)
     is_held = cell >= 0
-    rows, measured = family.measure.rows, here.measured
+    rows, measured = family.followed.rows, here.measured
     rates = along(rows, measured, motion) / family.scale
     size = np.abs(rates)
     chosen = size.argmax(axis=0)
