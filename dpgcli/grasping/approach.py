@@ -39,8 +39,13 @@ class Approach:
     resets: tuple[Reset, ...]
 
 
-def approach(obstructed: Obstructed, start: Touching, load: Array, end: Array) -> Approach:
-    """Let bodies grow from one load to another, (batch,), about fingers in balance."""
+def approach(
+    obstructed: Obstructed, start: Touching, load: Array, end: Array, *, to_reset: bool = False
+) -> Approach:
+    """Let bodies grow from one load to another, (batch,), about fingers in balance.
+
+    With `to_reset` only as far as to where a first unit resets or snaps.
+    """
     shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
     resets: list[Reset] = []
     lanes = np.flatnonzero(shapes.is_there & (here < end))
@@ -57,14 +62,13 @@ def approach(obstructed: Obstructed, start: Touching, load: Array, end: Array) -
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
             resets.append(Reset(lanes[changed], here[lanes[changed]], flipped[:, changed]))
-        lanes = lanes[moved.is_there & (ends.outcome != PathEnd.ARRIVED)]
+        goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
+        lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     return Approach(shapes, here, tuple(resets))
 
 
-def _gone_on(
-    own: Obstructed, before: Touching, ends: Ends, end: Array
-) -> tuple[Touching, Flags]:
+def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple[Touching, Flags]:
     """The shapes with which paths go on from where they ended, and units that flipped there."""
     size = len(before.coordinates)
     coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
@@ -81,7 +85,8 @@ def _gone_on(
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
         skipped = np.where(is_fold, ends.load[falls], ends.load[falls] + SKIPPED)
         start = begun.coordinates + further
-        there = few.relaxed(start, begun.inverted, begun.push, np.minimum(skipped, end[falls]))
+        push = few.at_places(begun)
+        there = few.relaxed(start, begun.inverted, push, np.minimum(skipped, end[falls]))
         was = few.is_open(begun)
         flipped[:, falls] = was ^ few.is_open(there)
         moved.put(falls, there)

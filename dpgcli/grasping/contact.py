@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
@@ -155,6 +155,12 @@ class Obstructed:
         if not isinstance(self.units.finger.law, PushOnly):
             return np.zeros(shapes.inverted.shape, bool)
         return shapes.inverted & ~self.is_open(shapes)
+
+    def at_places(self, shapes: Touching) -> Array:
+        """Pushes of shapes, (cell, batch), each where its contact has come to."""
+        place = self.gaps()(shapes.coordinates).place
+        is_there = place[:, None] == np.arange(len(place))[:, None]
+        return total(np.where(is_there, shapes.push[:, None], 0.0))
 
     def is_open(self, shapes: Touching) -> Flags:
         """Which units are beyond their barriers, (unit, batch)."""

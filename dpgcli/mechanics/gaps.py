@@ -81,7 +81,9 @@ class FaceGaps:
             value, gradient = np.where(is_first, value, FAR), np.where(is_first, gradient, 0.0)
 
         def bent(force: Array) -> Array:
-            at_place = total(np.where(place[:, None] == np.arange(cells)[:, None], force[:, None], 0.0))
+            at_place = total(
+                np.where(place[:, None] == np.arange(cells)[:, None], force[:, None], 0.0)
+            )
             return _bent(shape, near, at_place)
 
         return WideMeasured(value, gradient, bent, place)
