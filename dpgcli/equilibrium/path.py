@@ -66,7 +66,8 @@ class _Walk:
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
     one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
-    moves `cell` is −1, and steps are of the load itself.
+    moves `cell` is −1, and steps are of the load itself. `is_beyond` says that the last step that
+    was tried led beyond an event.
     """
 
     coordinates: Array
@@ -80,6 +81,7 @@ class _Walk:
     last: Array
     last_slope: Array
     margin: Array
+    is_beyond: Flags
 
     def put(self, lanes: Indices, other: "_Walk", taken: Flags) -> None:
         """Replace some lanes by those of another walk."""
@@ -157,7 +159,7 @@ def _begin(
     walk = _Walk(
         here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
-        margin,
+        margin, np.zeros(n, bool),
     )  # fmt: skip
     _turn(family, walk, here, nothing, towards)
     return walk, here.is_fine
@@ -210,6 +212,7 @@ def _one_step(
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
+    first = np.where(walk.is_beyond, CLOSER * first, first)  # margins that bend: from nearer by
     to_root = walk.slope / (walk.slope - slope)
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
@@ -219,6 +222,7 @@ def _one_step(
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
+    walk.is_beyond = is_event
     event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():

@@ -74,17 +74,15 @@ class FaceGaps:
         cells = n_bodies * n
         own = (near.distance - self.radii[:, None]).reshape(cells, batch)
         value = np.take_along_axis(own, place, axis=0)
-        slope = shape.pulled(_at_ends(near, -near.normal, 1.0 - near.share, near.share))
-        gradient = np.take_along_axis(slope, place[None], axis=1)
+        moves = _moves(shape, near)
+        gradient = np.take_along_axis(moves.slope, place[None], axis=1)
         if self.are_distinct:
             is_first = place == np.arange(cells)[:, None]
             value, gradient = np.where(is_first, value, FAR), np.where(is_first, gradient, 0.0)
 
         def bent(force: Array) -> Array:
-            at_place = total(
-                np.where(place[:, None] == np.arange(cells)[:, None], force[:, None], 0.0)
-            )
-            return _bent(shape, near, at_place)
+            is_there = place[:, None] == np.arange(cells)[:, None]
+            return _bent(shape, near, moves, total(np.where(is_there, force[:, None], 0.0)))
 
         return WideMeasured(value, gradient, bent, place)
 
@@ -138,31 +136,45 @@ def _followed(raw: Array) -> Indices:
     return place
 
 
-def _at_ends(near: Nearest, vector: Array, at_start: Array, at_end: Array) -> Array:
-    """Forces on nodes, (2, node, cell, batch): shares of a vector at both ends of each side."""
-    _, n_bodies, n, batch = vector.shape
-    forces = np.zeros((2, n + 1, n_bodies, n, batch))
+class _Moves(NamedTuple):
+    """∇g, w and τ of every side and body by the coordinates, (row, cell, batch).
+
+    `push` (2, node, cell, batch) are the forces on nodes of which ∇g is made.
+    """
+
+    slope: Array
+    turn: Array
+    slide: Array
+    push: Array
+
+
+def _moves(shape: FaceShape, near: Nearest) -> _Moves:
+    _, n_bodies, n, batch = near.normal.shape
+    rest = 1.0 - near.share
+    per_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
+    at_start = (-rest * near.normal, per_length * near.normal, -rest * near.along)
+    at_end = (-near.share * near.normal, -per_length * near.normal, -near.share * near.along)
+    forces = np.zeros((2, n + 1, 3, n_bodies, n, batch))
     sides = np.arange(n)
-    forces[:, sides, :, sides] += np.moveaxis(vector * at_start, 2, 0)
-    forces[:, sides + 1, :, sides] += np.moveaxis(vector * at_end, 2, 0)
-    return forces.reshape(2, n + 1, n_bodies * n, batch)
+    forces[:, sides, :, :, sides] = np.moveaxis(np.stack(at_start, axis=1), 3, 0)
+    forces[:, sides + 1, :, :, sides] += np.moveaxis(np.stack(at_end, axis=1), 3, 0)
+    flat = forces.reshape(2, n + 1, 3 * n_bodies * n, batch)
+    pulled = shape.pulled(flat).reshape(-1, 3, n_bodies * n, batch)
+    slope, turn, slide = np.moveaxis(pulled, 1, 0)
+    return _Moves(slope, turn, slide, flat[:, :, : n_bodies * n])
 
 
-def _bent(shape: FaceShape, near: Nearest, force: Array) -> Array:
+def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array:
     """Σ F ∇²g over places, (row, row, batch), for forces (place, batch)."""
     batch = force.shape[1]
-    on_nodes = _at_ends(near, -near.normal, 1.0 - near.share, near.share)
-    result = shape.bent(total(np.moveaxis(on_nodes * force, 2, 0)))
+    result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
     distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
-    by_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
-    turn = shape.pulled(_at_ends(near, near.normal, by_length, -by_length))
-    slide = shape.pulled(_at_ends(near, -near.along, 1.0 - near.share, near.share))
     safe = np.where(distance != 0.0, distance, 1.0)
     around = np.where(is_corner & (distance != 0.0), force / safe, 0.0)
     for cell in range(len(force)):
         if not force[cell].any():
             continue
-        w, tau, f = turn[:, cell], slide[:, cell], force[cell]
+        w, tau, f = moves.turn[:, cell], moves.slide[:, cell], force[cell]
         mixed = (f * w)[:, None] * tau
         result += mixed + np.swapaxes(mixed, 0, 1)
         result += (around[cell] * tau)[:, None] * tau - (f * distance[cell] * w)[:, None] * w
