@@ -129,7 +129,9 @@ class Obstructed:
         terms = (*leading_terms(bare.terms, size), multiplier_term(system))
         dome, slack = Leading(bare.coordinates.dome, size), Slack(gaps, size)
         scale, stiffness = finger.stroke, self.units.holding_stiffness
-        return LoadedPotential(system, terms, slack, law, dome, scale, stiffness, gaps.n_cells)
+        return LoadedPotential(
+            system, terms, slack, law, dome, scale, stiffness, n_multipliers=gaps.n_cells
+        )
 
     def stacked(self, shapes: Touching) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
