@@ -159,6 +159,7 @@ def frame_of(
 
 
 def point(option: str, text: str | None) -> tuple[float, float] | None:
+    """A place of an option, in mm; none of no text. Raises UsageError for what is none."""
     from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
 

@@ -1,4 +1,4 @@
-"""How fingers come to touch a body: it grows from nothing at its place, and units reset as they must.
+"""How fingers come to touch a body: it grows from nothing at its place; units reset as they must.
 
 Contacts close and open on the way without any change of shape. Where a finger loses its balance, a
 unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as large as

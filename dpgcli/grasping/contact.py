@@ -1,6 +1,6 @@
 """Fingers with round bodies in their way: contact without friction, exactly complementary."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np

@@ -68,8 +68,8 @@ class Held:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
-    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin`
-    what more of the load the next unit bears. `nodes`, and `face` (2, node, batch), in mm.
+    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
+    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node, batch), in mm.
     `residual` N and `error` mm are those of the tip. `resets` say what happened on the way.
     """
 
@@ -87,15 +87,8 @@ class Held:
     face: Array
     resets: tuple[Reset, ...]
     BY_LANE: ClassVar = (
-        "code",
-        "after",
-        "status",
-        "push",
-        "force",
-        "gap",
-        "margin",
-        "residual",
-        "error",
+        *("code", "after", "status", "push", "force", "gap", "margin"),
+        *("residual", "error"),
     )
 
 

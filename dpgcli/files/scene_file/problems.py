@@ -16,7 +16,7 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.loads import DIRECTION
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
-from dpgcli.files.scene_file import loads
+from dpgcli.files.scene_file import loads, objects
 from dpgcli.files.scene_file.models import (
     DataSpec,
     FingerSpec,
@@ -51,6 +51,8 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("pressure",): PressureSpec,
     ("pressure", "overrides", "*"): UnitPressure,
     ("loads",): loads.LoadsSpec,
+    ("object",): objects.ObjectSpec,
+    ("object", "disc"): objects.DiscSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -70,6 +72,7 @@ OWN = {
     "model_error": "a percentage such as 5%, or leave_one_out",
     **EXPECTED,
     **loads.EXPECTED,
+    **objects.EXPECTED,
 }
 
 HINTS = {
@@ -85,10 +88,10 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
-TEXTS = ("calibration", "law", "model_error", DIRECTION)
-PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE)
+TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
-WHOLE = (("data",), ("loads",))  # sections whose values may be lists
+WHOLE = (("data",), ("loads",), ("object",))  # sections whose values may be lists
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
