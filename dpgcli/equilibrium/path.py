@@ -25,6 +25,7 @@ LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
 FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
+KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
 PLACES = 64  # on a step, at which laws from points are looked at,
@@ -223,6 +224,8 @@ def _one_step(
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
     walk.is_beyond = is_event
+    if family.n_multipliers:
+        _go_by_load(walk, ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK))
     event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
@@ -235,6 +238,15 @@ def _one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _go_by_load(walk: _Walk, which: Flags) -> None:
+    """Go on by the load where no step by a cell leads further: beyond a kink it may not move."""
+    slope = np.where(which, walk.slope, 1.0)
+    walk.cell = np.where(which, -1, walk.cell)
+    walk.onward, walk.slope = walk.onward / slope, walk.slope / slope
+    walk.step = np.where(which, walk.step * slope, walk.step)
+    walk.last_slope = np.where(which, np.nan, walk.last_slope)
 
 
 def _tried(
@@ -257,7 +269,8 @@ def _tried(
     target = walk.values[place] + walk.sign * step * scale[place]
     there = corrected(family, guess, load, cell, target, depth)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
-    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
+    nearest = KINK if family.n_multipliers else FOLD_DISTANCE
+    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
 

@@ -125,7 +125,7 @@ def held(scene: Scene, formulate: Formulate, disc: Disc, frame: Frame, codes: Co
 def _certified(own: Obstructed, grown: Approach) -> Settled:
     """The states that fingers have come to rest in, certified with their contacts."""
     shapes = grown.shapes
-    potential = own.pressed(shapes.inverted, own.at_places(shapes), grown.load)
+    potential = own.pressed(shapes.inverted, shapes.push, grown.load)
     there = looked_at(potential, shapes.coordinates)
     settled = certified(own.units, potential, shapes.inverted, there, DEFAULT_TOLERANCE)
     settled = replace(settled, inverted=settled.reached)

@@ -12,7 +12,7 @@ the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g = w τᵀ
 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -47,13 +47,14 @@ class FaceGaps:
     """Gaps of bodies, cell by cell: all sides of the face for the first body, then the next.
 
     `centers` (2, body, 1 or batch) and `radii` (body, 1 or batch) in mm, in the finger's own frame.
-    If `are_distinct` is true sides that share a place with one before them are far away instead.
+    With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
+    one of the first, or else the lowest.
     """
 
     face: Face
     centers: Array
     radii: Array
-    are_distinct: bool = False
+    first: Flags | None = None
 
     @property
     def n_cells(self) -> int:
@@ -76,9 +77,9 @@ class FaceGaps:
         value = np.take_along_axis(own, place, axis=0)
         moves = _moves(shape, near)
         gradient = np.take_along_axis(moves.slope, place[None], axis=1)
-        if self.are_distinct:
-            is_first = place == np.arange(cells)[:, None]
-            value, gradient = np.where(is_first, value, FAR), np.where(is_first, gradient, 0.0)
+        if self.first is not None:
+            is_told = _lowest_at(place, self.first)
+            value, gradient = np.where(is_told, value, FAR), np.where(is_told, gradient, 0.0)
 
         def bent(force: Array) -> Array:
             is_there = place[:, None] == np.arange(cells)[:, None]
@@ -89,7 +90,16 @@ class FaceGaps:
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
         centers, radii = take_lanes(self.centers, index), take_lanes(self.radii, index)
-        return replace(self, face=self.face.take_lanes(index), centers=centers, radii=radii)
+        first = None if self.first is None else take_lanes(self.first, index)
+        return type(self)(self.face.take_lanes(index), centers, radii, first)
+
+
+def _lowest_at(place: Indices, first: Flags) -> Flags:
+    """The lowest cell of each place, or the lowest of the first ones there, (cell, batch)."""
+    n = len(place)
+    rank = np.where(first, 0, n) + np.arange(n)[:, None]
+    is_before = (place[:, None] == place[None]) & (rank[None] < rank[:, None])
+    return np.asarray(~is_before.any(axis=1))
 
 
 def nearest(shape: FaceShape, centers: Array) -> Nearest:
