@@ -211,16 +211,15 @@ class ActiveConstraints:
     def margin(self, measured: Measured | WideMeasured, load: Array) -> Array:
         """y of active constraints and t of the others, over what is large.
 
-        Infinite for t at a place that an active constraint is at, or that one before has as well.
+        Infinite for t at a place that an active constraint is at, or that is another one's own.
         """
         assert isinstance(measured, WideMeasured), "places are known"
         slack = measured.value - (load - 1.0) * self.depth
         place, numbers = measured.place, np.arange(len(slack))
         is_same = place[:, None] == place[None]
         is_held = (is_same & self.active[None]).any(axis=1)
-        is_before = (numbers[:, None] > numbers)[..., None]
-        is_again = (is_same & is_before).any(axis=1)
-        other = np.where(is_held | is_again, np.inf, slack)
+        is_elsewhere = place != numbers[:, None]
+        other = np.where(is_held | is_elsewhere, np.inf, slack)
         return np.where(self.active, -slack, other) / self.large
 
     def take_lanes(self, index: Indices) -> Self:

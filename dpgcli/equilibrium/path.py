@@ -26,6 +26,7 @@ GROWTH, SHRINKING = 1.6, 0.35
 FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
+AT_KINK = 1e-6  # of the load: as near a path comes to a kink beyond which nothing is found
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
 PLACES = 64  # on a step, at which laws from points are looked at,
@@ -218,7 +219,8 @@ def _one_step(
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
     meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
-    is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
+    is_kinked = (walk.cell < 0) & (family.n_multipliers > 0) & ~is_event
+    is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)

@@ -14,7 +14,7 @@ from dpgcli.equilibrium.path import Ends, PathEnd, follow
 from dpgcli.grasping.contact import Obstructed, Touching
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
-SKIPPED = 1e-6  # of the way: beyond a fold, or over a kink, as where two contacts become one
+SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
 MOST_HALTS = 40  # by unit
 
 
@@ -52,11 +52,12 @@ def approach(
     for _ in range(MOST_HALTS * obstructed.units.finger.n_units):
         if not len(lanes):
             break
-        own, few = obstructed.take_lanes(lanes), shapes.take_lanes(lanes)
+        own = obstructed.take_lanes(lanes)
+        few = own.relabeled(shapes.take_lanes(lanes))
         family = own.family(few.inverted, few.active)
         ends = follow(family, own.stacked(few), here[lanes], end[lanes])
         moved, flipped = _gone_on(own, few, ends, end[lanes])
-        here[lanes] = np.minimum(ends.load + _is_passed(ends) * SKIPPED, end[lanes])
+        here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
@@ -77,18 +78,19 @@ def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple
     push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
     moved = Touching(coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool))
     flipped = np.zeros(before.inverted.shape, bool)
-    falls = np.flatnonzero(_is_passed(ends))
+    falls = np.flatnonzero(_beyond(ends) > 0.0)
     if len(falls):
         few, begun = own.take_lanes(falls), moved.take_lanes(falls)
         is_fold = ends.outcome[falls] == PathEnd.FOLD
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
-        beyond = np.minimum(ends.load[falls] + SKIPPED, end[falls])
+        beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
         there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
     return moved, flipped
 
 
-def _is_passed(ends: Ends) -> Flags:
-    """Paths that ended where there is no balance beyond, or where laws or contacts have a kink."""
-    return np.asarray((ends.outcome == PathEnd.FOLD) | (ends.outcome == PathEnd.FAILED))
+def _beyond(ends: Ends) -> Array:
+    """How far beyond the ends of paths to go on: over folds, and kinks of laws or contacts."""
+    is_fold, is_kink = ends.outcome == PathEnd.FOLD, ends.outcome == PathEnd.FAILED
+    return np.where(is_fold, SKIPPED, np.where(is_kink, OVER_KINK, 0.0))

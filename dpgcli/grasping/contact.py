@@ -1,6 +1,6 @@
 """Fingers with round bodies in their way: contact without friction, exactly complementary."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -134,6 +134,14 @@ class Obstructed:
             system, terms, slack, law, dome, scale, stiffness, n_multipliers=gaps.n_cells
         )
 
+    def relabeled(self, shapes: Touching) -> Touching:
+        """Shapes with each contact counted as that of the side to which it has come."""
+        place = self.gaps()(shapes.coordinates).place
+        is_there = place[:, None] == np.arange(len(place))[:, None]
+        active = (is_there & shapes.active[:, None]).any(axis=0)
+        push = total(np.where(is_there, shapes.push[:, None], 0.0))
+        return replace(shapes, active=active, push=push)
+
     def stacked(self, shapes: Touching) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
         return np.concatenate((shapes.coordinates, shapes.push / self.stiffness))
@@ -158,12 +166,6 @@ class Obstructed:
         if not isinstance(self.units.finger.law, PushOnly):
             return np.zeros(shapes.inverted.shape, bool)
         return shapes.inverted & ~self.is_open(shapes)
-
-    def at_places(self, shapes: Touching) -> Array:
-        """Pushes of shapes, (cell, batch), each where its contact has come to."""
-        place = self.gaps()(shapes.coordinates).place
-        is_there = place[:, None] == np.arange(len(place))[:, None]
-        return total(np.where(is_there, shapes.push[:, None], 0.0))
 
     def is_open(self, shapes: Touching) -> Flags:
         """Which units are beyond their barriers, (unit, batch)."""

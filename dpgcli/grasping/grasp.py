@@ -136,10 +136,10 @@ def _described(
     own: Obstructed, codes: Codes, grown: Approach, settled: Settled, status: NDArray[np.uint8]
 ) -> Held:
     """What there is to say of fingers that have come to rest."""
-    shapes, coordinates = grown.shapes, settled.potential.coordinates
+    shapes, coordinates = own.relabeled(grown.shapes), settled.potential.coordinates
     face = own.face.shape(shapes.coordinates)
     near = nearest(face, own.centers)
-    push = own.at_places(shapes)
+    push = shapes.push
     at_tip = tip(settled, with_compliance=False)
     return Held(
         code=codes,

@@ -48,7 +48,7 @@ class FaceGaps:
 
     `centers` (2, body, 1 or batch) and `radii` (body, 1 or batch) in mm, in the finger's own frame.
     With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
-    one of the first, or else the lowest.
+    one of the first, or else that of the side itself.
     """
 
     face: Face
@@ -78,7 +78,7 @@ class FaceGaps:
         moves = _moves(shape, near)
         gradient = np.take_along_axis(moves.slope, place[None], axis=1)
         if self.first is not None:
-            is_told = _lowest_at(place, self.first)
+            is_told = _one_at(place, self.first)
             value, gradient = np.where(is_told, value, FAR), np.where(is_told, gradient, 0.0)
 
         def bent(force: Array) -> Array:
@@ -94,10 +94,11 @@ class FaceGaps:
         return type(self)(self.face.take_lanes(index), centers, radii, first)
 
 
-def _lowest_at(place: Indices, first: Flags) -> Flags:
-    """The lowest cell of each place, or the lowest of the first ones there, (cell, batch)."""
+def _one_at(place: Indices, first: Flags) -> Flags:
+    """One cell of each place: the lowest of the first ones there, or its own, (cell, batch)."""
     n = len(place)
-    rank = np.where(first, 0, n) + np.arange(n)[:, None]
+    numbers = np.arange(n)[:, None]
+    rank = np.where(first, 0, np.where(place == numbers, n, 2 * n)) + numbers
     is_before = (place[:, None] == place[None]) & (rank[None] < rank[:, None])
     return np.asarray(~is_before.any(axis=1))
 
