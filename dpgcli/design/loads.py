@@ -1,5 +1,6 @@
 """Dead loads of a design: values by key, which way gravity goes, and what is wrong with them."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -54,8 +55,8 @@ class GivenLoads:
         >>> GivenLoads(direction=(0.0, -2.0)).along
         (0.0, -1.0)
         """
-        x, y = (float(part) / np.hypot(*self.direction) for part in self.direction)
-        return tuple(0.0 if abs(part) < NEARLY_NONE else part for part in (x, y))  # type: ignore[return-value]  # a pair
+        x, y = (part / math.hypot(*self.direction) for part in self.direction)
+        return x if abs(x) > NEARLY_NONE else 0.0, y if abs(y) > NEARLY_NONE else 0.0
 
     def arrays(self, mounting_angle: Array) -> dict[str, Array]:
         """The loads of a finger by the names of its fields, (1 or unit, 1 or design).

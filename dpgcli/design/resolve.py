@@ -151,7 +151,10 @@ class Resolution:
 
     def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
         """What outputs of some designs, none of them wrong, rest on, and how many of them."""
-        found = kinds({**_each(self.values), **_each(self.answers)}, designs)
+        values = {**_each(self.values), **_each(self.answers)}
+        are_loaded = self._are_loaded(designs)
+        parts = designs[~are_loaded], designs[are_loaded]
+        found = [pair for part in parts if len(part) for pair in kinds(values, part)]
         return [(trusts_of(self._case(place)), count) for place, count in found]
 
     def _case(self, place: int) -> Case:

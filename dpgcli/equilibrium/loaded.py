@@ -53,7 +53,7 @@ class LoadedLaw(Protocol):
 class Holding:
     """A law, if any, and a spring of stiffness k towards a target on the same scalar.
 
-    `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,).
+    `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,) or by cell.
     """
 
     law: ScalarLaw | None

@@ -129,6 +129,9 @@ def assemble(
         add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
         return
     force = response.force
+    if q.outer is None and not response.stiffness.any():
+        _assemble_load(rows, q, force, gradient, hessian)
+        return
     stiff = [response.stiffness * slope for slope in q.gradient]
     across, turned = q.outer.vector if q.outer else (), []
     if q.outer:
@@ -167,6 +170,18 @@ def _assemble_wide(
 def widely(q: WideMeasured, weights: Array) -> Array:
     """Σ w ∇q over cells, (row, batch), for weights (cell, batch)."""
     return total(np.moveaxis(q.gradient * weights, 1, 0))
+
+
+def _assemble_load(
+    rows: tuple[Row, ...], q: Measured, force: Array, gradient: Array, hessian: Array
+) -> None:
+    """The same of a law without stiffness: only what bends counts."""
+    for row, slope in zip(rows, q.gradient, strict=True):
+        add(gradient, row, force * slope)
+    for (first, second), bend in q.entries.items():
+        depth = rows[second].offset - rows[first].offset
+        if depth < len(hessian):
+            add(hessian[depth], rows[first], force * bend)
 
 
 def add(target: Array, row: Row, values: Array) -> None:

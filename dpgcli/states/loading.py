@@ -76,6 +76,8 @@ def grown(units: UnitSolutions, formulate: Formulate, inverted: Flags, start: Ar
         springs = family.coordinates.take_lanes(np.flatnonzero(folds)).springs(here[:, lanes])
         now[:, lanes] = springs.extension > units.take_lanes(lanes).wells.spring_barrier
         lanes = lanes[~springs.is_folded]  # no finger takes such a shape, now or later
+        if not len(lanes):
+            break
     return Grown(here, arrived, unit, share)
 
 

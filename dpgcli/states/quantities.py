@@ -41,12 +41,12 @@ def rows(solved: SolvedStates, quantities: Sequence[Quantity]) -> Columns:
 
     States that were not solved as whole fingers have those of the groups states and energies only.
     """
-    fingers = cast("SolvedFingers", solved)
+    fingers, is_state = cast("SolvedFingers", solved), solved.is_state
+    are_all_states = is_state.all()
     columns: Columns = {}
     for quantity in quantities:
         values = quantity.of(fingers)
-        if not quantity.is_always:
-            is_state = solved.is_state
+        if not (quantity.is_always or are_all_states):
             is_flag = values.dtype == bool
             values = values & is_state if is_flag else np.where(is_state, values, np.nan)
         columns[quantity.name] = values

@@ -10,8 +10,10 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import STUDY, Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
+from dpgcli.states.barriers import barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.loading import Grown, grown
+from dpgcli.states.sensitivities import sensitivities
 from dpgcli.states.settle import settle
 from dpgcli.states.tip import COMPLIANCE_PAIRS, min_eigenvalues, tip
 from dpgcli.states.units import UnitSolutions
@@ -259,3 +261,63 @@ def test_lanes_do_not_touch_each_other(reference_finger: Fingers, units_of: Unit
         alone = solved(finger.take_lanes(np.array([lane])), patterns[:, :1])
         mine = together.equilibrium.coordinates[:, lane].tobytes()
         assert alone.equilibrium.coordinates[:, 0].tobytes() == mine
+
+
+def test_every_unit_that_is_pushed_back_falls_by_itself(
+    graded_finger: Fingers, units_of: UnitsOf
+) -> None:
+    """A couple that two of three bear; the weakest resets, and under more of it the next one."""
+    strokes = {"stroke": np.array([2.6, 3.5, 3.0])}
+    finger, pattern = graded_finger(3, 3, np.inf, **strokes), units_of("111")
+    falls = []
+    for moment in np.arange(5.0, 45.0, 2.5):
+        settled = solved(loaded(finger, end_moment=-moment), pattern)
+        falls.append(int((~settled.reached).sum()))
+    assert falls == sorted(falls)
+    assert falls[0] == 0
+    assert falls[-1] == 3
+    assert 1 in falls
+
+
+@pytest.mark.parametrize("force", [-1.5, -0.5, 0.35, 0.5, 0.8])
+def test_what_a_search_finds_is_where_growing_loads_lead(
+    reference_finger: Fingers, all_patterns: Callable[[int], Flags], force: float
+) -> None:
+    """All states of a finger under one force: none that is called stable lies beyond a reset."""
+    finger, patterns = loaded(reference_finger(4, 1e4), tip_force_y=force), all_patterns(4)
+    bare = stable(finger.unloaded, patterns)
+    coordinates = bare.equilibrium.coordinates
+    way = grown(UnitSolutions.of(finger), chain_potential, patterns, coordinates)
+    direct = solved(finger, patterns)
+    is_stable = direct.status == Status.STABLE
+    assert (is_stable == (way.unit < 0)).all()
+    off = way.coordinates - direct.equilibrium.coordinates
+    assert np.abs(off[:, is_stable]).max() < 1e-9
+
+
+@pytest.mark.parametrize("moment", [-12.0, 6.0])
+def test_barriers_of_a_loaded_unit(
+    reference_finger: Fingers, units_of: UnitsOf, moment: float
+) -> None:
+    finger, both = loaded(reference_finger(1), end_moment=moment), units_of("0", "1")
+    settled, units = stable(finger, both), UnitSolutions.of(finger)
+    found = barriers(units, chain_potential, settled, 1e-12).energy[0]
+    turn = np.linspace(-0.2, 0.5, 1_400_001)
+    energy = np.array([rigid_unit_energy(t, moment) for t in turn[::100]])
+    middle = np.flatnonzero(turn[::100] < 0.245)[-1]
+    start = np.flatnonzero(turn[::100] < 0.05)[-1]
+    top = start + energy[start:middle].argmax()
+    rests = [energy[:top].min(), energy[top:].min()]
+    assert found == pytest.approx([energy[top] - rest for rest in rests], abs=1e-5)
+
+
+def test_sensitivities_of_loaded_states(graded_finger: Fingers, units_of: UnitsOf) -> None:
+    """Heights move the places where weights act."""
+    finger, pattern = loaded(graded_finger(3, 10)), units_of("101")
+    found = sensitivities(stable(finger, pattern), [{"segment_height": np.ones((1, 1))}])
+    poses = []
+    for step in (1e-4, -1e-4):
+        moved = finger.changed(segment_height=finger.segment_height + step)
+        poses.append(tip(stable(moved, pattern), with_compliance=False).pose[:, 0])
+    slopes = (poses[0] - poses[1]) / 2e-4
+    assert found.pose[:, 0, 0] == pytest.approx(slopes, rel=1e-6, abs=1e-8)

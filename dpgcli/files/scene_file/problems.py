@@ -91,6 +91,7 @@ UNCERTAINTY: KeyPath = ("uncertainty",)
 TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
 PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
+MOST_SHOWN = 6  # parts of a list
 WHOLE = (("data",), ("loads",), ("object",))  # sections whose values may be lists
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
@@ -150,10 +151,18 @@ def _problem(document: Document, error: Any) -> Problem:
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
-    found = "nothing" if error["type"] == "missing" else shown(error["input"])
+    show = _shown if path[:1] in WHOLE else shown
+    found = "nothing" if error["type"] == "missing" else show(error["input"])
     is_worded = path[:-1] == UNCERTAINTY or bool(expected_at(path))
     hint = "" if is_worded else _hint(key, error)
     return document.problem(path, _expected(path), found, hint)
+
+
+def _shown(value: Any) -> str:
+    """A value as messages show it; the parts of a short list, too."""
+    if isinstance(value, list) and len(value) <= MOST_SHOWN:
+        return f"[{', '.join(map(shown, value))}]"
+    return shown(value)
 
 
 def _at(data: Any, path: KeyPath) -> Any:
