@@ -25,6 +25,7 @@ from dpgcli.cli import (
     compare,
     explain,
     fe,
+    grasp,
     help,
     init,
     landscape,
@@ -75,6 +76,7 @@ COMMANDS = {
             validate,
             init,
             landscape,
+            grasp,
             schema,
             help,
         )
