@@ -12,7 +12,8 @@ from dpgcli.mechanics.finger import Finger
     strict=True,
     reason="the cell that closes is the first one whose nearest place this is, not the place's "
     "own side; it jumps to a place of its own once the body reaches its side, and the side that "
-    "is touched goes on without a constraint (its margin comes from infinity: no event)",
+    "is touched goes on without a constraint (its margin comes from infinity: no event). In "
+    "ActiveConstraints.margin `is_again = place != numbers[:, None]` mends it",
 )
 @pytest.mark.parametrize("bars", [np.inf, 1e4])
 def test_a_side_that_is_touched_first_by_way_of_another_stays_closed(
