@@ -120,25 +120,26 @@ def test_trust_constr_finds_the_same_minima(
 ) -> None:
     found = Found(seed, grown, own)
     energy, slope, apart = scaled(found)
+
+    def curvature(function: Callable[[Array], Array], z: Array) -> Array:
+        bend = found.own.hessian(function, z / found.unit)
+        return np.asarray(bend / found.unit / found.unit[:, None])
+
     gaps = NonlinearConstraint(
         lambda z: found.own.gaps((z / found.unit)[:, None])[apart, 0],
         0.0,
         np.inf,
         jac=lambda z: found.own.gradient(found.own.gaps, z / found.unit)[apart] / found.unit,
+        hess=lambda z, v: curvature(lambda q: v @ found.own.gaps(q)[apart], z),
     )
     start = found.q * found.unit + np.random.default_rng(seed).normal(0.0, 0.02, len(found.q))
-
-    def bend(z: Array) -> Array:
-        return np.asarray(
-            found.own.hessian(found.own.energy, z / found.unit) / found.unit / found.unit[:, None]
-        )
 
     options = {"gtol": 1e-9, "xtol": 1e-12, "maxiter": 600}
     best = minimize(
         energy,
         start,
         jac=slope,
-        hess=bend,
+        hess=lambda z: curvature(found.own.energy, z),
         constraints=gaps,
         method="trust-constr",
         options=options,
