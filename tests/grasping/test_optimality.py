@@ -114,7 +114,7 @@ def test_slsqp_finds_the_same_minima(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", QUICK)
+@pytest.mark.parametrize("seed", (2, 3, 15, 24, 26))
 def test_trust_constr_finds_the_same_minima(
     seed: int, grown: Callable[..., Any], own: Callable[..., Any]
 ) -> None:
