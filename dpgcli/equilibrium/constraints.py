@@ -2,8 +2,8 @@
 
 Two ways, for the same minima:
 
-- from afar the augmented Lagrangian, E + Σ (max(0, μ − σ t)² − μ²)/2σ with t = g − b: an energy like
-  others, minimized again and again while μ ← max(0, μ − σ t) (Nocedal and Wright, Numerical
+- from afar the augmented Lagrangian, E + Σ (max(0, μ − σ t)² − μ²)/2σ with t = g − b: an energy
+  like others, minimized again and again while μ ← max(0, μ − σ t) (Nocedal and Wright, Numerical
   Optimization, 2nd ed., 2006, section 17.3);
 - near by the multipliers of a set of active constraints as coordinates: with y = μ/σ the Lagrangian
   is E + Σ ½ σ (t − y)² over active ones − Σ ½ σ y² over all. It is stationary where active t are 0
@@ -38,7 +38,7 @@ System = TypeVar("System", bound=Coordinates, covariant=True)
 
 @dataclass(frozen=True)
 class AugmentedContact:
-    """The augmented Lagrangian of t = g − b ≥ 0: μ (N) by (cell, batch), σ (N/mm), b (mm), (batch,).
+    """The augmented Lagrangian of t = g − b ≥ 0: μ (cell, batch) in N, σ in N/mm, b (batch,) in mm.
 
     >>> law = AugmentedContact(np.array([[2.0]]), np.array([[10.0]]), np.zeros(1))
     >>> [float(law(np.array([[gap]])).force[0, 0]) for gap in (-0.1, 0.1, 0.3)]  # N
@@ -209,9 +209,9 @@ class ActiveConstraints:
         return np.where(self.active, -self.stiffness * self.depth, 0.0 * scalar)
 
     def margin(self, measured: Measured | WideMeasured, load: Array) -> Array:
-        """y of active constraints and t of the others, over what is large; infinite where others say it.
+        """y of active constraints and t of the others, over what is large.
 
-        t of a place that an active constraint is at, or that one before has, says nothing new.
+        Infinite for t at a place that an active constraint is at, or that one before has as well.
         """
         assert isinstance(measured, WideMeasured), "places are known"
         slack = measured.value - (load - 1.0) * self.depth

@@ -1,10 +1,11 @@
-"""Potentials that change with a load: fixed terms, and one law on a measure that knows the load.
+"""Potentials that change with a load: fixed terms, one law on a measure that may know the load, and
+terms that grow with it.
 
 What a path of equilibria needs beside gradient and Hessian is ∂g/∂λ, and scalars by which it can be
-followed where the load turns back: those of the measure that is loaded.
+followed where the load turns back: those of the measure.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
@@ -74,6 +75,45 @@ class Holding:
         return type(self)(self.law and self.law.take_lanes(index), *parts)
 
 
+@dataclass(frozen=True)
+class Unchanged:
+    """A law that knows no load (`LoadedLaw`)."""
+
+    law: ScalarLaw
+    is_smooth = True  # what bends more is for short steps
+
+    def at(self, load: Array) -> ScalarLaw:
+        """The law."""
+        return self.law
+
+    def rate(self, scalar: Array, load: Array) -> Array:
+        """Zero."""
+        return np.zeros_like(scalar)
+
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> None:
+        """No other law begins."""
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same for some lanes of the batch."""
+        return type(self)(self.law.take_lanes(index))
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share, (batch,), of a law."""
+
+    law: ScalarLaw
+    share: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness, each by the share."""
+        return Response(*(self.share * part for part in self.law(scalar)))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same for some lanes of the batch."""
+        return type(self)(self.law.take_lanes(index), take_lanes(self.share, index))
+
+
 class Linearized(NamedTuple):
     """Gradient, band of the Hessian and ∂g/∂λ; the followed and the loaded measure."""
 
@@ -88,9 +128,10 @@ class Linearized(NamedTuple):
 class LoadedPotential(Generic[System, Law]):
     """Potentials by a load: `terms` that do not feel it, and a `measure` under a loaded `law`.
 
-    Paths are followed by the scalars `followed`. `scale` (cell, 1 or batch) is the measure of a
-    large change of each, `stiffness` (same shape) that of a spring which keeps a cell where it is,
-    however its own law softens. A minimum has as many negative pivots as there are multipliers.
+    Of the terms in `growing` the load is the share that acts. Paths are followed by the scalars
+    `followed`. `scale` (cell, 1 or batch) is the measure of a large change of each, `stiffness`
+    (same shape) that of a spring which keeps a cell where it is, however its own law softens. A
+    minimum has as many negative pivots as there are multipliers.
     """
 
     coordinates: System
@@ -100,6 +141,7 @@ class LoadedPotential(Generic[System, Law]):
     followed: Measure
     scale: Array
     stiffness: Array
+    growing: tuple[Term, ...] = ()
     n_multipliers: int = 0
 
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
@@ -113,6 +155,7 @@ class LoadedPotential(Generic[System, Law]):
             followed,
             take_lanes(self.scale, index),
             take_lanes(self.stiffness, index),
+            tuple(term.take_lanes(index) for term in self.growing),
             self.n_multipliers,
         )
 
@@ -123,17 +166,21 @@ class LoadedPotential(Generic[System, Law]):
 
     def at(self, load: Array) -> Potential[System]:
         """The potential under a load, (batch,)."""
-        loaded = Term("loaded", self.measure, self.law.at(load))
-        return Potential(self.coordinates, (*self.terms, loaded))
+        return self._with(self.law.at(load), load)
 
     def held(self, load: Array, stiffness: Array, target: Array) -> Potential[System]:
         """The same, with springs of some stiffness (cell, batch) towards a target (batch,)."""
-        free = self.at(load)
         if self.is_by_load:
-            law = Holding(self.law.at(load), stiffness, target)
-            return Potential(self.coordinates, (*self.terms, Term("loaded", self.measure, law)))
+            return self._with(Holding(self.law.at(load), stiffness, target), load)
         hold = Term("hold", self.followed, Holding(None, stiffness, target))
-        return Potential(self.coordinates, (*free.terms, hold))
+        return self._with(self.law.at(load), load, hold)
+
+    def _with(self, law: ScalarLaw, load: Array, *others: Term) -> Potential[System]:
+        loaded = Term("loaded", self.measure, law)
+        return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load), *others))
+
+    def _grown(self, load: Array) -> tuple[Term, ...]:
+        return tuple(replace(term, law=Share(term.law, load)) for term in self.growing)
 
     @property
     def column_depths(self) -> tuple[int, ...]:
@@ -146,7 +193,7 @@ class LoadedPotential(Generic[System, Law]):
         """Derivatives at coordinates, (size, batch), with cells held as in `held`."""
         gradient = np.zeros_like(coordinates)
         hessian = np.zeros((depth + 1, *coordinates.shape))
-        for term in self.terms:
+        for term in (*self.terms, *self._grown(load)):
             measured = term.measure(coordinates)
             response = term.law(measured.value)
             assemble(term.measure.rows, measured, response, gradient, hessian)
@@ -159,6 +206,9 @@ class LoadedPotential(Generic[System, Law]):
             assemble(self.followed.rows, followed, hold(followed.value), gradient, hessian)
         assemble(self.measure.rows, loaded, law(loaded.value), gradient, hessian)
         rate = spread(self.measure.rows, loaded, self.law.rate(loaded.value, load), gradient)
+        for term in self.growing:
+            at = term.measure(coordinates)
+            rate += spread(term.measure.rows, at, term.law(at.value).force, gradient)
         return Linearized(gradient, hessian, rate, followed, loaded)
 
     def looked_at(self, coordinates: Array) -> tuple[Measured | WideMeasured, Measured]:
@@ -174,6 +224,9 @@ def spread(
     result = np.zeros_like(like)
     if isinstance(measured, WideMeasured):
         result[[row.offset for row in rows]] = widely(measured, weights)
+        return result
+    if not measured.gradient:
+        add(result, rows[0], weights)
         return result
     for row, slope in zip(rows, measured.gradient, strict=True):
         add(result, row, weights * slope)

@@ -25,6 +25,7 @@ LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
 FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
+KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 SMALLEST_STEP = 1e-9  # of the scale
 PLACES = 64  # on a step, at which laws from points are looked at,
@@ -66,7 +67,8 @@ class _Walk:
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
     one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
-    moves `cell` is −1, and steps are of the load itself.
+    moves `cell` is −1, and steps are of the load itself. `is_beyond` says that the last step that
+    was tried led beyond an event.
     """
 
     coordinates: Array
@@ -80,6 +82,7 @@ class _Walk:
     last: Array
     last_slope: Array
     margin: Array
+    is_beyond: Flags
 
     def put(self, lanes: Indices, other: "_Walk", taken: Flags) -> None:
         """Replace some lanes by those of another walk."""
@@ -157,7 +160,7 @@ def _begin(
     walk = _Walk(
         here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
-        margin,
+        margin, np.zeros(n, bool),
     )  # fmt: skip
     _turn(family, walk, here, nothing, towards)
     return walk, here.is_fine
@@ -210,6 +213,7 @@ def _one_step(
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
+    first = np.where(walk.is_beyond, CLOSER * first, first)  # margins that bend: from nearer by
     to_root = walk.slope / (walk.slope - slope)
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
@@ -219,6 +223,9 @@ def _one_step(
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
+    walk.is_beyond = is_event
+    if family.n_multipliers:
+        _go_by_load(walk, ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK))
     event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
@@ -231,6 +238,15 @@ def _one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _go_by_load(walk: _Walk, which: Flags) -> None:
+    """Go on by the load where no step by a cell leads further: beyond a kink it may not move."""
+    slope = np.where(which, walk.slope, 1.0)
+    walk.cell = np.where(which, -1, walk.cell)
+    walk.onward, walk.slope = walk.onward / slope, walk.slope / slope
+    walk.step = np.where(which, walk.step * slope, walk.step)
+    walk.last_slope = np.where(which, np.nan, walk.last_slope)
 
 
 def _tried(
@@ -253,7 +269,8 @@ def _tried(
     target = walk.values[place] + walk.sign * step * scale[place]
     there = corrected(family, guess, load, cell, target, depth)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
-    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
+    nearest = KINK if family.n_multipliers else FOLD_DISTANCE
+    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
 

@@ -1,4 +1,4 @@
-"""How fingers come to touch a body: it grows from nothing at its place, and units reset as they must.
+"""How fingers come to touch a body: it grows from nothing at its place; units reset as they must.
 
 Contacts close and open on the way without any change of shape. Where a finger loses its balance, a
 unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as large as
@@ -14,7 +14,7 @@ from dpgcli.equilibrium.path import Ends, PathEnd, follow
 from dpgcli.grasping.contact import Obstructed, Touching
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
-SKIPPED = 1e-6  # of the way: over what a path cannot pass, such as two contacts that become one
+SKIPPED = 1e-6  # of the way: beyond a fold, or over a kink, as where two contacts become one
 MOST_HALTS = 40  # by unit
 
 
@@ -56,12 +56,11 @@ def approach(
         family = own.family(few.inverted, few.active)
         ends = follow(family, own.stacked(few), here[lanes], end[lanes])
         moved, flipped = _gone_on(own, few, ends, end[lanes])
-        reached = np.where(ends.outcome == PathEnd.FAILED, ends.load + SKIPPED, ends.load)
-        here[lanes] = np.minimum(reached, end[lanes])
+        here[lanes] = np.minimum(ends.load + _is_passed(ends) * SKIPPED, end[lanes])
         shapes.put(lanes, moved)
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
-            resets.append(Reset(lanes[changed], here[lanes[changed]], flipped[:, changed]))
+            resets.append(Reset(lanes[changed], ends.load[changed], flipped[:, changed]))
         goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
@@ -78,16 +77,18 @@ def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple
     push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
     moved = Touching(coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool))
     flipped = np.zeros(before.inverted.shape, bool)
-    falls = np.flatnonzero((ends.outcome == PathEnd.FOLD) | (ends.outcome == PathEnd.FAILED))
+    falls = np.flatnonzero(_is_passed(ends))
     if len(falls):
         few, begun = own.take_lanes(falls), moved.take_lanes(falls)
         is_fold = ends.outcome[falls] == PathEnd.FOLD
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
-        skipped = np.where(is_fold, ends.load[falls], ends.load[falls] + SKIPPED)
-        start = begun.coordinates + further
-        push = few.at_places(begun)
-        there = few.relaxed(start, begun.inverted, push, np.minimum(skipped, end[falls]))
-        was = few.is_open(begun)
-        flipped[:, falls] = was ^ few.is_open(there)
+        beyond = np.minimum(ends.load[falls] + SKIPPED, end[falls])
+        there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
+        flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
     return moved, flipped
+
+
+def _is_passed(ends: Ends) -> Flags:
+    """Paths that ended where there is no balance beyond, or where laws or contacts have a kink."""
+    return np.asarray((ends.outcome == PathEnd.FOLD) | (ends.outcome == PathEnd.FAILED))

@@ -1,6 +1,6 @@
 """Fingers with round bodies in their way: contact without friction, exactly complementary."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,7 @@ from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.units import UnitSolutions
 
-STIFFER = 10.0  # than the stiffest unit: of what stands in for a contact while it is sought
+STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has rounding in it
 TOLERANCE = 1e-12  # of the forces in play
 CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
 MOST_UPDATES = 40
@@ -79,8 +79,9 @@ class Obstructed:
     @property
     def stiffness(self) -> Array:
         """σ, N/mm, (1, 1 or design)."""
-        finger = self.units.finger
-        return np.asarray(STIFFER * (finger.force_scale / finger.stroke).max(axis=0)[None])
+        ground = np.zeros((self.units.finger.n_units, 1), bool)
+        finger = self.units.finger.with_domes(ground)
+        return np.asarray(STIFFER * (finger.force_scale / finger.stroke).min(axis=0)[None])
 
     @property
     def large(self) -> Array:
@@ -98,9 +99,9 @@ class Obstructed:
         """The face of the fingers."""
         return Face.of(self.formulate(self.units.finger).coordinates, self.thickness)
 
-    def gaps(self, *, are_distinct: bool = False) -> FaceGaps:
-        """Gaps to the bodies in full."""
-        return FaceGaps(self.face, self.centers, self.radii, are_distinct)
+    def gaps(self, first: Flags | None = None) -> FaceGaps:
+        """Gaps to the bodies in full; at each place only one, if it is said which come first."""
+        return FaceGaps(self.face, self.centers, self.radii, first)
 
     def bound(self, load: Array) -> Array:
         """b = (λ − 1) D, mm."""
@@ -114,7 +115,7 @@ class Obstructed:
         """The augmented Lagrangian for some pushes, (cell, batch), N."""
         bare = self.potential(inverted)
         law = AugmentedContact(push, self.stiffness, self.bound(load))
-        contact = Term("contact", self.gaps(are_distinct=True), law)
+        contact = Term("contact", self.gaps(push > 0.0), law)
         return Potential(bare.coordinates, (*bare.terms, contact))
 
     def family(
@@ -129,7 +130,9 @@ class Obstructed:
         terms = (*leading_terms(bare.terms, size), multiplier_term(system))
         dome, slack = Leading(bare.coordinates.dome, size), Slack(gaps, size)
         scale, stiffness = finger.stroke, self.units.holding_stiffness
-        return LoadedPotential(system, terms, slack, law, dome, scale, stiffness, gaps.n_cells)
+        return LoadedPotential(
+            system, terms, slack, law, dome, scale, stiffness, n_multipliers=gaps.n_cells
+        )
 
     def stacked(self, shapes: Touching) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""

@@ -1,7 +1,7 @@
 """What a finger, or a gripper's two, do with a round body in their way."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,8 +68,8 @@ class Held:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
-    (side, batch) N is by phalanx, `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin`
-    what more of the load the next unit bears. `nodes`, and `face` (2, node, batch), in mm.
+    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
+    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node, batch), in mm.
     `residual` N and `error` mm are those of the tip. `resets` say what happened on the way.
     """
 
@@ -77,6 +77,7 @@ class Held:
     after: Codes
     status: NDArray[np.uint8]
     push: Array
+    normal: Array
     force: Array
     gap: Array
     margin: Array
@@ -85,6 +86,10 @@ class Held:
     nodes: Stations
     face: Array
     resets: tuple[Reset, ...]
+    BY_LANE: ClassVar = (
+        *("code", "after", "status", "push", "force", "gap", "margin"),
+        *("residual", "error"),
+    )
 
 
 def held(scene: Scene, formulate: Formulate, disc: Disc, frame: Frame, codes: Codes) -> Held:
@@ -120,7 +125,7 @@ def held(scene: Scene, formulate: Formulate, disc: Disc, frame: Frame, codes: Co
 def _certified(own: Obstructed, grown: Approach) -> Settled:
     """The states that fingers have come to rest in, certified with their contacts."""
     shapes = grown.shapes
-    potential = own.pressed(shapes.inverted, own.at_places(shapes), grown.load)
+    potential = own.pressed(shapes.inverted, shapes.push, grown.load)
     there = looked_at(potential, shapes.coordinates)
     settled = certified(own.units, potential, shapes.inverted, there, DEFAULT_TOLERANCE)
     settled = replace(settled, inverted=settled.reached)
@@ -141,6 +146,7 @@ def _described(
         after=codes_of(settled.reached),
         status=status,
         push=push,
+        normal=near.normal[:, 0],
         force=total(np.moveaxis(near.normal[:, 0] * push, 1, 0)),
         gap=own.gaps()(shapes.coordinates).value.min(axis=0),
         margin=_margins(own, grown, np.asarray(status == Status.STABLE)),

@@ -1,9 +1,9 @@
 """The inner face of a finger, by its chain's coordinates: where it touches what it holds.
 
 The face is the polyline through F_0 … F_n. F_k lies on the line of strut k, half the layer's
-thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). So it has one side for each phalanx, and
-its corners stay joined however the finger bends (our choice; for equal corner angles sides are
-parallel to the chords).
+thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). So there is a side for each phalanx, and
+corners stay joined however the finger bends (our choice; for equal corner angles sides are parallel
+to the chords).
 
 A corner turns all that lies beyond it by −1 about its station P, so that ∂F/∂θ = R (F − P) with
 R (x, y) = (y, −x); a chord's extension moves all beyond along its direction u. Of coordinates p

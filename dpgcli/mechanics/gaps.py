@@ -7,12 +7,12 @@ place have the same gap. So a body that touches two sides in a corner has two ga
 slides over a corner keeps its own.
 
 With A and B the ends of a side of length ℓ, t its direction, m its inner normal and c nearest to
-A + s ℓ t, ∇g is m at c and −(1 − s) m and −s m at A and B; with ω = w · δ the turn of the side,
-w = (m, −m)/ℓ at A and B, and τ = t at c, −(1 − s) t and −s t at A and B, ∇²g = w τᵀ + τ wᵀ − g w wᵀ.
-At a corner w is 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
+A + s ℓ t, ∇g is m at c, −(1 − s) m at A and −s m at B. With w = (m, −m)/ℓ at A and B, the turn of
+the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g = w τᵀ + τ wᵀ − g w wᵀ. At a corner w is
+0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -47,13 +47,14 @@ class FaceGaps:
     """Gaps of bodies, cell by cell: all sides of the face for the first body, then the next.
 
     `centers` (2, body, 1 or batch) and `radii` (body, 1 or batch) in mm, in the finger's own frame.
-    If `are_distinct` is true sides that share a place with one before them are far away instead.
+    With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
+    one of the first, or else the lowest.
     """
 
     face: Face
     centers: Array
     radii: Array
-    are_distinct: bool = False
+    first: Flags | None = None
 
     @property
     def n_cells(self) -> int:
@@ -74,24 +75,31 @@ class FaceGaps:
         cells = n_bodies * n
         own = (near.distance - self.radii[:, None]).reshape(cells, batch)
         value = np.take_along_axis(own, place, axis=0)
-        slope = shape.pulled(_at_ends(near, -near.normal, 1.0 - near.share, near.share))
-        gradient = np.take_along_axis(slope, place[None], axis=1)
-        if self.are_distinct:
-            is_first = place == np.arange(cells)[:, None]
-            value, gradient = np.where(is_first, value, FAR), np.where(is_first, gradient, 0.0)
+        moves = _moves(shape, near)
+        gradient = np.take_along_axis(moves.slope, place[None], axis=1)
+        if self.first is not None:
+            is_told = _lowest_at(place, self.first)
+            value, gradient = np.where(is_told, value, FAR), np.where(is_told, gradient, 0.0)
 
         def bent(force: Array) -> Array:
-            at_place = total(
-                np.where(place[:, None] == np.arange(cells)[:, None], force[:, None], 0.0)
-            )
-            return _bent(shape, near, at_place)
+            is_there = place[:, None] == np.arange(cells)[:, None]
+            return _bent(shape, near, moves, total(np.where(is_there, force[:, None], 0.0)))
 
         return WideMeasured(value, gradient, bent, place)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
         centers, radii = take_lanes(self.centers, index), take_lanes(self.radii, index)
-        return replace(self, face=self.face.take_lanes(index), centers=centers, radii=radii)
+        first = None if self.first is None else take_lanes(self.first, index)
+        return type(self)(self.face.take_lanes(index), centers, radii, first)
+
+
+def _lowest_at(place: Indices, first: Flags) -> Flags:
+    """The lowest cell of each place, or the lowest of the first ones there, (cell, batch)."""
+    n = len(place)
+    rank = np.where(first, 0, n) + np.arange(n)[:, None]
+    is_before = (place[:, None] == place[None]) & (rank[None] < rank[:, None])
+    return np.asarray(~is_before.any(axis=1))
 
 
 def nearest(shape: FaceShape, centers: Array) -> Nearest:
@@ -122,7 +130,7 @@ def nearest(shape: FaceShape, centers: Array) -> Nearest:
 
 
 def _followed(raw: Array) -> Indices:
-    """The sides to which nearest places lead, (body, side, batch), from shares s that may be beyond.
+    """The sides to which nearest places lead, (body, side, batch), from shares s beyond 0 and 1.
 
     A corner that is nearest to both its sides belongs to the first of them.
     """
@@ -138,31 +146,45 @@ def _followed(raw: Array) -> Indices:
     return place
 
 
-def _at_ends(near: Nearest, vector: Array, at_start: Array, at_end: Array) -> Array:
-    """Forces on nodes, (2, node, cell, batch): shares of a vector at both ends of each side."""
-    _, n_bodies, n, batch = vector.shape
-    forces = np.zeros((2, n + 1, n_bodies, n, batch))
+class _Moves(NamedTuple):
+    """∇g, w and τ of every side and body by the coordinates, (row, cell, batch).
+
+    `push` (2, node, cell, batch) are the forces on nodes of which ∇g is made.
+    """
+
+    slope: Array
+    turn: Array
+    slide: Array
+    push: Array
+
+
+def _moves(shape: FaceShape, near: Nearest) -> _Moves:
+    _, n_bodies, n, batch = near.normal.shape
+    rest = 1.0 - near.share
+    per_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
+    at_start = (-rest * near.normal, per_length * near.normal, -rest * near.along)
+    at_end = (-near.share * near.normal, -per_length * near.normal, -near.share * near.along)
+    forces = np.zeros((2, n + 1, 3, n_bodies, n, batch))
     sides = np.arange(n)
-    forces[:, sides, :, sides] += np.moveaxis(vector * at_start, 2, 0)
-    forces[:, sides + 1, :, sides] += np.moveaxis(vector * at_end, 2, 0)
-    return forces.reshape(2, n + 1, n_bodies * n, batch)
+    forces[:, sides, :, :, sides] = np.moveaxis(np.stack(at_start, axis=1), 3, 0)
+    forces[:, sides + 1, :, :, sides] += np.moveaxis(np.stack(at_end, axis=1), 3, 0)
+    flat = forces.reshape(2, n + 1, 3 * n_bodies * n, batch)
+    pulled = shape.pulled(flat).reshape(-1, 3, n_bodies * n, batch)
+    slope, turn, slide = np.moveaxis(pulled, 1, 0)
+    return _Moves(slope, turn, slide, flat[:, :, : n_bodies * n])
 
 
-def _bent(shape: FaceShape, near: Nearest, force: Array) -> Array:
+def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array:
     """Σ F ∇²g over places, (row, row, batch), for forces (place, batch)."""
     batch = force.shape[1]
-    on_nodes = _at_ends(near, -near.normal, 1.0 - near.share, near.share)
-    result = shape.bent(total(np.moveaxis(on_nodes * force, 2, 0)))
+    result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
     distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
-    by_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
-    turn = shape.pulled(_at_ends(near, near.normal, by_length, -by_length))
-    slide = shape.pulled(_at_ends(near, -near.along, 1.0 - near.share, near.share))
     safe = np.where(distance != 0.0, distance, 1.0)
     around = np.where(is_corner & (distance != 0.0), force / safe, 0.0)
     for cell in range(len(force)):
         if not force[cell].any():
             continue
-        w, tau, f = turn[:, cell], slide[:, cell], force[cell]
+        w, tau, f = moves.turn[:, cell], moves.slide[:, cell], force[cell]
         mixed = (f * w)[:, None] * tau
         result += mixed + np.swapaxes(mixed, 0, 1)
         result += (around[cell] * tau)[:, None] * tau - (f * distance[cell] * w)[:, None] * w

@@ -15,6 +15,7 @@ from dpgcli.design.dimensions import without_unit
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.scene import Uncertainty
 from dpgcli.errors import Field, UsageError
+from dpgcli.mechanics.terms import LOAD
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import SolvedFingers, SolvedStates
@@ -208,6 +209,7 @@ _ENERGY_KINDS = {
     "wall": "walls",
     "hinge": "hinges",
     "bar": "bars",
+    LOAD: "dead loads: minus force times place, weights and couples likewise",
 }
 
 

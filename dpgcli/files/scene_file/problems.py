@@ -13,8 +13,10 @@ from dpgcli.design.dimensions import (
     unit_of,
     unit_range,
 )
+from dpgcli.design.loads import DIRECTION
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
+from dpgcli.files.scene_file import loads, objects
 from dpgcli.files.scene_file.models import (
     DataSpec,
     FingerSpec,
@@ -48,6 +50,9 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("gripper",): GripperSpec,
     ("pressure",): PressureSpec,
     ("pressure", "overrides", "*"): UnitPressure,
+    ("loads",): loads.LoadsSpec,
+    ("object",): objects.ObjectSpec,
+    ("object", "disc"): objects.DiscSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -66,6 +71,8 @@ OWN = {
     **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),
     "model_error": "a percentage such as 5%, or leave_one_out",
     **EXPECTED,
+    **loads.EXPECTED,
+    **objects.EXPECTED,
 }
 
 HINTS = {
@@ -81,10 +88,11 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
-TEXTS = ("calibration", "law", "model_error")
-PAIRS = tuple(DataSpec.model_fields)
+TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
-BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
+WHOLE = (("data",), ("loads",), ("object",))  # sections whose values may be lists
+BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
 
@@ -136,8 +144,8 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    if path[:1] == ("data",) and error["type"] != "extra_forbidden" and len(path) > 1:
-        path = path[:2]  # of the pair, not of one of its numbers
+    if path[:1] in WHOLE and error["type"] != "extra_forbidden" and len(path) > 1:
+        path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
