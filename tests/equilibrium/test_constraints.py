@@ -131,7 +131,14 @@ def lagrangian(
     law = ActiveConstraints(active, sigma, np.array([depth]), large[0])
     terms = (*leading_terms(bare, size), multiplier_term(system))
     return LoadedPotential(
-        system, terms, Slack(gaps, size), law, Each(size), np.ones((size, 1)), np.ones((size, 1)), n
+        system,
+        terms,
+        Slack(gaps, size),
+        law,
+        Each(size),
+        np.ones((size, 1)),
+        np.ones((size, 1)),
+        n_multipliers=n,
     )
 
 
@@ -302,7 +309,14 @@ def test_lanes_taken(dense: Callable[[Array], Array]) -> None:
     bare = leading_terms((Term("wells", OwnCoordinate(Row(1, 0), 4), Wells(1.0)),), 4)
     followed, one = Each(4), np.ones((4, 1))
     family = LoadedPotential(
-        system, (*bare, multiplier_term(system)), Slack(gaps, 4), law, followed, one, one, 2
+        system,
+        (*bare, multiplier_term(system)),
+        Slack(gaps, 4),
+        law,
+        followed,
+        one,
+        one,
+        n_multipliers=2,
     )
     x, load = np.random.default_rng(6).normal(0.0, 1.0, (6, 3)), np.array([0.1, 0.5, 0.9])
     index = np.array([2, 0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import LineString, Point
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import FingerCoordinates, Internal
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.finger import Finger
@@ -30,7 +30,7 @@ PLACES = {  # on which side, share along it, how far inwards (mm)
 
 
 def gaps_of(
-    coordinates: FingerCoordinates, at: Array, place: str, *, are_distinct: bool = False
+    coordinates: FingerCoordinates, at: Array, place: str, first: Flags | None = None
 ) -> FaceGaps:
     """The gaps to a body of 3 mm near some place of the face as it is at coordinates."""
     face = Face.of(coordinates, np.array([[1.5]]))
@@ -43,7 +43,7 @@ def gaps_of(
         normal = normal + np.array([after[1], -after[0]]) / np.hypot(*after)
         normal /= np.hypot(*normal)
     center = nodes[:, side] + share * along + inwards * normal
-    return FaceGaps(face, center[:, None, None], np.array([[3.0]]), are_distinct)
+    return FaceGaps(face, center[:, None, None], np.array([[3.0]]), first)
 
 
 def bent_shape(coordinates: FingerCoordinates, random_shape: Shapes, place: str) -> Array:
@@ -178,12 +178,14 @@ def test_sides_that_lead_to_one_place_are_told_apart_on_request(
     coordinates = chain_potential(graded_finger(4, 31)).coordinates
     at = bent_shape(coordinates, random_shape, "a corner")
     every = gaps_of(coordinates, at, "a corner")(at)
-    distinct = gaps_of(coordinates, at, "a corner", are_distinct=True)(at)
-    own = (every.place == np.arange(4)[:, None])[:, 0]
-    assert own.tolist() == [False, True, False, False], "all lead to the corner, on its first side"
-    assert distinct.value[own] == every.value[own]
-    assert (distinct.value[~own] == FAR).all() and not distinct.gradient[:, ~own].any()
-    assert (distinct.gradient[:, own] == every.gradient[:, own]).all()
+    assert every.place.ravel().tolist() == [1] * 4, "all lead to the corner, on its first side"
+    for wanted, told in ((None, 0), (2, 2)):
+        first = np.arange(4)[:, None] == wanted
+        distinct = gaps_of(coordinates, at, "a corner", first)(at)
+        own = np.arange(4) == told
+        assert distinct.value[own] == every.value[own]
+        assert (distinct.value[~own] == FAR).all() and not distinct.gradient[:, ~own].any()
+        assert (distinct.gradient[:, own] == every.gradient[:, own]).all()
 
 
 def test_a_corner_that_opens_towards_the_body_has_two_gaps(reference_finger: Fingers) -> None:
