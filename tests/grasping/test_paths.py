@@ -32,6 +32,21 @@ def test_a_body_in_a_corner_touches_both_sides(
     assert np.abs(rest).max() / 10.75 <= 1e-9
 
 
+def test_a_side_that_is_let_go_of_opens(
+    reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
+) -> None:
+    """In the same corner the larger disc ends on one side: the end phalanx has come off."""
+    patterns, center, _ = TWO_SIDES
+    found = grown(reference_finger(3), patterns, center, 17.2)
+    assert found.shapes.is_there.all() and not found.came.resets
+    push, q = found.obstructed.at_places(found.shapes)[:, 0], found.shapes.coordinates[:, 0]
+    assert (push > 0.0).tolist() == [False, True, False]
+    finger = own(reference_finger(3), np.array([False, True, False]), 1.5, center, 17.2)
+    assert finger.gaps(q[:, None])[2, 0] > 1e-3
+    rest = finger.gradient(finger.energy, q) - push @ finger.gradient(finger.gaps, q)
+    assert np.abs(rest).max() / 10.75 <= 1e-9
+
+
 @pytest.mark.parametrize("walls", [0.0, 0.6])
 def test_a_penalty_comes_to_the_same_at_first_order(
     walls: float, reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
