@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dpgcli.equilibrium import path
-from dpgcli.grasping import approach
+from dpgcli.equilibrium import newton
+from dpgcli.grasping import contact
 from dpgcli.mechanics.finger import Finger
 
 
@@ -49,21 +49,21 @@ def test_a_side_that_comes_near_within_one_step_is_met(
 @pytest.mark.xfail(
     strict=True,
     reason="beyond the tip the gap of a body behind the face is +d, on the end phalanx −d: a tip "
-    "that slips over the body's center comes to a jump, which ends as a fold (or in a search that "
-    "alternates between both signs), again and again for minutes, and then as not converged",
+    "that slips over the body's center comes to a jump, where the search downhill alternates "
+    "between both signs (40 times 200 iterations, 46 s) and the state is lost with garbage in it",
 )
 def test_a_tip_that_slips_over_a_body_ends_its_path(
     reference_finger: Callable[..., Finger],
     grown: Callable[..., object],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    calls = []
+    searches = []
 
     def counted(*args: object, **options: object) -> object:
-        calls.append(args)
-        assert len(calls) <= 8, "the same fold again and again"
-        return path.follow(*args, **options)  # type: ignore[arg-type]
+        searches.append(args)
+        assert len(searches) <= 12, "to and fro between two signs"
+        return newton.minimize(*args, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(approach, "follow", counted)
+    monkeypatch.setattr(contact, "minimize", counted)
     found = grown(reference_finger(3, 1e3), ["111"], (41.0, -20.0), 16.0)
-    assert found is not None
+    assert found.shapes.is_there.all()
