@@ -211,6 +211,8 @@ def _one_step(
     dip = _first_dip(family, walk, trial, towards)
     is_over = trial.is_fine & ~is_beyond & (dip < 1.0)
     crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
+    is_new = (margin < -TOLERANCE) & np.isinf(walk.margin)  # where it began is not known
+    crossed = np.where(is_new, -0.5, crossed)
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event

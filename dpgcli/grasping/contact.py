@@ -30,7 +30,7 @@ from dpgcli.states.units import UnitSolutions
 STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has rounding in it
 TOLERANCE = 1e-12  # of the forces in play
 CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
-MOST_UPDATES = 40
+MOST_UPDATES, MOST_STEPS = 30, 120  # of multipliers; of a descent
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 
 Constrained = WithMultipliers[FingerCoordinates]
@@ -177,7 +177,9 @@ class Obstructed:
         for _ in range(MOST_UPDATES):
             own = self.take_lanes(lanes)
             potential = own.pressed(inverted[:, lanes], push[:, lanes], load[lanes])
-            there = minimize(potential, here[:, lanes], TOLERANCE, largest_step=SHORT_STEP)
+            there = minimize(
+                potential, here[:, lanes], TOLERANCE, MOST_STEPS, largest_step=SHORT_STEP
+            )
             contact = potential.terms[-1]
             assert isinstance(contact.law, AugmentedContact), "the last term"
             pushed = contact.law.pushes(contact.measure(there.coordinates).value)

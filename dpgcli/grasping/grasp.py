@@ -69,8 +69,8 @@ class Held:
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
     (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
-    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node, batch), in mm.
-    `residual` N and `error` mm are those of the tip. `resets` say what happened on the way.
+    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node,
+    batch), in mm. `residual` N and `error` mm are those of the tip. `resets` say what happened.
     """
 
     code: Codes

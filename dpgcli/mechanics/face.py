@@ -1,7 +1,7 @@
 """The inner face of a finger, by its chain's coordinates: where it touches what it holds.
 
 The face is the polyline through F_0 … F_n. F_k lies on the line of strut k, half the layer's
-thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). So there is a side for each phalanx, and
+thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). There is a side for each phalanx, and
 corners stay joined however the finger bends (our choice; for equal corner angles sides are parallel
 to the chords).
 

@@ -7,9 +7,9 @@ place have the same gap. So a body that touches two sides in a corner has two ga
 slides over a corner keeps its own.
 
 With A and B the ends of a side of length ℓ, t its direction, m its inner normal and c nearest to
-A + s ℓ t, ∇g is m at c, −(1 − s) m at A and −s m at B. With w = (m, −m)/ℓ at A and B, the turn of
-the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g = w τᵀ + τ wᵀ − g w wᵀ. At a corner w is
-0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
+A + s ℓ t, ∇g is m at c, −(1 − s) m at A and −s m at B. With w = (m, −m)/ℓ at A and B, which is the
+turn of the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g = w τᵀ + τ wᵀ − g w wᵀ. At a
+corner w is 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
 """
 
 from dataclasses import dataclass

@@ -10,13 +10,6 @@ from dpgcli.grasping import contact
 from dpgcli.mechanics.finger import Finger
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the cell that closes is the first one whose nearest place this is, not the place's "
-    "own side; it jumps to a place of its own once the body reaches its side, and the side that "
-    "is touched goes on without a constraint (its margin comes from infinity: no event). In "
-    "ActiveConstraints.margin `is_again = place != numbers[:, None]` mends it",
-)
 @pytest.mark.parametrize("bars", [np.inf, 1e4])
 def test_a_side_that_is_touched_first_by_way_of_another_stays_closed(
     bars: float, reference_finger: Callable[..., Finger], grown: Callable[..., object]
@@ -27,13 +20,6 @@ def test_a_side_that_is_touched_first_by_way_of_another_stays_closed(
     assert gaps.min() >= -1e-9
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a side that gets a nearest place of its own in the middle of a step comes from a "
-    "margin of infinity, and is not taken for an event where its gap is already closed at the end "
-    "of it. In _one_step such cells have to be crossed as well: crossed = np.where((margin < "
-    "-TOLERANCE) & np.isinf(walk.margin), -0.5, crossed) mends it (beside the other remedy)",
-)
 @pytest.mark.parametrize("bars", [np.inf, 1e4])
 def test_a_side_that_comes_near_within_one_step_is_met(
     bars: float, reference_finger: Callable[..., Finger], grown: Callable[..., object]

@@ -24,7 +24,7 @@ def test_a_body_in_a_corner_touches_both_sides(
     """Against the balance of an energy and gaps of the tests' own, with two pushes."""
     patterns, center, radius = TWO_SIDES
     found = grown(reference_finger(3), patterns, center, radius)
-    push, q = found.obstructed.at_places(found.shapes)[:, 0], found.shapes.coordinates[:, 0]
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
     assert (push > 0.0).tolist() == [False, True, True]
     finger = own(reference_finger(3), np.array([False, True, False]), 1.5, center, radius)
     assert finger.gaps(q[:, None])[1:, 0] == pytest.approx(0.0, abs=1e-12)
@@ -39,7 +39,7 @@ def test_a_side_that_is_let_go_of_opens(
     patterns, center, _ = TWO_SIDES
     found = grown(reference_finger(3), patterns, center, 17.2)
     assert found.shapes.is_there.all() and not found.came.resets
-    push, q = found.obstructed.at_places(found.shapes)[:, 0], found.shapes.coordinates[:, 0]
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
     assert (push > 0.0).tolist() == [False, True, False]
     finger = own(reference_finger(3), np.array([False, True, False]), 1.5, center, 17.2)
     assert finger.gaps(q[:, None])[2, 0] > 1e-3
@@ -54,7 +54,7 @@ def test_a_penalty_comes_to_the_same_at_first_order(
     """½ k max(0, −g)², minimized by Newton's method from definitions: errors fall as 1/k."""
     finger = reference_finger(2).changed(wall_compliance=np.array([[walls]]))
     found = grown(finger, ["10"], (20.0, -16.0), 15.0)
-    exact, push = found.shapes.coordinates[:, 0], found.obstructed.at_places(found.shapes)[:, 0]
+    exact, push = found.shapes.coordinates[:, 0], found.obstructed.relabeled(found.shapes).push[:, 0]
     soft = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0)
     off = []
     for k in (1e4, 1e5):
@@ -90,7 +90,7 @@ def test_the_work_of_the_body_is_the_change_of_energy(
     loads = np.array([touch, *(touch + half * (1.0 + place)), 1.0])
     came = approaching.approach(obstructed, start, 0.0 * loads, loads)
     assert came.shapes.is_there.all() and not came.resets
-    push = obstructed.at_places(came.shapes).sum(axis=0)
+    push = obstructed.relabeled(came.shapes).push.sum(axis=0)
     energy = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0).energy(
         came.shapes.coordinates
     )
@@ -158,7 +158,7 @@ def test_soft_bars_balance(
 ) -> None:
     finger = reference_finger(2, bars)
     found = grown(finger, ["10"], (20.0, -16.0), 15.0)
-    push, q = found.obstructed.at_places(found.shapes)[:, 0], found.shapes.coordinates[:, 0]
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
     mine = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0)
     assert push.max() > 0.1
     rest = mine.gradient(mine.energy, q) - push @ mine.gradient(mine.gaps, q)

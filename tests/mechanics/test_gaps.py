@@ -179,7 +179,7 @@ def test_sides_that_lead_to_one_place_are_told_apart_on_request(
     at = bent_shape(coordinates, random_shape, "a corner")
     every = gaps_of(coordinates, at, "a corner")(at)
     assert every.place.ravel().tolist() == [1] * 4, "all lead to the corner, on its first side"
-    for wanted, told in ((None, 0), (2, 2)):
+    for wanted, told in ((None, 1), (2, 2)):
         first = np.arange(4)[:, None] == wanted
         distinct = gaps_of(coordinates, at, "a corner", first)(at)
         own = np.arange(4) == told
