@@ -159,11 +159,11 @@ def _texts(codes: Codes, n_units: int) -> NDArray[np.str_]:
 
 def _joined(
     parts: Sequence[NDArray[np.str_]], is_there: NDArray[np.bool_] | None = None
-) -> NDArray[np.object_]:
+) -> NDArray[np.str_]:
     """Texts of both fingers as one, upper/lower where they differ; empty where nothing is."""
     rows = zip(*(part.tolist() for part in parts), strict=True)
     told = [row[0] if len(set(row)) == 1 else "/".join(word or "–" for word in row) for row in rows]
-    joined = np.array(told, object)
+    joined = np.array(told, str)
     return joined if is_there is None else np.where(is_there, joined, "")
 
 

@@ -54,7 +54,10 @@ def test_a_penalty_comes_to_the_same_at_first_order(
     """½ k max(0, −g)², minimized by Newton's method from definitions: errors fall as 1/k."""
     finger = reference_finger(2).changed(wall_compliance=np.array([[walls]]))
     found = grown(finger, ["10"], (20.0, -16.0), 15.0)
-    exact, push = found.shapes.coordinates[:, 0], found.obstructed.relabeled(found.shapes).push[:, 0]
+    exact, push = (
+        found.shapes.coordinates[:, 0],
+        found.obstructed.relabeled(found.shapes).push[:, 0],
+    )
     soft = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0)
     off = []
     for k in (1e4, 1e5):

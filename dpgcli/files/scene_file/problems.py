@@ -92,7 +92,7 @@ TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
 PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
 MOST_SHOWN = 6  # parts of a list
-WHOLE = (("data",), ("loads",), ("object",))  # sections whose values may be lists
+WHOLE = (("data",), ("loads",))  # sections whose values may be lists
 BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
@@ -145,7 +145,8 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    if path[:1] in WHOLE and error["type"] != "extra_forbidden" and len(path) > 1:
+    is_whole = path[:1] in WHOLE or path[:2] == ("object", objects.PLACE)
+    if is_whole and error["type"] != "extra_forbidden" and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
