@@ -37,7 +37,7 @@ def test_a_tip_that_slips_over_a_body_is_no_grasp(
     grown: Callable[..., object],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Beyond the tip the gap of a body behind the face jumps: the search ends, without an answer."""
+    """Beyond the tip the gap of a body behind the face jumps: the search ends without an answer."""
     searches = []
 
     def counted(*args: object, **options: object) -> object:
