@@ -12,7 +12,8 @@ from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
 from dpgcli.files.layout import NUMBER
-from dpgcli.files.places import Location, in_order, located
+from dpgcli.files.places import Location, in_order, located, shown
+from dpgcli.files.units import stem_and_unit
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -24,6 +25,7 @@ PATTERN_OF = {"ground": "0", "inverted": "1"}
 OF_ONE_UNIT = {UNIT: "pattern", "opening_mm": "opening1_mm", "push_N": "push1_N"}
 CLAMPED = "chamber1_angle_rad"  # the first chamber, whose turn counts as none
 STATION, OFFSET = "first_station_mm", "tip_offset_mm"
+FRAME_STEMS = tuple(stem_and_unit(key)[0] for key in (STATION, OFFSET))
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
@@ -96,7 +98,11 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
     problems = []
     for line, text in sheet.comments:
         key, mark, said = (part.strip() for part in text.partition(":"))
-        if not mark or key not in (STATION, OFFSET):
+        if not mark or stem_and_unit(key)[0] not in FRAME_STEMS:
+            continue
+        if key not in (STATION, OFFSET):
+            place = Location(sheet.file, line)
+            problems.append(located(place, key, f"{STATION} or {OFFSET}, in mm", shown(key)))
             continue
         numbers = said.removeprefix("[").removesuffix("]").split(",")
         if len(numbers) == len(TIP) and all(NUMBER.fullmatch(n.strip()) for n in numbers):
@@ -231,7 +237,6 @@ def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
 
 def _of_one_unit(sheet: Sheet) -> Sheet:
     """A table of one unit, with the names that a table of states has."""
-    names = tuple(OF_ONE_UNIT.get(name, name) for name in sheet.names)
     place = sheet.names.index(UNIT)
     rows = [[*row] for row in sheet.rows]
     problems = []
@@ -242,7 +247,7 @@ def _of_one_unit(sheet: Sheet) -> Sheet:
             problems.append(sheet.problem(line, UNIT, " or ".join(PATTERN_OF), repr(said)))
     if problems:
         raise SpecError(tuple(problems))
-    return replace(sheet, names=names, rows=rows)
+    return replace(sheet.renamed(OF_ONE_UNIT), rows=rows)
 
 
 def _moments(sheet: Sheet, patterns: Sequence[str]) -> Array:
