@@ -70,8 +70,11 @@ def thresholds_alone(pressed: Pressed) -> Thresholds:
 
 
 def _alone(pressed: Pressed) -> tuple[Pressed, tuple[int, int]]:
-    """Fingers of one unit, a lane for each unit and design, and how many of both are different."""
-    finger, volumes = pressed.finger, pressed.volumes
+    """Fingers of one unit, a lane for each unit and design, and how many of both are different.
+
+    The loads of a finger are not those of its units: they have none.
+    """
+    finger, volumes = pressed.finger.unloaded, pressed.volumes
     arrays = {**finger.arrays(), **finger.conditions(), "area": volumes.area}
     shapes = [array.shape for array in arrays.values()]
     n_units, n_designs = np.broadcast_shapes(*shapes)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from dpgcli.actuation.folding import folded
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
-from dpgcli.equilibrium.loaded import LoadedPotential
+from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, Watch, follow
 from dpgcli.equilibrium.potential import Potential
@@ -32,9 +33,10 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
+Loaded = TypeVar("Loaded", bound=LoadedLaw)
+
 TIE = 1e-6  # of the pressure: thresholds as near are not told apart
 LEFT = 0.05  # of a stroke: what has moved further has left its place
-SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 TOLERANCE = 1e-12  # of the forces in play
 LARGEST_RESIDUAL = 1e-9  # of the forces in play: more is no equilibrium
@@ -170,10 +172,15 @@ class Pressed:
         if self.limits is not None:
             peak = np.broadcast_to(self.limits.peak, shapes.inverted.shape)
             law = replace(law, touching=shapes.touching, inverted=shapes.inverted, peak=peak)
+        return self.loaded(law)
+
+    def loaded(self, law: Loaded) -> LoadedPotential[FingerCoordinates, Loaded]:
+        """The energies with domes of a law that changes with a load."""
         bare = self._bare
-        coordinates = bare.coordinates
         scale, stiffness = self.finger.stroke, self.units.holding_stiffness
-        return LoadedPotential(coordinates, bare.terms, coordinates.dome, law, scale, stiffness)
+        return LoadedPotential(
+            bare.coordinates, bare.terms, bare.coordinates.dome, law, scale, stiffness
+        )
 
     def domes(self, pressure: Array, inverted: Flags) -> DomesAt | PushingDomes:
         """The law of the domes under fixed pressures."""

@@ -27,8 +27,10 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     ([[0.0], [0.0]], [0])
     """
     settled = settle(pressed.units, chain_potential, inverted, DEFAULT_TOLERANCE)
-    touching = None if pressed.limits is None else inverted.copy()
     coordinates = settled.equilibrium.coordinates
+    touching, finger = None if pressed.limits is None else inverted.copy(), pressed.finger
+    if touching is not None and finger.is_loaded:  # a gap may be open further than a dome reaches
+        touching &= pressed.extensions(coordinates) <= finger.law.touching(finger.domes).highest
     return Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching), settled
 
 

@@ -1,7 +1,8 @@
 """Snaps: what becomes of fingers where a unit, or a dome that is apart, has lost its place.
 
-They go downhill at that pressure to the next minimum. Where other units are just about to go as
-well, it is up to the steps of the descent which of them go along: these are tied.
+They go downhill at that pressure to the next minimum. Newton's steps lead there where the unit goes
+alone; where they take others along, or others are near to losing their balance, they may be too
+long to tell, and the units are let go slowly instead (`cascades`).
 """
 
 from dataclasses import replace
@@ -9,15 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dpgcli.actuation.cascades import let_go
 from dpgcli.actuation.domes import PushingDomes, kept_places
 from dpgcli.actuation.folding import folded
-from dpgcli.actuation.pressed import LARGEST_RESIDUAL, TOLERANCE, Halt, Halted, Pressed, Shapes
+from dpgcli.actuation.pressed import (
+    LARGEST_RESIDUAL,
+    TIE,
+    TOLERANCE,
+    Halt,
+    Halted,
+    Pressed,
+    Shapes,
+)
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.newton import minimize
 
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
-SHORTER = (0.5, 0.25)  # times the step: descents that a doubtful one is compared with
-NEAR_FOLD = 0.02  # of the stiffness in play: with less left another unit is about to go
+NEAR_FOLD = 0.005  # of the stiffness in play; within `TIE` of a fold 0.002 or less is left
 
 
 class Outcome(NamedTuple):
@@ -37,6 +46,12 @@ class _Rest(NamedTuple):
     shapes: Shapes
     curvature: Array
     is_there: Flags
+
+    def put(self, lanes: Indices, others: "_Rest", taken: Indices) -> None:
+        """Replace some lanes by those at `taken` of others."""
+        self.shapes.put(lanes, others.shapes.take_lanes(taken))
+        self.curvature[lanes] = others.curvature[taken]
+        self.is_there[lanes] = others.is_there[taken]
 
 
 def after(pressed: Pressed, halted: Halted) -> Outcome:
@@ -72,36 +87,39 @@ def after(pressed: Pressed, halted: Halted) -> Outcome:
 
 
 def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:
-    """Minima downhill, and units that go along or not with the length of steps, (unit, batch).
+    """Minima downhill, and units of which the model does not say if they go along, (unit, batch).
 
-    That is looked at where more units go than are tied, or another one is about to.
+    Those that go at pressures larger by `TIE`, or smaller, and not at the others.
     """
-    rest = _relaxed(pressed, start, 1.0)
     units = np.arange(pressed.finger.n_units)[:, None]
+    rest = _relaxed(pressed, start, np.zeros(halted.tied.shape, bool))
     others = (rest.shapes.inverted ^ halted.shapes.inverted) & ~halted.tied & (units != halted.unit)
-    is_doubtful = others.any(axis=0) | (rest.curvature < NEAR_FOLD)
-    doubtful = np.flatnonzero(is_doubtful & rest.is_there)
-    undecided = np.zeros(halted.tied.shape, bool)
+    is_clear = rest.is_there & ~others.any(axis=0) & (rest.curvature >= NEAR_FOLD)
+    doubtful, undecided = np.flatnonzero(~is_clear), np.zeros(halted.tied.shape, bool)
     if len(doubtful):
-        few, begin = pressed.take_lanes(doubtful), start.take_lanes(doubtful)
-        for share in SHORTER:
-            again = _relaxed(few, begin, share)
-            differs = again.shapes.inverted ^ rest.shapes.inverted[:, doubtful]
-            undecided[:, doubtful] |= differs & again.is_there
+        n, three = len(doubtful), np.tile(doubtful, 3)
+        begin = start.take_lanes(three)
+        pressure = begin.pressure * (1.0 + TIE * np.array([0.0, 1.0, -1.0]).repeat(n))
+        gone = (units == halted.unit[three]) | (start.inverted ^ halted.shapes.inverted)[:, three]
+        again = _relaxed(pressed.take_lanes(three), replace(begin, pressure=pressure), gone)
+        here, above, below = again.shapes.inverted.reshape(len(units), 3, n).swapaxes(0, 1)
+        undecided[:, doubtful] = (above ^ here) | (below ^ here)
+        rest.put(doubtful, again, np.arange(n))
     return rest, undecided & (units != halted.unit)
 
 
-def _relaxed(pressed: Pressed, shapes: Shapes, share: float) -> _Rest:
-    """Go downhill from shapes at their pressures to the next minima, by a share of the usual step.
+def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
+    """Go downhill from shapes at their pressures to the next minima, units that are `gone` slowly.
 
     Domes that only push and are pushed out of their places fall back, and the others go on.
     """
     inverted, coordinates = shapes.inverted, shapes.coordinates
     if pressed.limits is not None:
         inverted = kept_places(pressed.limits, shapes.pressure, inverted)
-    step = share * _downhill_step(pressed)
+    slowly, step = gone.any(axis=0), _downhill_step(pressed)
     for _ in range(pressed.finger.n_units + 1):
         law = pressed.domes(shapes.pressure, inverted)
+        coordinates = let_go(pressed, law, coordinates, gone)
         there = minimize(pressed.with_domes(law), coordinates, TOLERANCE, largest_step=step)
         coordinates = there.coordinates
         extension = pressed.extensions(coordinates)
@@ -109,6 +127,7 @@ def _relaxed(pressed: Pressed, shapes: Shapes, share: float) -> _Rest:
             break
         fallen = inverted & (extension <= law.low)
         inverted = inverted & ~fallen
+        gone = fallen & slowly
         if not fallen.any():
             break
     is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)

@@ -28,6 +28,7 @@ from dpgcli.calibration.comparison import compare
 from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Scene
+from dpgcli.errors import Field, UsageError
 from dpgcli.hard_cases.cases import check_law
 from dpgcli.hard_cases.families import repeated
 from dpgcli.mechanics.finger import Finger
@@ -104,8 +105,11 @@ class Bench:
         return self.scene.finger
 
     def check(self) -> None:
-        """Raise UsageError for a law that has no reference, and what makes no sense."""
+        """Raise UsageError for a law that has no reference, loads, and what makes no sense."""
         check_law(self.finger)
+        if self.finger.is_loaded:
+            what = "the methods that are compared with know no loads: take "
+            raise UsageError(what, Field("setting"), " loads=null")
         check_exactness(DEFAULT_TOLERANCE, self.target_error)
         for name in self.keep:
             check_ablation(self.scene, name, self.target_error)

@@ -93,6 +93,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "method": plan.method.value,
         "formulation": plan.request.formulation,
         "terms": list(plan.terms),
+        "loads": _loads(plan),
         "pressure_lines": plan.scene.pressure and plan.scene.pressure.units_by_line,
         "unknowns_per_solve": plan.unknowns,
         "n_unit_solves": plan.n_unit_solves,
@@ -159,6 +160,7 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         "",
         "Kept",
         f"  energy terms    {', '.join(plan.terms)} ({plan.scene.finger.law.description})",
+        *_load_lines(plan),
         *_pressure_lines(plan),
         f"  unknowns        {plan.unknowns} a finger, {plan.request.formulation} coordinates",
         f"  states          {plan.n_states:,} of {2**plan.n_units:,}, method: {plan.method}",
@@ -187,6 +189,36 @@ def _lines(name: str, plan: "Plan") -> list[str]:
         f"  {_bound(plan)}",
         f"  {expected(plan)}",
     ]
+
+
+def _loads(plan: "Plan") -> dict[str, Any] | None:
+    """The dead loads of the finger, in its own frame; None where there are none."""
+    finger = plan.scene.finger
+    if not finger.is_loaded:
+        return None
+    return {
+        "tip_force_N": [finger.tip_force_x.item(), finger.tip_force_y.item()],
+        "tip_moment_N_mm": 0.0 - finger.end_moment.item(),
+        "unit_weight_N": finger.unit_weight[:, 0].tolist(),
+        "gravity_direction": [finger.gravity_x.item(), finger.gravity_y.item()],
+    }
+
+
+def _load_lines(plan: "Plan") -> Iterator[str]:
+    """The dead loads that act, in the finger's frame."""
+    loads = _loads(plan)
+    if loads is None:
+        return
+    parts = []
+    if any(loads["tip_force_N"]):
+        parts.append("tip force ({:.4g}, {:.4g}) N".format(*loads["tip_force_N"]))
+    if loads["tip_moment_N_mm"]:
+        parts.append(f"couple on the end {loads['tip_moment_N_mm']:.4g} N mm")
+    if any(loads["unit_weight_N"]):
+        weights = "/".join(f"{weight:.4g}" for weight in loads["unit_weight_N"])
+        way = "({:.4g}, {:.4g})".format(*loads["gravity_direction"])
+        parts.append(f"weight of {weights} N a unit along {way}, on its chamber's middle (assumed)")
+    yield f"  loads           {'; '.join(parts)}"
 
 
 def _pressure_lines(plan: "Plan") -> Iterator[str]:

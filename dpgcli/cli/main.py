@@ -13,6 +13,8 @@ from dpgcli.cli.exits import run_and_exit
 # Small matrices gain nothing from threads; set before NumPy is loaded.
 for _library in ("OPENBLAS", "MKL", "OMP"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# Arrow's own allocators give back memory that is wanted again at once: fresh pages for each block.
+os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 # Pydantic would look for plugins among everything that is installed.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 

@@ -14,6 +14,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.geometry import chamber_width
+from dpgcli.design.loads import FORCES, MASS, MOMENT, GivenLoads
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.text import KeyPath, dotted
 
@@ -32,15 +33,20 @@ BOUNDS = {  # where they are not those of a length
     WALL_COMPLIANCE: (0.0, LARGEST),
     HINGE_COUPLING: (-LARGEST, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
+    **dict.fromkeys((*FORCES, MOMENT), (-LARGEST, LARGEST)),
+    MASS: (0.0, LARGEST),
 }
 SUFFIXES = {  # units in the names of keys
     "_N_mm_per_rad": "N mm/rad",
     "_N_per_mm": "N/mm",
     "_mm_per_N": "mm/N",
+    "_N_mm": "N mm",
     "_mm2": "mm²",
     "_mm": "mm",
     "_MPa": "MPa",
     "_deg": "°",
+    "_N": "N",
+    "_g": "g",
 }
 Sizes = Mapping[str, Array]
 LEAVE_ONE_OUT = "leave_one_out"  # instead of a model error: that of the calibration
@@ -104,7 +110,7 @@ class Design:
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
     `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
-    `pressure` is None where the spec says nothing of it.
+    `pressure` and `loads` are None where the spec says nothing of them.
     """
 
     units: int
@@ -119,6 +125,7 @@ class Design:
     model_error: float | str | None = None
     pressure: GivenPressure | None = None
     hinge_coupling: Array | None = None
+    loads: GivenLoads | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -140,6 +147,8 @@ class Design:
         if parents[0] == "pressure":
             given = self.pressure or GivenPressure()
             return replace(self, pressure=given.with_value(path[1:], column))
+        if parents == ["loads"]:
+            return replace(self, loads=(self.loads or GivenLoads()).with_value(key, column))
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
         if path == ["finger", HINGE_COUPLING]:

@@ -101,6 +101,11 @@ class Case:
         return bool(walls) and all(of_design(w.numbers, self.place) > 0.0 for w in walls)
 
     @property
+    def is_loaded(self) -> bool:
+        """Whether it bears any dead load."""
+        return self.design.loads is not None and self.design.loads.act(self.place)
+
+    @property
     def is_pushed_by_curve(self) -> bool:
         """Whether domes only push, by a curve of their own."""
         return not self.pulls and self.domes.calibration is not None

@@ -25,6 +25,7 @@ from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.fitted import from_file
 from dpgcli.design.footing import Case, kinds
 from dpgcli.design.lines import history_of, line_issues, line_of, units_by_line
+from dpgcli.design.loads import check_across, load_issues
 from dpgcli.design.model_error import model_error_of
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
@@ -53,7 +54,7 @@ from dpgcli.design.trust import trusts_of, warnings_of
 from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, uncertainty_of
 from dpgcli.design.values import value_of
 from dpgcli.design.volumes import swept_shape
-from dpgcli.mechanics.finger import KEYS, Finger
+from dpgcli.mechanics.finger import KEYS, LOADS, Finger
 from dpgcli.text import KeyPath
 
 NEARLY_RIGID = 1.0e4  # N/mm; the study names no number
@@ -150,7 +151,10 @@ class Resolution:
 
     def kinds_of_trust(self, designs: Indices) -> list[tuple[tuple[Trust, ...], int]]:
         """What outputs of some designs, none of them wrong, rest on, and how many of them."""
-        found = kinds({**_each(self.values), **_each(self.answers)}, designs)
+        values = {**_each(self.values), **_each(self.answers)}
+        are_loaded = self._are_loaded(designs)
+        parts = designs[~are_loaded], designs[are_loaded]
+        found = [pair for part in parts if len(part) for pair in kinds(values, part)]
         return [(trusts_of(self._case(place)), count) for place, count in found]
 
     def _case(self, place: int) -> Case:
@@ -162,16 +166,30 @@ class Resolution:
         Bars and walls are rigid in all or in none; sources, uncertainty and chambers are left out.
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
+        arrays |= self._loads(designs)
         finger = Finger(self.design.units, **arrays, law=self.domes.law)
         layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
         thickness = None if layer is None else _picked(layer, designs)
         gripper, pressure = self._gripper(designs), self._pressure(designs)
         return Scene(finger, (), gripper, thickness, pressure=pressure)
 
+    def _loads(self, designs: Indices) -> dict[str, Array]:
+        """The dead loads by name; none where the spec says nothing of them."""
+        if self.design.loads is None:
+            return {}
+        loads = self.design.loads.arrays(self._mounting_angle).items()
+        return {name: _picked(values, designs) for name, values in loads}
+
+    def _are_loaded(self, designs: Indices) -> Flags:
+        """Which designs bear any load."""
+        none = np.zeros((1, len(designs)))
+        loads = self._loads(designs)
+        return np.asarray(np.any([loads.get(name, none).any(axis=0) for name in LOADS], axis=0))
+
     def alike(self, designs: Indices) -> list[Indices]:
         """Some of the designs, none of them wrong, apart by which kinds of energy they have.
 
-        Bars or all walls may be rigid, hinges turn each other or not.
+        Bars or all walls may be rigid, hinges turn each other or not, loads act or not.
         """
         if not len(designs):
             return []
@@ -180,9 +198,8 @@ class Resolution:
             kind += 2 * (_picked(self.lattice["wall_compliance"], designs) > 0.0).any(axis=0)
         if "hinge_coupling" in self.lattice:
             kind += 4 * (_picked(self.lattice["hinge_coupling"], designs)[0] != 0.0)
-        return [
-            part for part in (designs[kind == k] for k in (1, 0, 3, 2, 5, 4, 7, 6)) if len(part)
-        ]
+        kind += 8 * self._are_loaded(designs)
+        return [part for part in (designs[kind == k ^ 1] for k in range(16)) if len(part)]
 
     def _chambers(self) -> Chambers:
         """Sizes of the chambers of the first design."""
@@ -196,8 +213,13 @@ class Resolution:
         given = self.design.gripper
         if not given:
             return None
-        angle = np.radians(given.get("mounting_angle_deg", np.zeros(1)))
-        return Gripper(_picked(given["base_spacing_mm"], designs), _picked(angle, designs))
+        angle = _picked(self._mounting_angle, designs)
+        return Gripper(_picked(given["base_spacing_mm"], designs), angle)
+
+    @property
+    def _mounting_angle(self) -> Array:
+        """The tilt of the fingers of a gripper, rad; 0 of a finger by itself."""
+        return np.asarray(np.radians(self.design.gripper.get("mounting_angle_deg", np.zeros(1))))
 
     def _pressure(self, designs: Indices) -> Pressure | None:
         given, units = self.design.pressure, self.design.units
@@ -264,6 +286,11 @@ def resolve(design: Design) -> Resolution:
     check_widths(design.finger.geometry, problems)
     for issue in line_issues(design.pressure, design.units) if design.pressure else ():
         problems.everywhere(issue)
+    if design.loads is not None:
+        for issue in load_issues(design.loads, design.units):
+            problems.everywhere(issue)
+        if design.gripper:
+            check_across(design.loads, problems)
     domes = domes_of(design.law, design.calibrations)
     if isinstance(domes, Issue):
         problems.everywhere(domes)

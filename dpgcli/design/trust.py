@@ -37,6 +37,7 @@ SAY_SNAP = "say pressure.snap_pressure_MPa, or effective_area_mm2, as measured"
 BRIDGED_RESET = "reset pressures are assumed: nothing is sampled where domes come back"
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
+UNDER_LOAD = "loads move it by stiffness"
 WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
 DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
 
@@ -44,7 +45,7 @@ DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
 def trusts_of(case: Case) -> tuple[Trust, ...]:
     """What each output of a design rests on, in the order of `Output`."""
     return (
-        _shapes(case),
+        _under_load(case) if case.is_loaded else _shapes(case),
         _energies(case),
         _barriers(case),
         _ground(case),
@@ -73,6 +74,17 @@ def _shapes(case: Case) -> Trust:
     lead = gravest if gravest.basis is Basis.EXTRAPOLATED else lead
     error = shapes_in(model_error_of(case))
     return _checked(Trust(Output.SHAPES, lead.basis, error, str(lead)), lead)
+
+
+def _under_load(case: Case) -> Trust:
+    """Shapes under dead loads: as good as the stiffness of the units that bear them."""
+    free, stiffness = _shapes(case), [_ground(case), _inverted(case)]
+    error = f"{free.known_error}; under loads as the stiffness of units"
+    doubted = next((each for each in stiffness if each.doubt), None)
+    if free.doubt or doubted is None:
+        return replace(free, known_error=error)
+    doubt = f"{UNDER_LOAD}: {doubted.doubt}"
+    return replace(free, known_error=error, doubt=doubt, instead=doubted.instead)
 
 
 def _energies(case: Case) -> Trust:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Indices
 
 Pair = tuple[int, int]
-Values = TypeVar("Values", bound=NDArray[Any])
+LaneArray = TypeVar("LaneArray", bound=NDArray[Any])
 
 
 class Response(NamedTuple):
@@ -155,10 +155,10 @@ class Coordinates(Protocol):
         """The coordinates after a step: their sum, or a curved update that strains bars less."""
 
 
-def take_lanes(values: Values, index: Indices) -> Values:
+def take_lanes(values: LaneArray, index: Indices) -> LaneArray:
     """The lanes of an array (…, batch) at `index`; an array with one lane for all stays.
 
     >>> take_lanes(np.array([[1.0, 2.0, 3.0]]), np.array([2, 0]))
     array([[3., 1.]])
     """
-    return values if values.shape[-1] == 1 else cast("Values", np.take(values, index, axis=-1))
+    return values if values.shape[-1] == 1 else cast("LaneArray", np.take(values, index, axis=-1))

@@ -1,10 +1,11 @@
-"""Potentials that change with a load: fixed terms, and one law on a measure that knows the load.
+"""Potentials that change with a load: fixed terms, one law on a measure that may know the load, and
+terms that grow with it.
 
 What a path of equilibria needs beside gradient and Hessian is ∂g/∂λ, and scalars by which it can be
-followed where the load turns back: those of the measure that is loaded.
+followed where the load turns back: those of the measure.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
@@ -50,7 +51,7 @@ class LoadedLaw(Protocol):
 class Holding:
     """A law, and a spring of stiffness k towards a target on the same scalar.
 
-    `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,).
+    `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,) or by cell.
     """
 
     law: ScalarLaw
@@ -70,6 +71,45 @@ class Holding:
         return type(self)(self.law.take_lanes(index), *parts)
 
 
+@dataclass(frozen=True)
+class Unchanged:
+    """A law that knows no load (`LoadedLaw`)."""
+
+    law: ScalarLaw
+    is_smooth = True  # what bends more is for short steps
+
+    def at(self, load: Array) -> ScalarLaw:
+        """The law."""
+        return self.law
+
+    def rate(self, scalar: Array, load: Array) -> Array:
+        """Zero."""
+        return np.zeros_like(scalar)
+
+    def margin(self, scalar: Array, load: Array) -> None:
+        """No other law begins."""
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same for some lanes of the batch."""
+        return type(self)(self.law.take_lanes(index))
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share, (batch,), of a law."""
+
+    law: ScalarLaw
+    share: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness, each by the share."""
+        return Response(*(self.share * part for part in self.law(scalar)))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same for some lanes of the batch."""
+        return type(self)(self.law.take_lanes(index), take_lanes(self.share, index))
+
+
 class Linearized(NamedTuple):
     """Gradient, band of the Hessian, ∂g/∂λ and the loaded measure at some coordinates."""
 
@@ -83,6 +123,8 @@ class Linearized(NamedTuple):
 class LoadedPotential(Generic[System, Law]):
     """Potentials by a load: `terms` that do not feel it, and a `measure` under a loaded `law`.
 
+    Of the terms in `growing` the load is the share that acts.
+
     `scale` (cell, 1 or batch) is the measure of a large change of each scalar, `stiffness` (same
     shape) that of a spring which keeps a cell where it is, however its own law softens.
     """
@@ -93,6 +135,7 @@ class LoadedPotential(Generic[System, Law]):
     law: Law
     scale: Array
     stiffness: Array
+    growing: tuple[Term, ...] = ()
 
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
         """The same potential for some lanes of the batch."""
@@ -103,18 +146,23 @@ class LoadedPotential(Generic[System, Law]):
             self.law.take_lanes(index),
             take_lanes(self.scale, index),
             take_lanes(self.stiffness, index),
+            tuple(term.take_lanes(index) for term in self.growing),
         )
 
     def at(self, load: Array) -> Potential[System]:
         """The potential under a load, (batch,)."""
-        return self._with(self.law.at(load))
+        return self._with(self.law.at(load), load)
 
     def held(self, load: Array, stiffness: Array, target: Array) -> Potential[System]:
         """The same, with springs of some stiffness (cell, batch) towards a target (batch,)."""
-        return self._with(Holding(self.law.at(load), stiffness, target))
+        return self._with(Holding(self.law.at(load), stiffness, target), load)
 
-    def _with(self, law: ScalarLaw) -> Potential[System]:
-        return Potential(self.coordinates, (*self.terms, Term("loaded", self.measure, law)))
+    def _with(self, law: ScalarLaw, load: Array) -> Potential[System]:
+        loaded = Term("loaded", self.measure, law)
+        return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load)))
+
+    def _grown(self, load: Array) -> tuple[Term, ...]:
+        return tuple(replace(term, law=Share(term.law, load)) for term in self.growing)
 
     @property
     def column_depths(self) -> tuple[int, ...]:
@@ -127,7 +175,7 @@ class LoadedPotential(Generic[System, Law]):
         """Derivatives at coordinates, (size, batch), with cells held as in `held`."""
         gradient = np.zeros_like(coordinates)
         hessian = np.zeros((depth + 1, *coordinates.shape))
-        for term in self.terms:
+        for term in (*self.terms, *self._grown(load)):
             measured = term.measure(coordinates)
             response = term.law(measured.value)
             assemble(term.measure.rows, measured, response, gradient, hessian)
@@ -135,12 +183,18 @@ class LoadedPotential(Generic[System, Law]):
         law = Holding(self.law.at(load), stiffness, target)
         assemble(self.measure.rows, measured, law(measured.value), gradient, hessian)
         rate = spread(self.measure.rows, measured, self.law.rate(measured.value, load), gradient)
+        for term in self.growing:
+            at = term.measure(coordinates)
+            rate += spread(term.measure.rows, at, term.law(at.value).force, gradient)
         return Linearized(gradient, hessian, rate, measured)
 
 
 def spread(rows: tuple[Row, ...], measured: Measured, weights: Array, like: Array) -> Array:
     """Σ w ∇q over cells, (size, batch), for weights (cell, batch)."""
     result = np.zeros_like(like)
+    if not measured.gradient:
+        add(result, rows[0], weights)
+        return result
     for row, slope in zip(rows, measured.gradient, strict=True):
         add(result, row, weights * slope)
     return result

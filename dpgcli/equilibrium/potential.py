@@ -115,6 +115,9 @@ def assemble(
         add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
         return
     force = response.force
+    if q.outer is None and not response.stiffness.any():
+        _assemble_load(rows, q, force, gradient, hessian)
+        return
     stiff = [response.stiffness * slope for slope in q.gradient]
     across, turned = q.outer.vector if q.outer else (), []
     if q.outer:
@@ -133,6 +136,18 @@ def assemble(
             if (first, second) in q.entries:
                 entry += np.multiply(force, q.entries[first, second], out=part)
             add(hessian[depth], rows[first], entry)
+
+
+def _assemble_load(
+    rows: tuple[Row, ...], q: Measured, force: Array, gradient: Array, hessian: Array
+) -> None:
+    """The same of a law without stiffness: only what bends counts."""
+    for row, slope in zip(rows, q.gradient, strict=True):
+        add(gradient, row, force * slope)
+    for (first, second), bend in q.entries.items():
+        depth = rows[second].offset - rows[first].offset
+        if depth < len(hessian):
+            add(hessian[depth], rows[first], force * bend)
 
 
 def add(target: Array, row: Row, values: Array) -> None:

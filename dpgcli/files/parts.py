@@ -63,7 +63,8 @@ def write_part(
         {name: pa.list_(pa.struct(list(schema(c)))) for name, c in zip(LISTS, both, strict=True)}
     )
     n_states = 0
-    packed = pa.ipc.IpcWriteOptions(compression="lz4")
+    # every core has a worker: threads of this one would wait for each other
+    packed = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
     with pa.ipc.new_file(sink, described, options=packed) as writer:
         for block in blocks:
             states, designs = (record_batch(*table) for table in zip(both, block, strict=True))

@@ -134,10 +134,10 @@ def _hash(digest: Any, column: Any) -> None:
     buffers, start, stop = column.buffers(), column.offset, column.offset + len(column)
     if pa.types.is_string(column.type):
         ends = np.frombuffer(buffers[1], np.int32)[start : stop + 1]
-        digest.update(np.diff(ends).tobytes())
+        digest.update(np.diff(ends))
         digest.update(memoryview(buffers[2])[ends[0] : ends[-1]] if len(column) else b"")
     elif pa.types.is_boolean(column.type):
         bits = np.unpackbits(np.frombuffer(buffers[1], np.uint8), bitorder="little")
-        digest.update(bits[start:stop].tobytes())
+        digest.update(bits[start:stop])
     else:
-        digest.update(np.frombuffer(buffers[1], np.uint64)[start:stop].tobytes())
+        digest.update(np.frombuffer(buffers[1], np.uint64)[start:stop])

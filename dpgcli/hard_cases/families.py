@@ -12,6 +12,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
+from dpgcli.states.loading import grown
 from dpgcli.states.margins import last_where, limits, margins
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.settle import settle
@@ -31,6 +32,14 @@ NEARLY_EQUAL = (1e-3, 3e-6, 1e-6, 1e-9)  # thresholds of two units, relative
 PRESSED_DISTANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)  # of α from its limit
 PRESSED_WALLS = (1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3)  # c_w k_b
 PRESSED_COUPLINGS = (-0.3, 0.05, 0.49)  # κ/k_θ
+LOADED_UNITS = 3
+LOADED_RATIOS = (1.0, 1e3, 1e6, 1e12, 1e15)
+DEAD_LOADS = {  # N, N mm and N a unit along +y, each more than an inverted unit bears
+    "tip force": {"tip_force_x": 1.0, "tip_force_y": 4.0},
+    "couple": {"end_moment": -80.0},
+    "weight": {"unit_weight": 4.0},
+}
+BELOW_RESET = (0.5, 1e-3, 1e-9, -1e-6)  # of the load that resets a unit
 CROSSED_RATIOS = (0.1, 10.0, 1e4, 1e8, 1e12, 1e15)  # of k_L and k_b
 FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's opening
     "straight": ((0.0, 0.0), "0"),
@@ -311,6 +320,31 @@ def _coupling(base: Finger) -> Iterator[Variant]:
             yield from _both(f"{label}, walls", changed(stiff, wall_compliance=softness))
 
 
+def _loads(base: Finger) -> Iterator[Variant]:
+    """Dead loads up to just below the one that resets a unit, and beyond it."""
+    finger = changed(repeated(base, LOADED_UNITS), gravity_y=1.0)
+    fingers = {f"k_L/k_b = {ratio:g}": _with_bars(finger, ratio) for ratio in LOADED_RATIOS}
+    inverted = "1" * LOADED_UNITS
+    for bars, unloaded in {**fingers, "k_L = ∞": rigid(finger)}.items():
+        for words, load in DEAD_LOADS.items():
+            largest = _share_held(changed(unloaded, **load))
+            for below in BELOW_RESET if np.isfinite(largest) else ():
+                share = largest * (1.0 - below)
+                loaded = changed(unloaded, **{name: share * value for name, value in load.items()})
+                side = f"{abs(below):g} {'below' if below > 0.0 else 'beyond'} its reset"
+                yield Variant(f"{words}, {side}, {bars}", loaded, (inverted,))
+
+
+def _share_held(finger: Finger) -> float:
+    """The share of its loads at which the first inverted unit resets; NaN where none does."""
+    inverted = np.ones((finger.n_units, 1), bool)
+    free = settle(UnitSolutions.of(finger.unloaded), chain_potential, inverted, DEFAULT_TOLERANCE)
+    if free.status[0] != Status.STABLE:
+        return np.nan
+    start = free.equilibrium.coordinates
+    return float(grown(UnitSolutions.of(finger), chain_potential, inverted, start).share[0])
+
+
 def _mirror(base: Finger) -> Iterator[Variant]:
     """One unit from impossible shapes, each next to a minimum of the equations."""
     unit = base.with_units([0])
@@ -386,6 +420,7 @@ FAMILIES = (
     Family("crossed", _crossed),  # k_L, the distance to the fold, units and grading at once
     Family("walls", _walls),  # c_w k_b from 1e-9 to 1e6, of all units or one
     Family("coupling", _coupling),  # κ/k_θ from −0.499 to 0.4999999
+    Family("loads", _loads),  # forces, couples and weights up to those that reset a unit
     Family("pressure", _pressure),  # thresholds of pressure, at the ends of what there is
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

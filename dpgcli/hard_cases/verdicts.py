@@ -84,6 +84,7 @@ def scaled(finger: Finger, scale: float) -> Finger:
     changes = {name: arrays[name] * scale for name in lengths}
     changes |= {name: arrays[name] / scale for name in ("bistable_stiffness", "linear_stiffness")}
     changes["wall_compliance"] = arrays["wall_compliance"] * scale
+    changes["end_moment"] = finger.end_moment * scale
     return finger.changed(**changes)
 
 

@@ -7,7 +7,7 @@ angles open the dome side. Stiff bars sit on the diagonal of the Hessian, which 
 keeps its digits at any k_L (our derivation).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,7 +59,12 @@ class Chain:
     def position(self, axis: int) -> Position:
         """The tip's x (axis 0) or y (axis 1), mm."""
         finger = self.finger
-        return Position(finger.n_units, finger.segment_length, finger.is_rigid, axis)
+        lengths = finger.segment_length, finger.segment_height
+        return Position(finger.n_units, *lengths, finger.is_rigid, axis)
+
+    def center(self, axis: int, shares: Array) -> Position:
+        """The x or y of the center of the tops by their shares, mm."""
+        return replace(self.position(axis), shares=shares)
 
     def _rowwise(self, length: Array, angle: Array) -> Array:
         """Spread one value for lengths and one for angles over the coordinates."""

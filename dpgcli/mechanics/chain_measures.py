@@ -2,16 +2,18 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Self
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
-from dpgcli.equilibrium.contracts import Measured, Outer, OwnCoordinate, Row, take_lanes
+from dpgcli.equilibrium.contracts import Measured, Outer, OwnCoordinate, Pair, Row, take_lanes
 from dpgcli.mechanics.chain_geometry import cells, internal, pose_of
 from dpgcli.mechanics.finger import Finger
 
 RIGID, ELASTIC = ("a", "b"), ("e", "a", "b", "s")
+FROM_BASE = ("a", "e", "b", "s")  # what each of them moves lies beyond it
 
 
 def own(finger: Finger, name: str) -> OwnCoordinate:
@@ -83,52 +85,85 @@ class Opening:
 
 @dataclass(frozen=True)
 class Position:
-    """The tip's x or y, mm, by all corners and chords: one cell.
+    """x or y of the tip, or of the center of the tops T_i by their `shares` (unit, 1 or batch).
 
-    A corner turns all that lies beyond it by −1 about its station: with R that turn and r the
-    tip as seen from the station, ∂/∂θ = R r, ∂²/∂θ_k ∂θ_l = R² r_l = −r_l for l at or beyond k,
-    and a chord that lies beyond k has its direction u turned, ∂²/∂θ_k ∂e = R u (our derivation).
+    In mm, by all corners and bars: one cell. Each coordinate moves all that lies beyond it; from
+    the base on they are a, e, b and s of every unit. With w the shares of what lies beyond,
+    M = Σ w p and W = Σ w of it, and R a turn by −1: ∂/∂θ = R (M − W B) for a corner at station B,
+    ∂/∂e = W u along the chord and ∂/∂s = w n along the strut. A corner turns the slope of each
+    coordinate beyond it, ∂²/∂θ ∂q = R ∂/∂q; what follows a bar only shifts (our derivation).
     """
 
     n_units: int
     length: Array
+    height: Array
     is_rigid: bool
     axis: int
+    shares: Array | None = None
     n_cells: int = 1
 
     @cached_property
+    def _letters(self) -> tuple[str, ...]:
+        """The coordinates of a unit that it is by, from the lowest row on."""
+        return RIGID if self.is_rigid else ELASTIC[:3] if self.shares is None else ELASTIC
+
+    @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Rows of e, a and b of every unit, or of a and b."""
-        step, used = (2, (0, 1)) if self.is_rigid else (4, (0, 1, 2))
-        return tuple(Row(1, step * unit + k) for unit in range(self.n_units) for k in used)
+        """Rows of a and b of every unit, or of e, a, b and perhaps s."""
+        step = len(RIGID if self.is_rigid else ELASTIC)
+        places = range(len(self._letters))
+        return tuple(Row(1, step * unit + k) for unit in range(self.n_units) for k in places)
+
+    @cached_property
+    def _bent(self) -> tuple[tuple[Pair, int], ...]:
+        """Pairs of rows whose first, from the base on, is a corner; and the place of the other."""
+        names = [(unit, name) for unit in range(self.n_units) for name in self._letters]
+        ranks = [(unit, FROM_BASE.index(name)) for unit, name in names]
+        found = []
+        for pair in combinations_with_replacement(range(len(names)), 2):
+            before, beyond = sorted(pair, key=ranks.__getitem__)
+            if names[before][1] in RIGID:
+                found.append((pair, beyond))
+        return tuple(found)
 
     def __call__(self, coordinates: Array) -> Measured:
         """x or y with its derivatives, (1, batch)."""
-        pose = pose_of(internal(coordinates, self.is_rigid), self.length)
-        stations = np.stack((pose.x, pose.y))
-        tip = stations[:, -1:]
-        away = tip - np.concatenate((np.zeros_like(tip), stations), axis=1)  # from B_0 … B_n
+        shape = internal(coordinates, self.is_rigid)
+        pose = pose_of(shape, self.length)
+        bases = np.stack((pose.x, pose.y))
         chord = np.stack((pose.chord_cos, pose.chord_sin))
-        parts: list[tuple[bool, int, Array]] = []  # is it a corner, at which station, ∂/∂
-        for unit in range(self.n_units):
-            if not self.is_rigid:
-                parts.append((False, unit, chord[:, unit]))
-            parts += [(True, at, _turned(away[:, at])) for at in (unit, unit + 1)]
-        entries = {}
-        for second, (is_corner, at, slope) in enumerate(parts):
-            for first, (is_first_corner, first_at, first_slope) in enumerate(parts[: second + 1]):
-                if is_first_corner and first_at <= at:
-                    entries[first, second] = _turned(slope)[self.axis][None]
-                elif is_corner and at <= first_at:
-                    entries[first, second] = _turned(first_slope)[self.axis][None]
-        slopes = tuple(slope[self.axis][None] for _, _, slope in parts)
-        return Measured(tip[self.axis], slopes, None, entries)
+        normal = np.stack((-np.sin(pose.strut_angle), np.cos(pose.strut_angle)))
+        points, shares = bases, np.zeros((self.n_units, 1))
+        if self.shares is None:
+            shares[-1] = 1.0
+        else:
+            points, shares = bases + (self.height + shape.strut) * normal, shares + self.shares
+        weighed, share = _beyond(shares * points), _beyond(shares)
+        before = np.concatenate((np.zeros_like(bases[:, :1]), bases[:, :-1]), axis=1)
+        slopes = {
+            "e": share * chord,
+            "a": _turned(weighed - share * before),
+            "b": _turned(weighed - share * bases),
+            "s": shares * normal,
+        }
+        by_row = [slopes[name][:, u] for u in range(self.n_units) for name in self._letters]
+        bends = [_turned(slope)[self.axis][None] for slope in by_row]
+        entries = {pair: bends[beyond] for pair, beyond in self._bent}
+        gradient = tuple(slope[self.axis][None] for slope in by_row)
+        return Measured(weighed[self.axis, :1], gradient, None, entries)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same measure for some lanes of the batch."""
-        return replace(self, length=take_lanes(self.length, index))
+        length, height = (take_lanes(part, index) for part in (self.length, self.height))
+        shares = None if self.shares is None else take_lanes(self.shares, index)
+        return replace(self, length=length, height=height, shares=shares)
+
+
+def _beyond(values: Array) -> Array:
+    """Sums over each unit and all that lie beyond it; units are on the axis before the last."""
+    return np.asarray(np.flip(np.cumsum(np.flip(values, -2), axis=-2), -2))
 
 
 def _turned(vector: Array) -> Array:
-    """A vector (2, batch) turned by −90°."""
+    """A vector, by its first axis, turned by −90°."""
     return np.stack((vector[1], -vector[0]))

@@ -113,6 +113,9 @@ class FingerCoordinates(Coordinates, Protocol):
     def position(self, axis: int) -> Measure:
         """The tip's x (axis 0) or y (axis 1), the last limiting-layer node, mm: one cell."""
 
+    def center(self, axis: int, shares: Array) -> Measure:
+        """The x or y of the center of the tops T_i by their shares (unit, 1 or batch), mm."""
+
     def of_shape(self, shape: Internal) -> Array:
         """The coordinates of a shape, (size, batch)."""
 

@@ -22,6 +22,7 @@ ARRAYS = (
     "hinge_coupling",
 )
 SHARED = ("segment_height", "linear_stiffness", "hinge_coupling")  # by all units of a finger
+LOADS = ("end_moment", "tip_force_x", "tip_force_y", "unit_weight")  # none where all are zero
 
 KEYS = {  # names with units, as files say them
     "segment_length_mm": "segment_length",
@@ -57,8 +58,11 @@ class Finger:
     `acting` (unit, design) is the state of the domes, given beside the energy: 1 where a dome acts
     on its neighbor, 0 where it does not, a dome that only pushes and stands in its ground state.
     So is `branch`, the stretch of its curve that a dome which only pushes is on; see `laws.Dome`.
-    `end_moment` (1, design), N mm, is a couple on the end phalanx; a positive one opens the gaps.
     `law` says how the domes answer.
+
+    Dead loads: `end_moment` (1, design), N mm, is a couple on the end phalanx, a positive one opens
+    the gaps; `tip_force_x` and `tip_force_y` (1, design), N, act on the tip; `unit_weight` (unit,
+    design), N, acts on each unit's chamber along `gravity_x` and `gravity_y` (1, design).
     """
 
     n_units: int
@@ -75,6 +79,11 @@ class Finger:
     acting: Array = field(default_factory=lambda: np.ones((1, 1)))
     branch: Array = field(default_factory=lambda: np.zeros((1, 1)))
     end_moment: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    tip_force_x: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    tip_force_y: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    unit_weight: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    gravity_x: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    gravity_y: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: DomeLaw = PUBLISHED
 
     def __post_init__(self) -> None:
@@ -93,7 +102,22 @@ class Finger:
 
     def conditions(self) -> dict[str, Array]:
         """What a finger of these arrays is under, by name."""
-        return {"acting": self.acting, "branch": self.branch, "end_moment": self.end_moment}
+        names = ("acting", "branch", *LOADS, "gravity_x", "gravity_y")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether any dead load acts."""
+        return any(getattr(self, name).any() for name in LOADS)
+
+    @property
+    def unloaded(self) -> "Finger":
+        """The finger without dead loads.
+
+        >>> uniform_finger(1, **STUDY).changed(end_moment=np.ones((1, 1))).unloaded.is_loaded
+        False
+        """
+        return self.changed(**dict.fromkeys(LOADS, np.zeros((1, 1)))) if self.is_loaded else self
 
     @property
     def n_designs(self) -> int:

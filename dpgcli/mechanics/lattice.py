@@ -29,7 +29,7 @@ from dpgcli.mechanics.lattice_geometry import (
     swung,
     vectors,
 )
-from dpgcli.mechanics.lattice_measures import Corner, Extension
+from dpgcli.mechanics.lattice_measures import Center, Corner, Extension
 
 FINEST_TOLERANCE = 1e-12  # the relative residual that `Lattice.gradient_scale` keeps in reach
 ROUNDING_STEPS = 2.0  # of k_L ε (finger's length); see `Lattice.rounding_floor`
@@ -87,6 +87,10 @@ class Lattice:
     def position(self, axis: int) -> OwnCoordinate:
         """The tip's x (axis 0) or y (axis 1), mm: a coordinate."""
         return OwnCoordinate(Row(self.size, self.size - 4 + axis), 1)
+
+    def center(self, axis: int, shares: Array) -> Center:
+        """The x or y of the center of the tops by their shares, mm."""
+        return Center(shares, axis, self.finger.n_units)
 
     def _vectors(self, coordinates: Array) -> Vectors:
         return vectors(coordinates, self.finger.segment_height)

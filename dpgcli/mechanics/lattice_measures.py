@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import Measured, Outer, Row, take_lanes
 from dpgcli.mechanics.lattice_geometry import Vectors, corners, dot, extension, left, vectors
 
@@ -125,3 +125,28 @@ class Corner:
     def take_lanes(self, index: Indices) -> Self:
         """The same measure for some lanes of the batch."""
         return replace(self, height=take_lanes(self.height, index))
+
+
+@dataclass(frozen=True)
+class Center:
+    """x or y of the center of the tops T_i by their `shares` (unit, 1 or batch), mm: one cell."""
+
+    shares: Array
+    axis: int
+    n_units: int
+    n_cells: int = 1
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Rows of the tops."""
+        return tuple(Row(1, 4 * unit + TOP + self.axis) for unit in range(self.n_units))
+
+    def __call__(self, coordinates: Array) -> Measured:
+        """x or y with its derivatives, (1, batch): it is linear."""
+        tops = coordinates[TOP + self.axis :: 4]
+        shares = np.broadcast_to(self.shares, tops.shape)
+        return Measured(total(shares * tops)[None], tuple(share[None] for share in shares))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same measure for some lanes of the batch."""
+        return replace(self, shares=take_lanes(self.shares, index))

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
-from dpgcli.arrays import Array, Indices
+import numpy as np
+
+from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import Response, Term, take_lanes
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics import laws
@@ -16,6 +18,7 @@ from dpgcli.mechanics.neighbors import NeighborTurns
 from dpgcli.mechanics.walls import Walled
 
 Formulate = Callable[[Finger], FingerPotential]
+LOAD = "load"  # the kind of the terms of dead loads
 
 
 @dataclass(frozen=True)
@@ -98,10 +101,26 @@ def _couplings(coordinates: FingerCoordinates) -> tuple[Term, ...]:
 
 
 def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
-    """The terms of an end moment M, if there is one: −M by the sum of corners, the end's turn."""
-    moment = coordinates.finger.end_moment
+    """The terms of the dead loads, each along its axis, as far as there are any.
+
+    Those of an end moment M are −M by the sum of corners, the end's turn.
+    """
+    finger = coordinates.finger
+    moment = finger.end_moment
     turning = coordinates.corners if moment.any() else ()
-    return tuple(Term("load", angle, DeadLoad(moment)) for angle in turning)
+    loads = [(angle, moment) for angle in turning]
+    for axis, force in enumerate((finger.tip_force_x, finger.tip_force_y)):
+        if force.any():
+            loads.append((coordinates.position(axis), force))
+    if finger.unit_weight.any():
+        shape = (finger.n_units, finger.unit_weight.shape[1])
+        weights = np.broadcast_to(finger.unit_weight, shape)
+        whole = total(weights)[None]
+        shares = weights / np.where(whole != 0.0, whole, 1.0)
+        for axis, along in enumerate((finger.gravity_x, finger.gravity_y)):
+            if along.any():
+                loads.append((coordinates.center(axis, shares), whole * along))
+    return tuple(Term(LOAD, measure, DeadLoad(force)) for measure, force in loads)
 
 
 def chain_potential(finger: Finger) -> FingerPotential:

@@ -179,6 +179,10 @@ class Walled:
         """The tip's x (axis 0) or y (axis 1), mm."""
         return self._beside(self.frame.position(axis))
 
+    def center(self, axis: int, shares: Array) -> Measure:
+        """The x or y of the center of the tops by their shares, mm."""
+        return self._beside(self.frame.center(axis, shares))
+
     def _with(self, walls: Array, others: Array) -> Array:
         walls, lanes = np.broadcast_arrays(walls, np.empty((1, others.shape[1])))
         others = np.broadcast_to(others, (len(others), lanes.shape[1]))

@@ -103,6 +103,12 @@ def linear(stiffness: "mpf", x: "mpf") -> Response:
     return Response(stiffness * x * x / 2, stiffness * x, stiffness)
 
 
+def corner_under(unit: Unit, angle: "mpf", moment: "mpf") -> Response:
+    """E = k_θ θ² − M θ of a corner under a moment M."""
+    spring = linear(2 * unit.hinge, angle)
+    return spring._replace(energy=spring.energy - moment * angle, force=spring.force - moment)
+
+
 def bistable(unit: Unit, x: "mpf") -> Response:
     """E = ½ k_b x² [1 + β(u² − 2u)] − P x with u = x/d, β = 1−α and a constant push P."""
     u, softening, stiffness = x / unit.stroke, 1 - unit.linearity, unit.bistable
@@ -213,6 +219,9 @@ class ElasticBars:
         for i, (unit, cell) in enumerate(zip(self.units, shape, strict=True)):
             _add_springs(expansion, i, unit, cell, walls[i] if walls else 0)
             _add_corners(expansion, i, unit, cell)
+            for k, pull in enumerate(unit.pulls):
+                expansion.energy -= pull * unknowns[4 * i + k]
+                expansion.gradient[expansion.row(4 * i + k)] -= pull
         if self.coupling:
             _add_couplings(expansion, self.coupling, shape)
         _add_swings(expansion, shape)
@@ -263,12 +272,16 @@ def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell, wall: "mp
 
 
 def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
-    """E = k_θ θ², θ = ∠s − ∠c − π/2, s either strut; ∠v bends by −(g hᵀ + h gᵀ), its `_rates`."""
+    """E = k_θ θ² − M θ, θ = ∠s − ∠c − π/2, s either strut; ∠v bends by −(g hᵀ + h gᵀ).
+
+    M turns its sign with θ, at the far strut; g and h are the `_rates`.
+    """
     a, b = corners(cell)
     turn, stretch = _rates(cell.chord)
     chord, along_chord = (_spread(i, (ENDS.chord, rate)) for rate in (turn, stretch))
-    for angle, ends, vector in ((a, ENDS.near, cell.near), (-b, ENDS.far, cell.far)):
-        corner = linear(2 * unit.hinge, angle)
+    sides = ((a, ENDS.near, cell.near, unit.moment), (-b, ENDS.far, cell.far, -unit.moment))
+    for angle, ends, vector, moment in sides:
+        corner = corner_under(unit, angle, moment)
         rates = _rates(vector)
         expansion.add(corner, _spread(i, (ends, rates[0]), (ENDS.chord, _times(-1, turn))))
         expansion.add_bend(-corner.force, *(_spread(i, (ends, rate)) for rate in rates))
@@ -371,6 +384,8 @@ class RigidBars:
 
         size = len(unknowns) + len(walls)
         bandwidth = (4 if walls else 3) if self.coupling else (2 if walls else 1)
+        if is_pulled := any(any(unit.pulls) for unit in self.units):
+            bandwidth = size
         expansion = Expansion(size, bandwidth, 2 if walls else 0)
         for i, unit in enumerate(self.units):
             a, b = unknowns[2 * i : 2 * i + 2]
@@ -387,12 +402,14 @@ class RigidBars:
             expansion.add_square(spring.force / length, across)
             bends = {2 * i: (-rise_near, lean_near), 2 * i + 1: (-rise_far, -lean_far)}
             for (row, bend), angle in zip(bends.items(), (a, b), strict=True):
-                expansion.add(linear(2 * unit.hinge, angle), {row: 1})
+                expansion.add(corner_under(unit, angle, unit.moment), {row: 1})
                 expansion.add_square(spring.force * _dot(n, bend), {row: 1})
         turns = [sum(unknowns[2 * i : 2 * i + 2]) for i in range(len(self.units))]
         for i, pair in enumerate(pairwise(turns) if self.coupling else ()):
             rates = {2 * i: 1, 2 * i + 1: 1}, {2 * i + 2: 1, 2 * i + 3: 1}
             _add_pair(expansion, self.coupling, pair, rates)
+        if is_pulled:
+            _add_pulls(expansion, self.units, self.nodes(unknowns))
         return expansion
 
     def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
@@ -411,6 +428,29 @@ class RigidBars:
         is_beyond = np.arange(n)[:, None] >= np.arange(2 * n) // 2
         rates = np.stack((away[..., 1], -away[..., 0]), axis=2) * is_beyond[:, None, None]
         return np.asarray(rates.reshape(4 * n, 2 * n))
+
+
+def _add_pulls(expansion: Expansion, units: list[Unit], nodes: list["mpf"]) -> None:
+    """−Σ f · p by corners: each turns all that lies beyond by −1 about its station B.
+
+    So ∂/∂θ = −Σ f × (p − B), and once more by a corner before it Σ f · (p − B).
+    """
+    stations: list[Vector] = [(0, 0), *zip(nodes[0::4], nodes[1::4], strict=True)]
+    for i in range(len(units)):
+        pulled = [
+            ((unit.pulls[k], unit.pulls[k + 1]), (nodes[4 * j + k], nodes[4 * j + k + 1]))
+            for j, unit in enumerate(units)
+            for k in (0, 2)
+            if j >= i
+        ]
+        expansion.energy -= sum(_dot(pull, node) for pull, node in pulled[:2])
+        for row, (x, y) in ((2 * i, stations[i]), (2 * i + 1, stations[i + 1])):
+            away = [(pull, (node[0] - x, node[1] - y)) for pull, node in pulled]
+            place = expansion.row(row)
+            expansion.gradient[place] -= sum(cross(pull, arm) for pull, arm in away)
+            for column in range(row + 1):
+                depth = place - expansion.row(column)
+                expansion.band[place][depth] += sum(_dot(pull, arm) for pull, arm in away)
 
 
 @dataclass(frozen=True)

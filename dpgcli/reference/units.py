@@ -17,7 +17,8 @@ BISECTIONS = 60
 class Unit(NamedTuple):
     """One unit's L, H and d (mm), k_b (N/mm), α, k_θ (N mm/rad), k_L (N/mm) and c_w (mm/N).
 
-    `push` (N) is that of a pressure on its dome, the same wherever the dome is.
+    `push` (N) is that of a pressure on its dome, the same wherever the dome is. Dead loads:
+    `moment` (N mm) opens its gap, `pulls` (N) act on B_i and T_i, each along x and y.
     """
 
     length: "mpf"
@@ -29,6 +30,8 @@ class Unit(NamedTuple):
     bar: "mpf"
     wall: "mpf" = 0
     push: "mpf" = 0
+    moment: "mpf" = 0
+    pulls: tuple["mpf", ...] = (0, 0, 0, 0)
 
 
 def extended_units(finger: Finger) -> list[Unit]:
@@ -36,9 +39,30 @@ def extended_units(finger: Finger) -> list[Unit]:
     from mpmath import mpf
 
     parameters = finger.arrays()
-    arrays = [*list(parameters.values())[: len(Unit._fields) - 2], parameters["wall_compliance"]]
+    own = Unit._fields.index("wall")
+    arrays = [*list(parameters.values())[:own], parameters["wall_compliance"]]
     columns = (np.broadcast_to(v, (finger.n_units, 1))[:, 0] for v in arrays)
-    return [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
+    units = [Unit(*map(mpf, values)) for values in zip(*(c.tolist() for c in columns), strict=True)]
+    return _under_loads(finger, units)
+
+
+def _under_loads(finger: Finger, units: list[Unit]) -> list[Unit]:
+    """The units under the finger's dead loads; those without any stay as they are."""
+    from mpmath import mpf
+
+    if not finger.is_loaded:
+        return units
+    loads = {name: values[:, 0].tolist() for name, values in finger.conditions().items()}
+    weights = np.broadcast_to(finger.unit_weight, (finger.n_units, 1))[:, 0].tolist()
+    (x,), (y,) = loads["gravity_x"], loads["gravity_y"]
+    loaded = []
+    for place, (unit, weight) in enumerate(zip(units, weights, strict=True), start=1):
+        tip = (loads["tip_force_x"][0], loads["tip_force_y"][0])
+        on_base = map(mpf, tip if place == len(units) else (0, 0))
+        on_top = (mpf(weight) * mpf(x), mpf(weight) * mpf(y))
+        moment = mpf(loads["end_moment"][0])
+        loaded.append(unit._replace(moment=moment, pulls=(*on_base, *on_top)))
+    return loaded
 
 
 def inverted_angle(unit: Unit) -> "mpf":

@@ -129,7 +129,8 @@ def exactnesses(
 def error_bounds(units: UnitSolutions) -> Array:
     """Bound on the tip's error (mm) by each level, shape (level, design); infinite where none.
 
-    The first level needs elastic bars to drop, and a second well of every unit without them.
+    The first level needs elastic bars to drop, and a second well of every unit without them. What
+    dead loads do to a finger is not known before.
     """
     finger = units.finger
     softness, length = _softness(units), finger.straight_length
@@ -140,7 +141,8 @@ def error_bounds(units: UnitSolutions) -> Array:
         + (dropped_bars(units) if level.drops_bars else 0.0)
         for level in ACCURACY_LEVELS
     ]
-    return np.where(units.are_soft.any(axis=0), np.inf, np.stack(bounds))
+    is_unknown = units.are_soft.any(axis=0) | finger.is_loaded
+    return np.where(is_unknown, np.inf, np.stack(bounds))
 
 
 def cheapest(bounds: Array, target: float) -> Indices:

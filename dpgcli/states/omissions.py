@@ -6,6 +6,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.states.accuracy import Exactness
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.units import UnitSolutions
+from dpgcli.text import enumerated
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ def omissions(
     """Omitted terms, unknowns and solves of a scene."""
     finger = units.finger
     n = finger.n_units
-    what = "loads, pressure and contact" if scene.pressure is None else "loads and contact"
+    is_there = {"loads": finger.is_loaded, "pressure": scene.pressure is not None}
+    what = enumerated([*(name for name, has in is_there.items() if not has), "contact"])
     left_out = [Omission(what, "the spec has none")]
     if scene.pressure is not None:
         left_out.append(Omission("pressure", "states are those at 0 MPa"))

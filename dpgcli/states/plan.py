@@ -202,7 +202,12 @@ def explain(scene: Scene, request: Request | None = None) -> Plan:
         bar_flexibility=_flexibility(scene_units),
         error_bound=float(exactness.error_bounds[0]) if is_bounded else np.inf,
         expected_seconds=seconds(
-            request.formulation, split, n, n_states, {c.group for c in columns}
+            request.formulation,
+            split,
+            n,
+            n_states,
+            {c.group for c in columns},
+            is_loaded=units.finger.is_loaded,
         ),
         expected_bytes=peak_bytes(split, n, n_states, len(columns)),
     )

@@ -15,6 +15,7 @@ from dpgcli.design.dimensions import without_unit
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.scene import Uncertainty
 from dpgcli.errors import Field, UsageError
+from dpgcli.mechanics.terms import LOAD
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import SolvedFingers, SolvedStates
@@ -40,12 +41,12 @@ def rows(solved: SolvedStates, quantities: Sequence[Quantity]) -> Columns:
 
     States that were not solved as whole fingers have those of the groups states and energies only.
     """
-    fingers = cast("SolvedFingers", solved)
+    fingers, is_state = cast("SolvedFingers", solved), solved.is_state
+    are_all_states = is_state.all()
     columns: Columns = {}
     for quantity in quantities:
         values = quantity.of(fingers)
-        if not quantity.is_always:
-            is_state = solved.is_state
+        if not (quantity.is_always or are_all_states):
             is_flag = values.dtype == bool
             values = values & is_state if is_flag else np.where(is_state, values, np.nan)
         columns[quantity.name] = values
@@ -208,6 +209,7 @@ _ENERGY_KINDS = {
     "wall": "walls",
     "hinge": "hinges",
     "bar": "bars",
+    LOAD: "dead loads: minus force times place, weights and couples likewise",
 }
 
 

@@ -124,4 +124,4 @@ def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
     arrays = {**finger.arrays(), "branch": finger.branch}
     units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
     flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
-    return finger.with_units([0]).changed(**flat, end_moment=np.zeros((1, 1))), (units, designs)
+    return finger.with_units([0]).changed(**flat).unloaded, (units, designs)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Columns, Flags
 from dpgcli.mechanics.terms import Formulate
-from dpgcli.states.barriers import barriers
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows
@@ -56,6 +55,8 @@ def solved_rows(units: UnitSolutions, inverted: Flags, request: RowRequest) -> C
     has_stiffness = any(q.group is Group.STIFFNESS for q in told)
     over = None
     if any(q.group is Group.BARRIERS for q in told):
+        from dpgcli.states.barriers import barriers
+
         over = barriers(units, request.formulate, settled, request.tolerance)
     solved = SolvedFingers.of(
         settled, request.around, request.dropped_error, with_compliance=has_stiffness, barriers=over

@@ -1,5 +1,6 @@
 """From patterns to certified states: guess, minimize, certify."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,6 +11,7 @@ from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Settled, Status, certified
 from dpgcli.states.guess import geometric_guess, stroke_guess
+from dpgcli.states.loading import grown
 from dpgcli.states.units import UnitSolutions
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
@@ -31,7 +33,8 @@ def settle(
     `units` have one design, or one for each lane; `formulate` gives the potential of a finger,
     loads and all. `tolerance` is the largest residual over the forces in play. The search begins
     at the shape `start`, or else at a guess that puts each unit into its own well; what goes
-    astray from there between bars that give way is looked for again, with domes held open first.
+    astray from there between bars that give way is looked for again, with domes held open first;
+    under dead loads it is followed from the unloaded state instead, as far as it keeps its place.
     `own` are the units that must have reached their wells.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -47,6 +50,8 @@ def settle(
         return walk(potential.coordinates.of_shape(start))
     guess = geometric_guess(units.finger, inverted, units.first_order)
     settled = walk(potential.coordinates.of_shape(guess))
+    if units.finger.is_loaded:
+        return _followed(units, formulate, settled, tolerance, own)
     for strokes in HELD_FROM:
         lanes = _worth_a_search(settled, units)
         if not len(lanes):
@@ -117,6 +122,34 @@ def _searched_again(
     found = np.flatnonzero(again.status == Status.STABLE)
     if not len(found):
         return settled
+    there = settled.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
+    return certified(units, settled.potential, settled.inverted, there, tolerance, own)
+
+
+def _followed(
+    units: UnitSolutions, formulate: Formulate, settled: Settled, tolerance: float, own: slice
+) -> Settled:
+    """Follow lanes without a state from their unloaded states, where they have one, and certify.
+
+    What is folded in its own wells is so however it got there. The others end in what the finger
+    has become under its full load, in another pattern perhaps.
+    """
+    is_elsewhere = ((settled.reached != settled.inverted) | settled.strayed).any(axis=0)
+    is_missed = (settled.status != Status.STABLE) & (is_elsewhere | ~settled.is_folded)
+    lanes = np.flatnonzero(is_missed)
+    if not len(lanes):
+        return settled
+    few, inverted = units.take_lanes(lanes), np.take(settled.inverted, lanes, axis=1)
+    bare = replace(few, finger=few.finger.unloaded)
+    begun = settle(bare, formulate, inverted, tolerance, own=own)
+    begins = np.flatnonzero(begun.status == Status.STABLE)
+    if not len(begins):
+        return settled
+    lanes, few, inverted = lanes[begins], few.take_lanes(begins), inverted[:, begins]
+    way = grown(few, formulate, inverted, begun.equilibrium.coordinates[:, begins])
+    potential = formulate(few.finger.with_domes(inverted))
+    again = settle_from(few, potential, inverted, way.coordinates, tolerance, own)
+    found = np.flatnonzero(way.arrived)
     there = settled.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
     return certified(units, settled.potential, settled.inverted, there, tolerance, own)
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +10,13 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
-from dpgcli.states.barriers import Barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.tip import Tip, min_eigenvalues, tip
-from dpgcli.states.uncertainty import Spread, spread
+
+if TYPE_CHECKING:
+    from dpgcli.states.barriers import Barriers
+    from dpgcli.states.uncertainty import Spread
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class SolvedFingers(SolvedStates):
     settled: Settled
     tip: Tip
     around: Surroundings
-    barriers_if_asked: Barriers | None = None
+    barriers_if_asked: "Barriers | None" = None
 
     @classmethod
     def of(
@@ -85,7 +88,7 @@ class SolvedFingers(SolvedStates):
         dropped_error: float | Array,
         *,
         with_compliance: bool,
-        barriers: Barriers | None = None,
+        barriers: "Barriers | None" = None,
     ) -> "SolvedFingers":
         """The states of a batch; `dropped_error` is added to the error of each tip, mm."""
         at_tip = tip(settled, with_compliance=with_compliance)
@@ -104,7 +107,7 @@ class SolvedFingers(SolvedStates):
         )
 
     @property
-    def barriers(self) -> Barriers:
+    def barriers(self) -> "Barriers":
         """What units have to get over to flip, and which of them needs least."""
         if self.barriers_if_asked is None:
             raise ValueError("the states were solved without their barriers")
@@ -149,8 +152,10 @@ class SolvedFingers(SolvedStates):
         return self.tip.stiffness
 
     @cached_property
-    def spread(self) -> Spread:
+    def spread(self) -> "Spread":
         """Standard uncertainties of pose and aperture, by what the scene says may be off."""
+        from dpgcli.states.uncertainty import spread
+
         around = self.around
         if around.uncertainty is None:
             raise ValueError("no value of the fingers may be off")

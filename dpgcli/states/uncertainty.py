@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dpgcli.arrays import Array, total
-from dpgcli.design.scene import MODEL, Gripper, Uncertainty
+from dpgcli.design.scene import MODEL, Gripper, Step, Uncertainty
+from dpgcli.mechanics.finger import Finger
 from dpgcli.states.certify import Settled
-from dpgcli.states.sensitivities import sensitivities
+from dpgcli.states.sensitivities import Direction, sensitivities
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,16 @@ def _slopes(settled: Settled, known: Uncertainty) -> Array:
     """Derivatives of poses by the steps, (3, step, state)."""
     if not known.steps:
         return np.zeros((3, 0, settled.inverted.shape[1]))
-    return sensitivities(settled, [step.finger for step in known.steps]).pose
+    return sensitivities(settled, [_direction(step, settled.finger) for step in known.steps]).pose
+
+
+def _direction(step: Step, finger: Finger) -> Direction:
+    """What a step changes in a finger: gravity turns the other way as its mounting angle grows."""
+    if not step.mounting_angle or not finger.unit_weight.any():
+        return step.finger
+    turn = step.mounting_angle
+    gravity = {"gravity_x": turn * finger.gravity_y, "gravity_y": -turn * finger.gravity_x}
+    return {**step.finger, **gravity}
 
 
 def _variance(slopes: Array, covariance: Array) -> Array:

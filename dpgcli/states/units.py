@@ -63,9 +63,11 @@ class UnitSolutions:
     def shortest_loop(self) -> int | None:
         """Units that the finger needs to run into itself; None where it has too few.
 
-        How far a unit between soft bars turns is not known before: any two may meet.
+        How far a unit between soft bars, or under a load, turns is not known before: any two may
+        meet.
         """
-        turn = np.where(self.are_soft, np.pi, 2.0 * self.wells.angle)
+        is_free = self.are_soft | self.finger.is_loaded
+        turn = np.where(is_free, np.pi, 2.0 * self.wells.angle)
         return fewest_in_loop(turn, self.finger.segment_length, self.finger.n_units)
 
     @property

@@ -148,12 +148,14 @@ class Study:
     def chunk_size(self) -> int:
         """Designs per chunk: many states, but never so many that one waits for it.
 
-        Under pressure a batch of them takes a second or more.
+        They are whole batches, since a small one takes longer by the state. Under pressure a batch
+        takes a second or more.
         """
         most_units = self.extent.most_units
         if self.extent.has_pressure:
             return designs_at_once(most_units)
-        return max(1, STATES_PER_CHUNK >> most_units)
+        most, at_once = STATES_PER_CHUNK >> most_units, designs_at_once(most_units)
+        return most // at_once * at_once or max(1, most)
 
     @cached_property
     def extent(self) -> Extent:

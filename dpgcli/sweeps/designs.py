@@ -70,7 +70,7 @@ def design_states(
                 for some in _groups(designs, size >> n_units)
                 for codes in chunks(n_codes, size)
             ]
-            rows = _joined(parts)
+            rows = joined_rows(parts)
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
             yield Block(designs, rows, metrics.columns() if is_last else None)
@@ -81,8 +81,10 @@ def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
     return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 
 
-def _joined(parts: Sequence[Columns]) -> Columns:
-    """Concatenate rows."""
+def joined_rows(parts: Sequence[Columns]) -> Columns:
+    """Concatenate rows of the same columns; what is one part already is not copied."""
+    if len(parts) == 1:
+        return parts[0]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

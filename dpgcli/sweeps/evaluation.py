@@ -17,7 +17,7 @@ from dpgcli.states.accuracy import exactnesses
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared
 from dpgcli.states.units import UnitSolutions
-from dpgcli.sweeps.designs import design_states
+from dpgcli.sweeps.designs import design_states, joined_rows
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.sweeps.space import DesignValues, Space
@@ -223,10 +223,11 @@ class Evaluation:
         if (owner[1:] < owner[:-1]).any():
             order = np.argsort(owner, kind="stable")
             owner = owner[order]
+        rows = joined_rows([part.rows for part in solved])
         return {
             column.name: described[column.name][owner]
             if column.name in described
-            else np.concatenate([part.rows[column.name] for part in solved])[order]
+            else rows[column.name][order]
             for column in self.state_columns
         }
 

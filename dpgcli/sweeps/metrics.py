@@ -272,7 +272,7 @@ METRICS = (
     Metric(
         "min_barrier_mJ",
         "mJ",
-        "smallest barrier of a unit to snap or reset, bars taken as rigid",
+        "smallest barrier of a unit by itself to snap or reset: rigid bars, no loads",
         outputs=(Output.BARRIERS,),
         of=lambda m: m.alike(barriers(m.units.finger, m.units.wells)),
     ),

@@ -1,37 +1,26 @@
 """What fingers become where a unit has lost its place: shapes that can be, ties that are said."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import dpgcli as dpg
+from dpgcli.actuation import cascades, snaps
 from dpgcli.actuation.directions import Directions, raised
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.staircase import driven
 from dpgcli.actuation.travel import travel
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.pressure import DomeVolumes
+from dpgcli.states.units import UnitSolutions
 
 Study, Made = Callable[..., Finger], Callable[..., Pressed]
-LATTICE = ("stroke_mm", "bistable_stiffness_N_per_mm", "force_linearity")
-UNEQUAL: dict[str, Any] = {
-    "units": 3,
-    "law": "push_only",
-    "lattice": {
-        "segment_length_mm": 13.5,
-        "segment_height_mm": 10.75,
-        "stroke_mm": 4.225,
-        "bistable_stiffness_N_per_mm": 12.0,
-        "force_linearity": 0.0286,
-        "hinge_stiffness_N_mm_per_rad": 24.2,
-    },
-    "overrides": {
-        unit: {"lattice": dict(zip(LATTICE, values, strict=True))}
-        for unit, values in {"2": (3.77, 10.6, 0.0665), "3": (3.39, 9.36, 0.0139)}.items()
-    },
-}
+AREA = 4.7261788958 / 0.1495  # mm², of the study's springs
 
 
 def test_no_way_leads_through_a_shape_that_crosses_itself(study: Study, pressed: Made) -> None:
@@ -52,7 +41,14 @@ def test_no_way_leads_through_a_shape_that_crosses_itself(study: Study, pressed:
 
 
 def test_commands_agree_on_a_snap_that_folds() -> None:
-    lattice = {**UNEQUAL["lattice"], "stroke_mm": 8.6, "bistable_stiffness_N_per_mm": 12.84}
+    lattice = {
+        "segment_length_mm": 13.5,
+        "segment_height_mm": 10.75,
+        "stroke_mm": 8.6,
+        "bistable_stiffness_N_per_mm": 12.84,
+        "force_linearity": 0.0286,
+        "hinge_stiffness_N_mm_per_rad": 24.2,
+    }
     finger = {"units": 8, "linear_stiffness_N_per_mm": 1e4, "lattice": lattice}
     spec = {"finger": finger, "pressure": {"effective_area_mm2": 30}}
     row = dpg.transitions(spec).to_pandas().query("pattern == '00000000' and direction == '+'")
@@ -62,17 +58,97 @@ def test_commands_agree_on_a_snap_that_folds() -> None:
         dpg.actuate(spec, pressure="0:2:0")
 
 
-@pytest.mark.parametrize(
-    "linear_stiffness", [30.0, *(pytest.param(k, marks=pytest.mark.slow) for k in (30.01, 100.0))]
-)
-def test_units_that_may_go_along_or_not_are_tied(linear_stiffness: float) -> None:
-    """Unequal units that snap at one pressure: what goes after the first hangs on a breath."""
-    spec = {
-        "finger": {**UNEQUAL, "linear_stiffness_N_per_mm": linear_stiffness},
-        "pressure": {"snap_pressure_MPa": 0.15},
-    }
-    found = dpg.transitions(spec).to_pandas()
-    row = found[(found["pattern"] == "000") & (found["direction"] == "+")].iloc[0]
-    assert row["tie"] != ""
-    flipped = {str(i + 1) for i, digit in enumerate(row["reached_at_pressure"]) if digit == "1"}
-    assert set(row["unit"].split(",")) == flipped
+STIFFNESSES = [300.0, *(pytest.param(k, marks=pytest.mark.slow) for k in (5.0, 30.0, 1e4))]
+
+
+class First(NamedTuple):
+    """The first event of straight fingers as the pressure rises: a lane each."""
+
+    inverted: Flags
+    tied: Flags
+    unit: Indices
+
+
+def first_event(finger: Finger, area: Array) -> First:
+    """Of fingers whose domes have these areas, mm², (unit, lane)."""
+    n_units, n = area.shape
+    pressed = Pressed(UnitSolutions.of(finger), DomeVolumes(area))
+    rows = np.arange(n), np.zeros(n, np.uint64), np.zeros(n, int), np.ones(n, int)
+    line_of, reach = np.zeros(n_units, int), np.full(n, 0.6)
+    _, stairs, _ = raised(pressed, line_of, reach, Directions(*rows), 1)
+    events = stairs[0].events
+    assert len(stairs) == 1 and len(events.lanes) == n and events.is_fine.all()
+    return First(events.after.inverted, events.halted.tied, events.halted.unit)
+
+
+def near_ties(study: Study, linear_stiffness: float) -> tuple[Finger, Array]:
+    """Three unequal units, and areas with which all snap at nearly the same pressure by itself."""
+    random = np.random.default_rng(20)
+    stroke = np.array([[3.5], [3.9], [3.3]])
+    apart = random.choice([-1.0, 1.0], (3, 12)) * 10.0 ** random.uniform(-8.0, -1.5, (3, 12))
+    finger = study(3, linear_stiffness).changed(stroke=stroke)
+    return finger, AREA * stroke / 3.5 * (1.0 + apart)
+
+
+@pytest.mark.parametrize("linear_stiffness", STIFFNESSES)
+@pytest.mark.parametrize("share", [0.5, pytest.param(0.1, marks=pytest.mark.slow)])
+def test_snaps_do_not_hang_on_steps_and_tolerances(
+    study: Study, monkeypatch: pytest.MonkeyPatch, linear_stiffness: float, share: float
+) -> None:
+    finger, area = near_ties(study, linear_stiffness)
+    usual = first_event(finger, area)
+    own = snaps._downhill_step
+    monkeypatch.setattr(snaps, "_downhill_step", lambda pressed: share * own(pressed))
+    monkeypatch.setattr(cascades, "LARGEST_STEP", share * cascades.LARGEST_STEP)
+    for module in (snaps, cascades):
+        monkeypatch.setattr(module, "TOLERANCE", 0.5 * module.TOLERANCE)
+    shorter = first_event(finger, area)
+    is_tied = (usual.tied | shorter.tied).any(axis=0)
+    assert (usual.inverted == shorter.inverted)[:, ~is_tied].all()
+    assert (usual.unit == shorter.unit)[~is_tied].all()
+    assert (usual.inverted.sum(axis=0) == 1).sum() > 1, "some go alone"
+
+
+@pytest.mark.slow
+def test_a_tie_is_where_a_millionth_of_the_pressure_decides(study: Study) -> None:
+    """Unit 2 goes along with unit 1 from some area on: it is a tie there, and nowhere else."""
+    finger = study(2, 30.0).changed(stroke=np.array([[3.5], [3.9]]))
+    base = AREA * np.array([[1.0], [3.9 / 3.5]])
+
+    def goes_along(more: Array) -> First:
+        return first_event(finger, base * np.stack((np.ones(len(more)), 1.0 + more)))
+
+    low, high = -0.002, 0.0
+    for _ in range(3):
+        places = np.linspace(low, high, 21)
+        found = goes_along(places)
+        assert (found.unit == 0).all() and found.inverted[0].all()
+        assert not found.inverted[1, 0] and found.inverted[1, -1]
+        place = int(found.inverted[1].argmax())
+        low, high = places[place - 1], places[place]
+    found = goes_along(high + 1e-6 * np.array([-4.0, -0.5, 0.5, 4.0]))
+    assert found.inverted[1].tolist() == [False, False, True, True]
+    assert found.tied.tolist() == [[False] * 4, [False, True, True, False]]
+
+
+@pytest.mark.parametrize("linear_stiffness", STIFFNESSES)
+def test_snaps_end_where_the_gradient_leads(study: Study, linear_stiffness: float) -> None:
+    """Units with one snap pressure, against the flow x' = -dE/dx of all coordinates, by SciPy.
+
+    Long Newton steps are no such flow: they take a second unit along.
+    """
+    stroke = np.array([[3.5], [3.9], [3.3]])
+    finger = study(3, linear_stiffness).changed(stroke=stroke)
+    area = AREA * stroke / 3.5
+    pressed = Pressed(UnitSolutions.of(finger), DomeVolumes(area))
+    rest, _ = at_rest(pressed, np.zeros((3, 1), bool))
+    halted = pressed.followed(rest, np.full((3, 1), 0.6))
+    there = pressed.with_domes(pressed.domes(halted.shapes.pressure, rest.inverted))
+    scale = pressed.coordinates.stiffness_scale[:, 0]
+
+    def motion(_: float, coordinates: Array) -> Array:
+        return np.asarray(-there.evaluate(coordinates[:, None]).gradient[:, 0] / scale)
+
+    flow = solve_ivp(motion, (0.0, 3e4), halted.start[:, 0], method="LSODA", rtol=1e-7)
+    is_open = pressed.extensions(flow.y[:, -1:]) > 0.5 * stroke
+    assert first_event(finger, area).inverted.tolist() == is_open.tolist()

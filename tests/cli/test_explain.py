@@ -72,6 +72,24 @@ def test_pressure_is_left_out_of_states(call: Call) -> None:
     assert facts(call, "three_unit.yaml")["pressure_lines"] is None
 
 
+def test_loads_are_listed_in_the_finger_s_frame(call: Call) -> None:
+    assert facts(call, "three_unit.yaml")["loads"] is None
+    settings = ("-s", "loads={tip_force_N: [0, -0.1], tip_moment_N_mm: 2, unit_mass_g: [10, 0, 5]}")
+    plan = facts(call, "three_unit.yaml", *settings)
+    assert "load" in plan["terms"]
+    assert plan["left_out"][0]["what"] == "pressure and contact"
+    loads = plan["loads"]
+    assert (loads["tip_force_N"], loads["tip_moment_N_mm"]) == ([0.0, -0.1], 2.0)
+    assert loads["unit_weight_N"] == pytest.approx([0.0980665, 0.0, 0.04903325])
+    assert loads["gravity_direction"] == [-1.0, 0.0]
+    tilted = ("-s", "gripper={base_spacing_mm: 60, mounting_angle_deg: 90}")
+    turned = facts(call, "three_unit.yaml", *settings, *tilted)["loads"]
+    assert turned["gravity_direction"] == pytest.approx([0.0, 1.0], abs=1e-15)
+    text = call("explain", "three_unit.yaml", *settings).stdout
+    said = "tip force (0, -0.1) N; couple on the end 2 N mm; weight of 0.09807/0/0.04903 N a unit"
+    assert f"  loads           {said} along (-1, 0), on its chamber's middle (assumed)\n" in text
+
+
 def test_rigid_bars_are_left_out_by_name(call: Call) -> None:
     plan = facts(call, "three_unit.yaml", *RIGID)
     assert plan["terms"] == ["bistable", "hinge"]

@@ -122,7 +122,22 @@ def test_workers_load_no_reader_of_specs() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     unneeded = {"pydantic", "ruamel.yaml", "typer", "pandas", "scipy", "pyarrow.parquet"}
+    unneeded |= {f"dpgcli.states.{name}" for name in ("barriers", "uncertainty", "pairs.halves")}
     assert set(done.stdout.split()) & unneeded == set()
+
+
+@pytest.mark.parametrize(("own", "expected"), [(None, "system"), ("mimalloc", "mimalloc")])
+def test_arrow_takes_its_memory_from_the_system_unless_it_is_told(
+    monkeypatch: pytest.MonkeyPatch, own: str | None, expected: str
+) -> None:
+    monkeypatch.delenv("ARROW_DEFAULT_MEMORY_POOL", raising=False)
+    if own is not None:
+        monkeypatch.setenv("ARROW_DEFAULT_MEMORY_POOL", own)
+    program = "import dpgcli.cli.main, pyarrow; print(pyarrow.default_memory_pool().backend_name)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == expected
 
 
 def test_a_command_loads_no_other_than_those_it_shares_with(loaded: Loaded) -> None:

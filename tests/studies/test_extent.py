@@ -39,6 +39,20 @@ def test_states_are_counted_by_the_number_of_units(study: Any) -> None:
     assert study(HEIGHTS).extent.n_states == 2 * 8
 
 
+@pytest.mark.parametrize("states", [2**6, 2**15])
+@pytest.mark.parametrize("n_units", [1, 3, 5, 9, 14])
+def test_chunks_are_whole_batches_that_come_close_to_their_most(
+    study: Any, monkeypatch: pytest.MonkeyPatch, n_units: int, states: int
+) -> None:
+    """A batch of the one design that would be left takes as long as one of a dozen."""
+    monkeypatch.setattr(studies, "STATES_PER_CHUNK", states)
+    made = study(f"{{key: finger.units, values: [{n_units}]}}", HEIGHTS)
+    most = max(states >> n_units, 1)
+    at_once = min(designs.designs_at_once(n_units), most)
+    assert made.chunk_size % at_once == 0
+    assert most - at_once < made.chunk_size <= most
+
+
 def test_units_of_the_base_do_not_count_where_units_vary(study: Any) -> None:
     made = study("{key: finger.units, values: [2, 3]}", base="eight_unit")
     assert (made.extent.most_units, made.extent.n_states) == (3, 4 + 8)

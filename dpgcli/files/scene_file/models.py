@@ -16,6 +16,7 @@ from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
+from dpgcli.files.scene_file.loads import LoadsSpec
 from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
@@ -127,6 +128,7 @@ class Spec(Section):
     pressure: PressureSpec | None = Field(
         default=None, description="The pressure lines and how domes answer to pressure."
     )
+    loads: LoadsSpec | None = Field(default=None, description="Dead loads and gravity.")
     uncertainty: Tolerances | None = Field(
         default=None, description="Standard uncertainties of values, as tolerances of the mold."
     )
@@ -161,6 +163,7 @@ class Spec(Section):
             model_error=said if (share := share_of(said)) is None else share,
             pressure=None if self.pressure is None else self.pressure.known,
             hinge_coupling=None if coupling is None else np.array([coupling], float),
+            loads=None if self.loads is None else self.loads.known,
         )
 
 

@@ -13,8 +13,10 @@ from dpgcli.design.dimensions import (
     unit_of,
     unit_range,
 )
+from dpgcli.design.loads import DIRECTION
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
+from dpgcli.files.scene_file import loads
 from dpgcli.files.scene_file.models import (
     DataSpec,
     FingerSpec,
@@ -48,6 +50,7 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("gripper",): GripperSpec,
     ("pressure",): PressureSpec,
     ("pressure", "overrides", "*"): UnitPressure,
+    ("loads",): loads.LoadsSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -66,6 +69,7 @@ OWN = {
     **dict.fromkeys(DataSpec.model_fields, "two numbers in mm, such as [5.375, -0.75]"),
     "model_error": "a percentage such as 5%, or leave_one_out",
     **EXPECTED,
+    **loads.EXPECTED,
 }
 
 HINTS = {
@@ -81,10 +85,12 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
-TEXTS = ("calibration", "law", "model_error")
-PAIRS = tuple(DataSpec.model_fields)
+TEXTS = ("calibration", "law", "model_error", DIRECTION)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE)
 MAPPINGS = ("overrides", *EXPECTED)
-BOUNDED = ("units", "force_linearity", "mounting_angle_deg")
+MOST_SHOWN = 6  # parts of a list
+WHOLE = (("data",), ("loads",))  # sections whose values may be lists
+BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
 
@@ -136,16 +142,24 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    if path[:1] == ("data",) and error["type"] != "extra_forbidden" and len(path) > 1:
-        path = path[:2]  # of the pair, not of one of its numbers
+    if path[:1] in WHOLE and error["type"] != "extra_forbidden" and len(path) > 1:
+        path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
-    found = "nothing" if error["type"] == "missing" else shown(error["input"])
+    show = _shown if path[:1] in WHOLE else shown
+    found = "nothing" if error["type"] == "missing" else show(error["input"])
     is_worded = path[:-1] == UNCERTAINTY or bool(expected_at(path))
     hint = "" if is_worded else _hint(key, error)
     return document.problem(path, _expected(path), found, hint)
+
+
+def _shown(value: Any) -> str:
+    """A value as messages show it; the parts of a short list, too."""
+    if isinstance(value, list) and len(value) <= MOST_SHOWN:
+        return f"[{', '.join(map(shown, value))}]"
+    return shown(value)
 
 
 def _at(data: Any, path: KeyPath) -> Any:

@@ -319,7 +319,7 @@ def test_settings_reach_overrides_written_as_numbers(read):
         (
             "zzz=3",
             "settings: zzz: expected a known key, found zzz "
-            "(known here: finger, gripper, pressure, uncertainty, model_error, data)",
+            "(known here: finger, gripper, pressure, loads, uncertainty, model_error, data)",
         ),
     ],
 )
