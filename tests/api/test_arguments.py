@@ -159,7 +159,7 @@ UNWRITABLE += [{"finger": {"units": value}} for value in (HUGE, Fraction(10**400
 UNWRITABLE += [DEEP, {"a": DEEP}, {"a": [DEEP, 1.0]}, {"a": [{"b": DEEP}]}, ITSELF, {"a": ITSELF}]
 NEEDED: dict[Callable[..., Any], dict[str, Any]] = {
     dpg.actuate: {"spec": BASE, "pressure": "0:0.1"},
-    dpg.bench: {"spec": FINGER},
+    dpg.bench: {"spec": "none"},
     dpg.check: {"designs": {**DESIGNS, "n_stable": [4]}, "require": "n_stable > 1"},
     dpg.compare: {"spec": BASE, "data": TIPS},
     dpg.explain: {"spec": BASE},
@@ -176,7 +176,7 @@ NEEDED: dict[Callable[..., Any], dict[str, Any]] = {
     dpg.pulses: {"spec": BASE, "end": "11"},
     dpg.read_calibration: {"path": "none"},
     dpg.report: {"folder": "none"},
-    dpg.stress: {"only": "mirror"},
+    dpg.stress: {"only": "none"},
     dpg.sweep: {"sweep": SWEEP, "executor": "serial"},
     dpg.transitions: {"spec": BASE},
     dpg.validate: {},
