@@ -30,6 +30,7 @@ POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
 UNLIKELY = 30.0  # times what hinge and dome say, or as little of it: another unit
+ODD = 6.0  # times the stroke or the length that is known, or as little of it: another unit
 FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
@@ -116,12 +117,35 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
 def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
     """Known states that can be those of this finger, in mm and rad.
 
-    Raises SpecError as `read_states`, `check_scale` and `check_loads` do.
+    Raises SpecError as `read_states`, `check_scale` and `check_loads` do, and for openings or
+    layers that are ten times too large or too small for it: centimeters.
     """
     known = read_states(source, finger.n_units, shapes)
     check_scale(source, known, float(finger.straight_length[0]))
     check_loads(source, known, finger)
+    if problems := [*_centimeters(source, shapes, known, finger)]:
+        raise SpecError(tuple(problems))
     return known
+
+
+def _centimeters(
+    source: Tabular, shapes: Tabular | None, known: KnownStates, finger: Finger
+) -> Iterator[Problem]:
+    """Problems of openings of inverted units beside the stroke, and of layers beside the finger."""
+    inverted = known.openings[:, known.moments == 0.0][known.patterns[:, known.moments == 0.0]]
+    opened = float(np.max(inverted, initial=0.0, where=np.isfinite(inverted)))
+    lengths = [float(np.hypot(*np.diff(shape, axis=1)).sum()) for shape in known.shapes]
+    opening = "opening_mm" if finger.n_units == 1 else "opening1_mm"
+    stroke, length = float(finger.stroke.mean()), float(finger.straight_length[0])
+    for table, key, what, found, usual in (
+        (source, opening, "openings of inverted units", opened, stroke),
+        (shapes, "x_mm", "layers from base to tip", max(lengths, default=0.0), length),
+    ):
+        if found > 0.0 and not usual / ODD < found < usual * ODD:
+            place = Location(str(table) if isinstance(table, str | Path) else FRAME)
+            hint = "centimeters?" if found < usual else "is the unit another one?"
+            expected = f"{what} in mm, about {usual:.3g}"
+            yield located(place, key, expected, f"{found:.3g}, the largest", hint)
 
 
 def check_loads(source: Tabular, known: KnownStates, finger: Finger) -> None:
