@@ -240,3 +240,15 @@ def test_two_columns_of_a_name_are_told_apart_by_what_is_behind_it(tmp_path: Pat
     known = read_states(path, 2)
     assert known.tip[0].tolist() == STATES["tip_x_mm"]
     assert known.unused == ("tip_x_mm (std)",)
+
+
+def test_a_header_whose_names_all_have_units_is_found_below_other_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    above = "1,2,3\n4,5,6\n7,8,9\n"
+    path.write_text(f"Lot,7\n{above}travel_mm [mm],energy_mJ [mJ]\n0,0\n14,60\n")
+    assert read_curve(path).curve.travel.tolist() == [0.0, 14.0]
+
+
+def test_a_name_that_ends_in_a_unit_of_something_else_is_another_column(tmp_path: Path) -> None:
+    table = {"travel_mm": [0.0, 14.0], "force_N": [0.0, 9.0], "energy_min": [0.0, 1.0]}
+    assert read_curve(written(tmp_path / "t.csv", table)).ignored == ("energy_min",)

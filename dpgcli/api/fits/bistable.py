@@ -81,12 +81,7 @@ def fit_bistable(
     >>> round(fit.values["bistable_stiffness_N_per_mm"], 6), round(fit.values["stroke_mm"], 6)
     (2.0, 2.0)
     """
-    mapping = travel_to_opening
-    opening = (
-        mapping
-        if isinstance(mapping, Opening)
-        else Opening.of(mapping if isinstance(mapping, str) else quoted(mapping))
-    )
+    opening = _opening(travel_to_opening)
     held = _held(fix, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
@@ -131,6 +126,12 @@ def _result(
         partial(draw_fit, bistable_figure(found, choice, name)),
         files=files,
     )
+
+
+def _opening(said: str | Opening) -> Opening:
+    if isinstance(said, Opening):
+        return said
+    return Opening.of(said if isinstance(said, str) else quoted(said))
 
 
 def limits_of(key: str) -> tuple[float, float]:
