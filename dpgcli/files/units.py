@@ -38,7 +38,8 @@ BRACKETED = re.compile(r"\((.*)\)|\[(.*)\]|<(.*)>")
 IN_NAME = re.compile(
     r"(?P<name>.*\S)\s*(?:\((?P<a>[^()]*)\)|\[(?P<b>[^][]*)\]|\s(?:/|in)\s*(?P<c>\S+))"
 )
-WORDS = "|".join(u for units in FACTORS.values() for u in units if u.isidentifier()) + "|[cm]?m2"
+KNOWN = frozenset(unit for units in FACTORS.values() for unit in units)
+WORDS = "|".join([*sorted(filter(str.isidentifier, KNOWN)), "[cm]?m2"])
 IN_KEY = re.compile(rf"(.+?)_((?:{WORDS})(?:_(?:per_)?(?:{WORDS}))*)")
 SAID_BY_KEY = {"seconds": "s", "force_linearity": ""}  # keys whose unit does not end them
 NO_UNIT = ("-", "1")
@@ -60,8 +61,8 @@ def is_unit(text: str) -> bool:
     >>> is_unit("kN"), is_unit("N mm/rad"), is_unit("[V]"), is_unit("Load")
     (True, True, True, False)
     """
-    plain, known = _plain(text), {unit for units in FACTORS.values() for unit in units}
-    is_known = plain in known or known.issuperset(plain.split("/"))
+    plain = _plain(text)
+    is_known = plain in KNOWN or KNOWN.issuperset(plain.split("/"))
     return is_known or BRACKETED.fullmatch(text) is not None
 
 
