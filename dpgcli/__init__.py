@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.grid import fit_grid
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
+    from dpgcli.api.grasp import grasp
     from dpgcli.api.landscape import landscape
     from dpgcli.api.lookup import lookup
     from dpgcli.api.predict import predict
@@ -68,6 +69,7 @@ __all__ = [
     "fit_grid",
     "fit_hinge",
     "fit_unit",
+    "grasp",
     "landscape",
     "lookup",
     "merge",
@@ -93,6 +95,7 @@ _HOMES = {
     "fit_grid": "api.fits.grid",
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
+    "grasp": "api.grasp",
     "landscape": "api.landscape",
     "lookup": "api.lookup",
     "merge": "api.sweep",

@@ -32,9 +32,12 @@ def temporary_file(path: Path) -> Iterator[tuple[Path, int | None]]:
 
 
 @contextmanager
-def temporary_folder(path: Path) -> Iterator[Path]:
-    """An empty folder beside `path` for this process alone; gone at the end."""
-    _drop_unheld(path, stat.S_ISDIR, shutil.rmtree)
+def temporary_folder(path: Path, drop: Callable[[Path], None] = shutil.rmtree) -> Iterator[Path]:
+    """An empty folder beside `path` for this process alone; gone at the end.
+
+    `drop` removes one that a killed process has left, with what belongs to it elsewhere.
+    """
+    _drop_unheld(path, stat.S_ISDIR, drop)
     name, handle, _ = _made(path, _new_folder)
     try:
         yield name

@@ -47,6 +47,19 @@ def control_character(name: str) -> str:
     return next((ascii(c)[1:-1] for c in name if c < " " or "\x7f" <= c < "\xa0"), "")
 
 
+def quoted(value: object) -> str:
+    """Whatever somebody handed in, as Python writes it; its type where Python cannot.
+
+    >>> quoted("a"), quoted(10**5000)
+    ("'a'", 'an int that cannot be written')
+    """
+    try:
+        return repr(value)
+    except Exception:  # of more than 4,300 digits, too deep, or what somebody's class raises
+        kind = type(value).__name__
+        return f"a{'n' * (kind[:1].lower() in 'aeiou')} {kind} that cannot be written"
+
+
 def dotted(path: KeyPath) -> str:
     """A key path as people write it: `finger.overrides.4-5`."""
     return ".".join(shortened(str(part)) for part in path) or "document"

@@ -21,6 +21,7 @@ FLOORS = {
     "design": 2,
     "states": 3,
     "actuation": 4,
+    "grasping": 4,
     "calibration": 4,
     "reference": 4,
     "benchmark": 5,
@@ -73,7 +74,9 @@ def test_the_room_for_designs_knows_no_files_and_no_specs() -> None:
     assert not {"pydantic", "pathlib", "yaml"} & set(words)
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "design", "equilibrium", "states", "calibration"])
+@pytest.mark.parametrize(
+    "folder", ["mechanics", "design", "equilibrium", "states", "grasping", "calibration"]
+)
 def test_physics_neither_prints_nor_exits_nor_reads_files(folder: str) -> None:
     paths = list((PACKAGE / folder).rglob("*.py"))
     assert len(paths) > 1

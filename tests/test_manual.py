@@ -25,6 +25,7 @@ from dpgcli.cli import (
     compare,
     explain,
     fe,
+    grasp,
     help,
     init,
     landscape,
@@ -76,6 +77,7 @@ COMMANDS = {
             validate,
             init,
             landscape,
+            grasp,
             schema,
             help,
         )

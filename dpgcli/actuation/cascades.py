@@ -13,7 +13,7 @@ import numpy as np
 
 from dpgcli.actuation.pressed import DISPLACED, LARGEST_RESIDUAL, TOLERANCE, Pressed
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
+from dpgcli.equilibrium.contracts import Measured, ScalarLaw, WideMeasured, take_lanes
 from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
@@ -47,9 +47,9 @@ class HeldDomes:
         """Minus the stiffness of the spring that moves."""
         return np.asarray(-self.stiffness * self.going)
 
-    def margin(self, scalar: Array, load: Array) -> Array:
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> Array:
         """What the unit that goes pulls at its spring with, over the forces in play."""
-        pull = self.stiffness * (scalar - self.place - load) / self.force_scale
+        pull = self.stiffness * (measured.value - self.place - load) / self.force_scale
         return np.where(self.going, self.sign * pull, np.inf)
 
     def take_lanes(self, index: Indices) -> Self:
@@ -111,7 +111,7 @@ class _Cascade:
         law = self._held(own, unit)
         held = own.loaded(law).at(load)
         start = minimize(held, self.coordinates[:, self.lanes], TOLERANCE).coordinates
-        pull = law.margin(own.extensions(start), load)[unit, each]
+        pull = law.margin(own.coordinates.dome(start), load)[unit, each]
         sign = np.where(np.abs(pull) > LARGEST_RESIDUAL, np.sign(pull), 0.0)
         end = sign * FURTHEST * np.broadcast_to(own.finger.stroke, law.place.shape)[unit, each]
         ends = follow(own.loaded(replace(law, sign=sign)), start, load, end, LARGEST_STEP)

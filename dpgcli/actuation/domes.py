@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import Response, take_lanes
+from dpgcli.equilibrium.contracts import Measured, Response, WideMeasured, take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import Dome, PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
@@ -66,7 +66,7 @@ class PressedDomes:
             self.finger, PressureWork(self.pressures(load), self.volumes, self._domes), scalar
         )
 
-    def margin(self, scalar: Array, load: Array) -> Array | None:
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> Array | None:
         """Push of domes in touch, and what keeps the others from it, over the forces in play.
 
         A dome that is apart rests where its own force is zero, before its neighbor; it is further
@@ -75,6 +75,7 @@ class PressedDomes:
         if self.touching is None:
             return None
         assert self.inverted is not None and self.peak is not None, "given beside touching"
+        scalar = measured.value
         force = self.free(scalar, load).force
         is_away = ~self.touching & ~self.inverted & (scalar > self.peak)
         margin = np.where(self.touching, -force, force) / self.finger.force_scale

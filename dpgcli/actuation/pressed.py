@@ -177,10 +177,9 @@ class Pressed:
     def loaded(self, law: Loaded) -> LoadedPotential[FingerCoordinates, Loaded]:
         """The energies with domes of a law that changes with a load."""
         bare = self._bare
-        scale, stiffness = self.finger.stroke, self.units.holding_stiffness
-        return LoadedPotential(
-            bare.coordinates, bare.terms, bare.coordinates.dome, law, scale, stiffness
-        )
+        coordinates = bare.coordinates
+        dome, scale, stiffness = coordinates.dome, self.finger.stroke, self.units.holding_stiffness
+        return LoadedPotential(coordinates, bare.terms, dome, law, dome, scale, stiffness)
 
     def domes(self, pressure: Array, inverted: Flags) -> DomesAt | PushingDomes:
         """The law of the domes under fixed pressures."""
@@ -275,7 +274,7 @@ class Pressed:
             return start, left
         few, cell = family.take_lanes(folds), ends.cell[folds]
         here, lanes = start[:, folds], np.arange(len(folds))
-        values = few.measure(here).value
+        values = few.followed(here).value
         if len(values) > 1:
             own = change[cell, folds]
             at_fold = few.law.pressures(ends.load[folds])[cell, lanes]
@@ -283,7 +282,7 @@ class Pressed:
             held = (np.arange(len(values))[:, None] == cell) * few.stiffness
             potential = few.held(ends.load[folds] + further, held, values[cell, lanes])
             here = minimize(potential, here, TOLERANCE).coordinates
-            left[:, folds] = np.abs(few.measure(here).value - values) > LEFT * few.scale
+            left[:, folds] = np.abs(few.followed(here).value - values) > LEFT * few.scale
         start[:, folds] = here + DISPLACED * ends.onward[:, folds]
         return start, left
 
@@ -291,10 +290,10 @@ class Pressed:
         self, family: LoadedPotential[FingerCoordinates, PressedDomes], ends: Ends
     ) -> Flags:
         """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
-        law, values = family.law, family.measure(ends.coordinates).value
-        margin = law.margin(values, ends.load)
+        law, measured = family.law, family.followed(ends.coordinates)
+        margin = law.margin(measured, ends.load)
         if margin is None or law.touching is None:
-            return np.zeros(values.shape, bool)
+            return np.zeros(measured.value.shape, bool)
         push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL

@@ -8,6 +8,7 @@ from dpgcli.api.inputs import (
     SceneInput,
     Settings,
     SpecInput,
+    by_text,
     path_of,
     plain,
     scene_input,
@@ -42,7 +43,7 @@ the keys base and space, found fingers (did you mean finger?)
     if isinstance(given, SceneInput | Scene | Finger):
         return scene_input(given, texts)
     if isinstance(given, Mapping):
-        own = without_free_keys({str(key): value for key, value in given.items()})
+        own = without_free_keys(by_text("spec", given))
         is_swept = is_sweep(Document("spec", own, {}))
         return sweep_input(given, texts) if is_swept else scene_input(given, texts)
     path = path_of("spec", given)

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dpgcli.api.inputs import each_of, path_of
+from dpgcli.api.inputs import by_text, each_of, path_of
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.design.lines import NAME, TIME
 from dpgcli.design.pressure import History, Pressure
@@ -20,6 +20,7 @@ from dpgcli.files.places import shown
 from dpgcli.files.scene_file.histories import FEWEST_ROWS, read_history
 from dpgcli.files.scene_file.pressure import NUMBER, ramp
 from dpgcli.files.units import FACTORS, factor_of
+from dpgcli.text import quoted
 
 PressureInput: TypeAlias = str | Path | Sequence[str] | Sequence[float] | Tabular
 """Ramps in MPa ("0:0.15:0", "A=0:0.15:0"), pressures of one line, or a table of a column a line."""
@@ -56,14 +57,15 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
         return _of_table(pressure, known.lines)
     if isinstance(pressure, Mapping):
         ramps = {
-            str(line): ramp(said) if _is_ramp(said) else said for line, said in pressure.items()
+            line: ramp(said) if _is_ramp(said) else said
+            for line, said in by_text("pressure", pressure).items()
         }
         return _of_table(ramps, known.lines)
     parts = each_of(pressure)
     are_texts = [isinstance(part, str | Path) for part in parts]
     if not (parts and all(are_texts)):
         if not parts or any(are_texts) or not _is_array(pressure):
-            raise UsageError(FIELD, f" {pressure}: expected two numbers or more, ", RAMP)
+            raise UsageError(FIELD, f" {quoted(pressure)}: expected two numbers or more, ", RAMP)
         return _of_table({known.lines[0]: list(parts)}, known.lines)
     texts = [part if isinstance(part, str) else str(path_of("pressure", part)) for part in parts]
     if len(texts) == 1 and _is_file(texts[0]):

@@ -35,6 +35,7 @@ from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.settings import with_settings
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
+from dpgcli.text import quoted
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
 """Values by dotted key of a spec, or "key=value" texts."""
@@ -46,6 +47,7 @@ Place: TypeAlias = Sequence[float] | None
 """Two numbers in mm; None where somebody else says them."""
 
 ORIGINS = ("as given", "from the data's header", "from the spec")
+LARGEST_WHOLE = 2**1000  # far beyond any seed
 NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
 FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
@@ -140,8 +142,28 @@ def setting_texts(settings: Settings, field: str = "settings") -> tuple[str, ...
     """
     if not isinstance(settings, Mapping):
         return as_texts(field, settings)
-    values = {key: json.dumps(canonical(plain(value))) for key, value in settings.items()}
-    return tuple(f"{key}={text}" for key, text in values.items())
+    values = by_text(field, settings)
+    return tuple(f"{key}={json.dumps(canonical(plain(values[key])))}" for key in values)
+
+
+def by_text(what: str, given: Mapping[Any, Any]) -> dict[str, Any]:
+    """What is given by keys that are texts, or numbers in their place, as 2 of a unit.
+
+    Raises UsageError for two keys that are one text, as in a file they would be.
+
+    >>> by_text("overrides", {2: "a", "3": "b"})
+    {'2': 'a', '3': 'b'}
+    """
+    texts: dict[str, Any] = {}
+    for key, value in given.items():
+        try:
+            text = str(key)
+        except ValueError:  # a number of more than 4,300 digits
+            raise UsageError(Field(what), f": {quoted(key)} is no key") from None
+        if text in texts:
+            raise UsageError(Field(what), f": {text} is there twice, as {key!r} as well")
+        texts[text] = value
+    return texts
 
 
 def plain(value: Any) -> Any:
@@ -163,17 +185,26 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Calibration):
         return value.model_dump(exclude_none=True)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {key: _plain(item) for key, item in by_text("spec", value).items()}
     if isinstance(value, list | tuple | range):
         return [_plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
-    if isinstance(value, Decimal | Fraction):  # of a database
-        return float(value)
+    if isinstance(value, Decimal | Fraction | int):
+        return _number(value)
     listed = getattr(value, "tolist", None)  # of NumPy's scalars and arrays, and of series
     if listed is None and not isinstance(value, str | Real | date | NoneType):
         raise UsageError(f"a spec has no {type(value).__name__}: expected numbers and texts")
     return value if listed is None else _plain(listed())
+
+
+def _number(value: Decimal | Fraction | int) -> float | int:
+    """A number as a file can hold it, those of a database included."""
+    try:
+        json.dumps(number := value if isinstance(value, int) else float(value))
+    except (OverflowError, ValueError):  # beyond double precision; digits; a signaling NaN
+        raise UsageError(f"a spec has no such number: {quoted(value)}") from None
+    return number
 
 
 def each_of(value: Any) -> tuple[Any, ...]:
@@ -198,7 +229,7 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
     """
     listed = each_of(texts)
     if not all(isinstance(text, str) for text in listed):
-        raise UsageError(Field(field), f" {texts!r}: expected a text or several")
+        raise UsageError(Field(field), f" {quoted(texts)}: expected a text or several")
     return listed
 
 
@@ -216,7 +247,7 @@ def path_of(field: str, path: str | os.PathLike[str]) -> Path:
     except (TypeError, UnicodeEncodeError):  # half of a pair in UTF-16
         is_name = False
     if not is_name:
-        raise UsageError(Field(field), f" {path!r}: expected a path")
+        raise UsageError(Field(field), f" {quoted(path)}: expected a path")
     return found
 
 
@@ -234,7 +265,7 @@ def check_numbers(**values: float | None) -> None:
         is_number = isinstance(value, Real) and not isinstance(value, bool)
         is_in_reach = is_number and not (isinstance(value, Integral) and abs(value) > LARGEST)
         if value is not None and not is_in_reach:
-            raise UsageError(Field(field), f" {value!r}: expected a number")
+            raise UsageError(Field(field), f" {quoted(value)}: expected a number")
 
 
 def check_whole(**values: int | None) -> None:
@@ -243,8 +274,9 @@ def check_whole(**values: int | None) -> None:
     >>> check_whole(jobs=2)
     """
     for field, value in values.items():
-        if value is not None and (isinstance(value, bool) or not isinstance(value, Integral)):
-            raise UsageError(Field(field), f" {value!r}: expected a whole number")
+        is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+        if value is not None and not (is_whole and abs(value) < LARGEST_WHOLE):
+            raise UsageError(Field(field), f" {quoted(value)}: expected a whole number")
 
 
 def check_texts(**values: str | None) -> None:
@@ -254,7 +286,7 @@ def check_texts(**values: str | None) -> None:
     """
     for field, value in values.items():
         if value is not None and not isinstance(value, str):
-            raise UsageError(Field(field), f" {value!r}: expected a text")
+            raise UsageError(Field(field), f" {quoted(value)}: expected a text")
 
 
 def check_flags(**values: bool) -> None:
@@ -264,7 +296,7 @@ def check_flags(**values: bool) -> None:
     """
     for field, value in values.items():
         if not isinstance(value, bool):
-            raise UsageError(Field(field), f" {value!r}: expected True or False")
+            raise UsageError(Field(field), f" {quoted(value)}: expected True or False")
 
 
 def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
@@ -280,7 +312,7 @@ def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
 def _by_name(field: str, texts: Texts) -> dict[str, str]:
     """Texts by name. Raises UsageError for what is no "name=text"."""
     if isinstance(texts, Mapping):
-        return {str(name): str(text) for name, text in texts.items()}
+        return {name: str(plain(text)) for name, text in by_text(field, texts).items()}
     parts = [(text, *map(str.strip, text.partition("="))) for text in as_texts(field, texts)]
     for text, name, _, said in parts:
         if not name or not said:
@@ -300,7 +332,7 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
         x, y = float("nan"), 0.0
     if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
         raise UsageError(
-            Field(field), f" {place}: expected two numbers in mm, such as 5.375, -0.75"
+            Field(field), f" {quoted(place)}: expected two numbers in mm, such as 5.375, -0.75"
         )
     return x, y
 
@@ -370,7 +402,7 @@ def check_positive(field: str, value: float | None) -> None:
 def chosen(kind: type[E], field: str, value: str) -> E:
     """A member of an enumeration by its text. Raises UsageError for another text."""
     try:
-        return kind(value)
+        return kind(value if isinstance(value, str) else quoted(value))
     except ValueError:
         known = ", ".join(map(str, kind))
-        raise UsageError(Field(field), f" {value!r}: expected {known}") from None
+        raise UsageError(Field(field), f" {quoted(value)}: expected {known}") from None

@@ -28,6 +28,7 @@ from dpgcli.states import predict as states
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.plan import Plan, Request
 from dpgcli.states.predict import Prediction, Summary
+from dpgcli.text import quoted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +106,7 @@ class PredictResult:
     def sketch(self, width: int = 80) -> str:
         """Small pictures of the states, 64 at most, as braille in lines of `width` characters."""
         if not (isinstance(width, int) and width > 0):
-            raise UsageError(f"width {width!r}: expected a whole number from 1 on")
+            raise UsageError(f"width {quoted(width)}: expected a whole number from 1 on")
         check_drawable(self.plan.n_states, "sketch")
         return sketch(self.given.scene, self.plan.request.patterns, width)
 

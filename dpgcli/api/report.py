@@ -14,6 +14,7 @@ from dpgcli.reports.page import html, markdown
 from dpgcli.reports.summary import DesignSpace, ranked_metrics
 from dpgcli.studies.sweep import DESIGNS, REPORT
 from dpgcli.sweeps.gate import check_beyond_doubt
+from dpgcli.text import quoted
 
 PAGES = {".md": markdown, ".html": html}
 AT_END = "<!-- written by dpg -->"
@@ -39,7 +40,7 @@ def report(folder: str | Path, *, format: str = "md", strict: bool = False) -> s
     """
     check_flags(strict=strict)
     if not isinstance(format, str) or f".{format}" not in PAGES:
-        raise UsageError(Field("format"), f" {format!r}: expected md or html")
+        raise UsageError(Field("format"), f" {quoted(format)}: expected md or html")
     return page(path_of("folder", folder), f".{format}", strict=strict)[1]
 
 

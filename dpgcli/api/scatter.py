@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import TypeAlias
 
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.api.inputs import as_texts, check_whole
+from dpgcli.api.inputs import as_texts, by_text, check_whole, plain
 from dpgcli.api.pressure import PressedInput
 from dpgcli.arrays import Indices
 from dpgcli.design.dimensions import LARGEST, Tolerance, unit_of
@@ -127,7 +127,7 @@ def spread_of(scatter: ScatterInput) -> dict[str, Tolerance]:
 def _pairs(scatter: ScatterInput) -> Iterator[tuple[str, str]]:
     """Keys and what is said of them."""
     if isinstance(scatter, Mapping):
-        yield from ((str(key), str(said)) for key, said in scatter.items())
+        yield from ((key, str(plain(said))) for key, said in by_text("scatter", scatter).items())
         return
     for text in as_texts("scatter", scatter):
         for part in text.split(","):

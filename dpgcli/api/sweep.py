@@ -56,6 +56,7 @@ from dpgcli.sweeps.gate import (
     requirement,
 )
 from dpgcli.temporary import temporary_folder
+from dpgcli.text import quoted
 
 EXECUTORS = ("processes", "serial", "dask")
 WAIT = 300.0  # s
@@ -289,7 +290,7 @@ class Place:
         check_numbers(wait=self.wait)
         dask, scheduler = Field("executor"), Field("scheduler")
         if self.executor not in EXECUTORS:
-            raise UsageError(dask, f" {self.executor!r}: expected {', '.join(EXECUTORS)}")
+            raise UsageError(dask, f" {quoted(self.executor)}: expected {', '.join(EXECUTORS)}")
         if self.jobs is not None and self.jobs < 1:
             raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
         if self.is_sent != (self.scheduler is not None):

@@ -53,6 +53,11 @@ EXAMPLES = {
         "dpg landscape finger.yaml --from 000 --to 111",
         "dpg landscape finger.yaml --from 000 --to 111 --via 001 --plot landscape.svg",
     ),
+    "grasp": (
+        "dpg grasp gripper.yaml --object disc:40 --at 40,0",
+        "dpg grasp gripper.yaml --object disc:40 --at 40,0 --pattern 111* --plot grasps.svg",
+        "dpg grasp gripper.yaml --object disc:40 --at 40,5 --pattern 11111/11100",
+    ),
     "pulses": (
         "dpg pulses finger.yaml --to 111",
         "dpg pulses finger.yaml --to 110 --set 'pressure.lines={A: 1-2, B: 3}'",

@@ -20,8 +20,8 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
     *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
-    *("stress", "actuate", "transitions", "pulses", "landscape", "validate", "init", "schema"),
-    *("fit", "fe", "help"),
+    *("stress", "actuate", "transitions", "pulses", "landscape", "grasp", "validate", "init"),
+    *("schema", "fit", "fe", "help"),
 )
 
 

@@ -155,10 +155,11 @@ def frame_of(
     first_station: str | None, tip_offset: str | None
 ) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
     """Where the lattice lies in given data, as far as the options say it."""
-    return _point("--first-station", first_station), _point("--tip-offset", tip_offset)
+    return point("--first-station", first_station), point("--tip-offset", tip_offset)
 
 
-def _point(option: str, text: str | None) -> tuple[float, float] | None:
+def point(option: str, text: str | None) -> tuple[float, float] | None:
+    """A place of an option, in mm; none of no text. Raises UsageError for what is none."""
     from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
 

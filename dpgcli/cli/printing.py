@@ -44,6 +44,7 @@ DROPPED_FIRST = (
 TOO_SMALL = 1e-3  # for fixed decimals: such as the tips of a finger of micrometers
 ROUNDED = {
     "residual_N": ".1e",
+    "penetration_mm": ".1e",
     "numerical_error_mm": ".1e",
     "min_eigenvalue_N_per_mm": ".5f",
     "mm": ".5f",

@@ -127,6 +127,14 @@ class Gripper:
 
 
 @dataclass(frozen=True)
+class Disc:
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+
+    center: Array
+    radius: float
+
+
+@dataclass(frozen=True)
 class Chambers:
     """Sizes (mm) of a finger's chambers that its lattice does not have, NaN where none is known.
 
@@ -147,7 +155,7 @@ class Scene:
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
     is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
     its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
-    `pressure` is None where the spec says nothing of it.
+    `pressure` and `body` are None where the spec says nothing of them.
     """
 
     finger: Finger
@@ -160,6 +168,7 @@ class Scene:
     trusts: tuple[Trust, ...] = ()
     warnings: tuple[str, ...] = ()
     pressure: Pressure | None = None
+    body: Disc | None = None
 
     def take_lanes(self, index: Indices) -> "Scene":
         """Some designs of a batch, without what is said of a single one."""

@@ -48,7 +48,7 @@ def beyond(
     beside that point.
     """
     depth, which = max(family.column_depths), np.array([cell])
-    values = family.measure(before).value
+    values = family.followed(before).value
     here = corrected(family, before, load, which, values[cell], depth)
     scale = of_cell(family, here, which)[1]
     step = 2.0 * float((fold - values[cell, 0]) / scale[0])
@@ -82,7 +82,7 @@ def _alone(
 ) -> Array:
     """The motion by which a force on the cell alone moves it by one scale."""
     _, scale, chosen = of_cell(family, here, cell)
-    own = (chosen * along(family.measure.rows, here.measured, here.by_hold)).sum(axis=0)
+    own = (chosen * along(family.followed.rows, here.measured, here.by_hold)).sum(axis=0)
     return np.asarray(here.by_hold / own * scale)
 
 
@@ -97,5 +97,5 @@ def _tangent(
 
 def _is_left(family: LoadedPotential[Coordinates, LoadedLaw], there: Corrected) -> bool:
     """Whether another law holds there."""
-    margin = family.law.margin(there.measured.value, there.load)
+    margin = family.law.margin(there.loaded, there.load)
     return margin is not None and bool((margin < 0.0).any())

@@ -6,7 +6,7 @@ that scalar. Neither knows the other, nor the solver either of them. What a scen
 need is no term, rather than one that is multiplied by zero.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, Self, TypeVar, cast
@@ -78,6 +78,35 @@ class Measure(Protocol):
         """The same measure for some lanes of the batch."""
 
 
+class WideMeasured(NamedTuple):
+    """Scalars that depend on many coordinates, all cells on the same.
+
+    `value` (cell, batch), `gradient` (row, cell, batch); `bent` gives Σ F ∇²q over cells, (row,
+    row, batch), for forces F (cell, batch). `place` (cell, batch) numbers the places of a shape
+    where q is measured: cells of one place have the same q.
+    """
+
+    value: Array
+    gradient: Array
+    bent: Callable[[Array], Array]
+    place: Indices
+
+
+class WideMeasure(Protocol):
+    """A measure each of whose cells depends on the same many coordinates: rows of stride 0."""
+
+    @property
+    def n_cells(self) -> int: ...
+    @property
+    def rows(self) -> tuple[Row, ...]: ...
+
+    def __call__(self, coordinates: Array) -> WideMeasured:
+        """q and its derivatives at coordinates of shape (size, batch)."""
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same measure for some lanes of the batch."""
+
+
 class ScalarLaw(Protocol):
     """A scalar's energy, with the constants of every cell and lane."""
 
@@ -99,7 +128,7 @@ class Term:
     """
 
     kind: str
-    measure: Measure
+    measure: Measure | WideMeasure
     law: ScalarLaw
 
     def take_lanes(self, index: Indices) -> "Term":

@@ -12,7 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
-from dpgcli.equilibrium.contracts import Coordinates, Measured
+from dpgcli.equilibrium.contracts import Coordinates, Measured, WideMeasured
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along, spread
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
@@ -27,6 +27,7 @@ class Corrected(NamedTuple):
     coordinates: Array
     load: Array
     measured: Measured
+    loaded: Measured | WideMeasured
     along_load: Array  # −H'⁻¹ ∂g/∂λ
     by_hold: Array  # H'⁻¹ ∇q
     is_fine: Flags
@@ -53,6 +54,7 @@ class _Look(NamedTuple):
     """What there is at points: which are solutions, which stable; and Newton's step from them."""
 
     measured: Measured
+    loaded: Measured | WideMeasured
     along_load: Array
     by_hold: Array
     is_there: Flags
@@ -75,7 +77,7 @@ def corrected(
     Lanes that have ended are put aside where they are many.
     """
     n, lanes, own = len(load), np.arange(len(load)), family
-    chosen = np.arange(len(family.measure(guess).value))[:, None] == cell
+    chosen = np.arange(family.followed.n_cells)[:, None] == cell
     stiffness = np.where(chosen, np.broadcast_to(family.stiffness, chosen.shape), 0.0)
     here = _Points(guess, load, chosen, stiffness, np.where(cell >= 0, target, 0.0))
     coordinates, by_load, by_hold = np.zeros((3, *guess.shape))
@@ -97,14 +99,17 @@ def corrected(
         here = here._replace(coordinates=moved, load=here.load + change)
         if is_crowded:
             lanes, own, here = lanes[rest], own.take_lanes(rest), here.only(rest)
-    measured = look.measured if len(lanes) == n else family.measure(coordinates)
-    return Corrected(coordinates, loads, measured, by_load, by_hold, is_fine)
+    both = look.measured, look.loaded
+    if len(lanes) < n:
+        loaded, measured = family.looked_at(coordinates)
+        both = measured, loaded
+    return Corrected(coordinates, loads, *both, by_load, by_hold, is_fine)
 
 
 def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth: int) -> _Look:
     coordinates, is_held = family.coordinates, here.chosen.any(axis=0)
     linear = family.linearized(here.coordinates, here.load, here.stiffness, here.target, depth)
-    measured, rows = linear.measured, family.measure.rows
+    measured, rows = linear.followed, family.followed.rows
     away = np.where(here.chosen, measured.value - here.target, 0.0).sum(axis=0)
     factors = factorize(linear.hessian, family.column_depths)
     selector = spread(rows, measured, here.chosen.astype(float), here.coordinates)
@@ -118,8 +123,9 @@ def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth:
     is_held_there = np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
     is_settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
     is_there = np.asarray((residual <= TOLERANCE) & is_held_there & is_settled)
-    is_stable = np.asarray((factors.pivots > 0.0).all(axis=0))
-    return _Look(measured, by_load, by_hold, is_there, is_stable, step, change)
+    n_positive = (factors.pivots > 0.0).sum(axis=0)
+    is_stable = np.asarray(n_positive == coordinates.size - family.n_multipliers)
+    return _Look(measured, linear.loaded, by_load, by_hold, is_there, is_stable, step, change)
 
 
 def _solved(factors: Factorization, sides: Array) -> Array:
@@ -137,7 +143,7 @@ def slope_by(
     With H' = H + k ∇q∇qᵀ the motion per q is k H'⁻¹∇q + λ' z, z = −H'⁻¹ ∂g/∂λ, and ∇q · of it is 1.
     """
     stiffness, scale, chosen = of_cell(family, here, cell)
-    rows, measured = family.measure.rows, here.measured
+    rows, measured = family.followed.rows, here.measured
     by_hold = (chosen * along(rows, measured, here.by_hold)).sum(axis=0)
     by_load = (chosen * along(rows, measured, here.along_load)).sum(axis=0)
     return np.where(cell >= 0, (1.0 - stiffness * by_hold) / by_load * scale, np.nan)

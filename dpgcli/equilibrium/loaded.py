@@ -19,9 +19,11 @@ from dpgcli.equilibrium.contracts import (
     Row,
     ScalarLaw,
     Term,
+    WideMeasure,
+    WideMeasured,
     take_lanes,
 )
-from dpgcli.equilibrium.potential import Potential, add, assemble
+from dpgcli.equilibrium.potential import Potential, add, assemble, widely
 
 System = TypeVar("System", bound=Coordinates, covariant=True)
 Law = TypeVar("Law", bound="LoadedLaw", covariant=True)
@@ -40,7 +42,7 @@ class LoadedLaw(Protocol):
     def rate(self, scalar: Array, load: Array) -> Array:
         """∂F/∂λ."""
 
-    def margin(self, scalar: Array, load: Array) -> Array | None:
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> Array | None:
         """How far each cell is from where another law begins, at least 0; None if none does."""
 
     def take_lanes(self, index: Indices) -> Self:
@@ -49,26 +51,28 @@ class LoadedLaw(Protocol):
 
 @dataclass(frozen=True)
 class Holding:
-    """A law, and a spring of stiffness k towards a target on the same scalar.
+    """A law, if any, and a spring of stiffness k towards a target on the same scalar.
 
     `stiffness` (cell, batch) is zero where nothing is held; `target` is (batch,) or by cell.
     """
 
-    law: ScalarLaw
+    law: ScalarLaw | None
     stiffness: Array
     target: Array
 
     def __call__(self, scalar: Array) -> Response:
         """Energy, force and stiffness of both."""
-        energy, force, stiffness = self.law(scalar)
         away = scalar - self.target
         pull = self.stiffness * away
+        if self.law is None:
+            return Response(0.5 * pull * away, pull, self.stiffness)
+        energy, force, stiffness = self.law(scalar)
         return Response(energy + 0.5 * pull * away, force + pull, stiffness + self.stiffness)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same for some lanes of the batch."""
         parts = take_lanes(self.stiffness, index), take_lanes(self.target, index)
-        return type(self)(self.law.take_lanes(index), *parts)
+        return type(self)(self.law and self.law.take_lanes(index), *parts)
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ class Unchanged:
         """Zero."""
         return np.zeros_like(scalar)
 
-    def margin(self, scalar: Array, load: Array) -> None:
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> None:
         """No other law begins."""
 
     def take_lanes(self, index: Indices) -> Self:
@@ -111,43 +115,54 @@ class Share:
 
 
 class Linearized(NamedTuple):
-    """Gradient, band of the Hessian, ∂g/∂λ and the loaded measure at some coordinates."""
+    """Gradient, band of the Hessian and ∂g/∂λ; the followed and the loaded measure."""
 
     gradient: Array
     hessian: Array
     rate: Array
-    measured: Measured
+    followed: Measured
+    loaded: Measured | WideMeasured
 
 
 @dataclass(frozen=True)
 class LoadedPotential(Generic[System, Law]):
     """Potentials by a load: `terms` that do not feel it, and a `measure` under a loaded `law`.
 
-    Of the terms in `growing` the load is the share that acts.
-
-    `scale` (cell, 1 or batch) is the measure of a large change of each scalar, `stiffness` (same
-    shape) that of a spring which keeps a cell where it is, however its own law softens.
+    Of the terms in `growing` the load is the share that acts. Paths are followed by the scalars
+    `followed`. `scale` (cell, 1 or batch) is the measure of a large change of each, `stiffness`
+    (same shape) that of a spring which keeps a cell where it is, however its own law softens. A
+    minimum has as many negative pivots as there are multipliers.
     """
 
     coordinates: System
     terms: tuple[Term, ...]
-    measure: Measure
+    measure: Measure | WideMeasure
     law: Law
+    followed: Measure
     scale: Array
     stiffness: Array
     growing: tuple[Term, ...] = ()
+    n_multipliers: int = 0
 
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
         """The same potential for some lanes of the batch."""
+        followed = self.followed.take_lanes(index)
         return LoadedPotential(
             self.coordinates.take_lanes(index),
             tuple(term.take_lanes(index) for term in self.terms),
-            self.measure.take_lanes(index),
+            followed if self.is_by_load else self.measure.take_lanes(index),
             self.law.take_lanes(index),
+            followed,
             take_lanes(self.scale, index),
             take_lanes(self.stiffness, index),
             tuple(term.take_lanes(index) for term in self.growing),
+            self.n_multipliers,
         )
+
+    @property
+    def is_by_load(self) -> bool:
+        """Whether paths are followed by the very scalars that are loaded."""
+        return self.followed is self.measure
 
     def at(self, load: Array) -> Potential[System]:
         """The potential under a load, (batch,)."""
@@ -155,11 +170,14 @@ class LoadedPotential(Generic[System, Law]):
 
     def held(self, load: Array, stiffness: Array, target: Array) -> Potential[System]:
         """The same, with springs of some stiffness (cell, batch) towards a target (batch,)."""
-        return self._with(Holding(self.law.at(load), stiffness, target), load)
+        if self.is_by_load:
+            return self._with(Holding(self.law.at(load), stiffness, target), load)
+        hold = Term("hold", self.followed, Holding(None, stiffness, target))
+        return self._with(self.law.at(load), load, hold)
 
-    def _with(self, law: ScalarLaw, load: Array) -> Potential[System]:
+    def _with(self, law: ScalarLaw, load: Array, *others: Term) -> Potential[System]:
         loaded = Term("loaded", self.measure, law)
-        return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load)))
+        return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load), *others))
 
     def _grown(self, load: Array) -> tuple[Term, ...]:
         return tuple(replace(term, law=Share(term.law, load)) for term in self.growing)
@@ -179,19 +197,34 @@ class LoadedPotential(Generic[System, Law]):
             measured = term.measure(coordinates)
             response = term.law(measured.value)
             assemble(term.measure.rows, measured, response, gradient, hessian)
-        measured = self.measure(coordinates)
-        law = Holding(self.law.at(load), stiffness, target)
-        assemble(self.measure.rows, measured, law(measured.value), gradient, hessian)
-        rate = spread(self.measure.rows, measured, self.law.rate(measured.value, load), gradient)
+        loaded, followed = self.looked_at(coordinates)
+        law = self.law.at(load)
+        if self.is_by_load:
+            law = Holding(law, stiffness, target)
+        else:
+            hold = Holding(None, stiffness, target)
+            assemble(self.followed.rows, followed, hold(followed.value), gradient, hessian)
+        assemble(self.measure.rows, loaded, law(loaded.value), gradient, hessian)
+        rate = spread(self.measure.rows, loaded, self.law.rate(loaded.value, load), gradient)
         for term in self.growing:
             at = term.measure(coordinates)
             rate += spread(term.measure.rows, at, term.law(at.value).force, gradient)
-        return Linearized(gradient, hessian, rate, measured)
+        return Linearized(gradient, hessian, rate, followed, loaded)
+
+    def looked_at(self, coordinates: Array) -> tuple[Measured | WideMeasured, Measured]:
+        """The loaded and the followed measure."""
+        followed = self.followed(coordinates)
+        return followed if self.is_by_load else self.measure(coordinates), followed
 
 
-def spread(rows: tuple[Row, ...], measured: Measured, weights: Array, like: Array) -> Array:
+def spread(
+    rows: tuple[Row, ...], measured: Measured | WideMeasured, weights: Array, like: Array
+) -> Array:
     """Σ w ∇q over cells, (size, batch), for weights (cell, batch)."""
     result = np.zeros_like(like)
+    if isinstance(measured, WideMeasured):
+        result[[row.offset for row in rows]] = widely(measured, weights)
+        return result
     if not measured.gradient:
         add(result, rows[0], weights)
         return result

@@ -25,6 +25,8 @@ LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
 FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
+KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
+AT_KINK = 1e-6  # of the load: as near a path comes to a kink beyond which nothing is found
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 AWAY = 1e-9  # of the forces in play: what is nearer to an event may be at it, rounding aside
 SMALLEST_STEP = 1e-9  # of the scale
@@ -67,7 +69,8 @@ class _Walk:
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
     one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
-    moves `cell` is −1, and steps are of the load itself.
+    moves `cell` is −1, and steps are of the load itself. `is_beyond` says that the last step that
+    was tried led beyond an event.
     """
 
     coordinates: Array
@@ -81,6 +84,7 @@ class _Walk:
     last: Array
     last_slope: Array
     margin: Array
+    is_beyond: Flags
 
     def put(self, lanes: Indices, other: "_Walk", taken: Flags) -> None:
         """Replace some lanes by those of another walk."""
@@ -158,15 +162,15 @@ def _begin(
     walk = _Walk(
         here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
-        margin,
+        margin, np.zeros(n, bool),
     )  # fmt: skip
     _turn(family, walk, here, nothing, towards)
     return walk, here.is_fine
 
 
 def _margin(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) -> Array:
-    margin = family.law.margin(here.measured.value, here.load)
-    return np.full(here.measured.value.shape, np.inf) if margin is None else margin
+    margin = family.law.margin(here.loaded, here.load)
+    return np.full(here.loaded.value.shape, np.inf) if margin is None else margin
 
 
 class _Trial(NamedTuple):
@@ -211,18 +215,24 @@ def _one_step(
     meets = is_away & (np.abs(margin) <= AWAY)
     is_crossed = margin < np.where(is_away, -TOLERANCE, -AWAY)
     by_secant = np.where(is_away, margin / (walk.margin - margin), SHRINKING - 1.0)
-    crossed = np.where(is_crossed, by_secant, 0.0)
+    is_new = np.isinf(walk.margin)  # where it began is not known
+    crossed = np.where(is_crossed, np.where(is_new, -0.5, by_secant), 0.0)
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
+    first = np.where(walk.is_beyond, CLOSER * first, first)  # margins that bend: from nearer by
     to_root = walk.slope / (walk.slope - slope)
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
-    is_stuck = ~accepted & (ending < 0) & (shorter < SMALLEST_STEP)
+    is_kinked = (walk.cell < 0) & (family.n_multipliers > 0) & ~is_event
+    is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
+    walk.is_beyond = is_event
+    if family.n_multipliers:
+        _go_by_load(walk, ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK))
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
@@ -235,6 +245,15 @@ def _one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _go_by_load(walk: _Walk, which: Flags) -> None:
+    """Go on by the load where no step by a cell leads further: beyond a kink it may not move."""
+    slope = np.where(which, walk.slope, 1.0)
+    walk.cell = np.where(which, -1, walk.cell)
+    walk.onward, walk.slope = walk.onward / slope, walk.slope / slope
+    walk.step = np.where(which, walk.step * slope, walk.step)
+    walk.last_slope = np.where(which, np.nan, walk.last_slope)
 
 
 def _tried(
@@ -257,7 +276,8 @@ def _tried(
     target = walk.values[place] + walk.sign * step * scale[place]
     there = corrected(family, guess, load, cell, target, depth)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
-    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), FOLD_DISTANCE))
+    nearest = KINK if family.n_multipliers else FOLD_DISTANCE
+    is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
 
@@ -358,7 +378,7 @@ def _turn(
     """
     motion, by = motion_by(family, here, cell)
     is_held = cell >= 0
-    rows, measured = family.measure.rows, here.measured
+    rows, measured = family.followed.rows, here.measured
     rates = along(rows, measured, motion) / family.scale
     size = np.abs(rates)
     chosen = size.argmax(axis=0)

@@ -7,7 +7,14 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, total
-from dpgcli.equilibrium.contracts import Coordinates, Measured, Response, Row, Term
+from dpgcli.equilibrium.contracts import (
+    Coordinates,
+    Measured,
+    Response,
+    Row,
+    Term,
+    WideMeasured,
+)
 
 Cells = tuple[tuple[tuple[Row, ...], int], ...]  # rows and number of cells of each measure
 System = TypeVar("System", bound=Coordinates, covariant=True)
@@ -107,9 +114,16 @@ class Potential(Generic[System]):
 
 
 def assemble(
-    rows: tuple[Row, ...], q: Measured, response: Response, gradient: Array, hessian: Array
+    rows: tuple[Row, ...],
+    q: Measured | WideMeasured,
+    response: Response,
+    gradient: Array,
+    hessian: Array,
 ) -> None:
     """Add F ∇q to the gradient and K ∇q ∇qᵀ + F ∇²q to the band of the Hessian."""
+    if isinstance(q, WideMeasured):
+        _assemble_wide(rows, q, response, gradient, hessian)
+        return
     if not q.gradient:
         add(gradient, rows[0], response.force)
         add(hessian[0], rows[0], np.broadcast_to(response.stiffness, response.force.shape))
@@ -136,6 +150,26 @@ def assemble(
             if (first, second) in q.entries:
                 entry += np.multiply(force, q.entries[first, second], out=part)
             add(hessian[depth], rows[first], entry)
+
+
+def _assemble_wide(
+    rows: tuple[Row, ...], q: WideMeasured, response: Response, gradient: Array, hessian: Array
+) -> None:
+    """The same for all cells at once: each has all rows."""
+    places = np.array([row.offset for row in rows])
+    gradient[places] += widely(q, response.force)
+    bend = q.bent(response.force)
+    for slope, stiffness in zip(np.moveaxis(q.gradient, 1, 0), response.stiffness, strict=True):
+        bend += (stiffness * slope)[:, None] * slope
+    first, second = np.triu_indices(len(places))
+    low = np.minimum(places[first], places[second])
+    depth = np.abs(places[second] - places[first])
+    hessian[depth, low] += bend[first, second]
+
+
+def widely(q: WideMeasured, weights: Array) -> Array:
+    """Σ w ∇q over cells, (row, batch), for weights (cell, batch)."""
+    return total(np.moveaxis(q.gradient * weights, 1, 0))
 
 
 def _assemble_load(

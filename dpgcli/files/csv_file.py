@@ -5,11 +5,12 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
@@ -31,6 +32,7 @@ from dpgcli.files.layout import (
     separator_of,
 )
 from dpgcli.files.places import Location, few, in_order, located, shown
+from dpgcli.files.units import are_alike, is_same, name_and_unit, stem_and_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,6 +121,16 @@ class Sheet:
         rows, lines = [self.rows[i] for i in kept], [self.lines[i] for i in kept]
         return replace(self, rows=rows, lines=lines)
 
+    def renamed(self, names: Mapping[str, str]) -> "Sheet":
+        """The sheet with other names, by those that it has; units and titles go with them."""
+        return replace(
+            self,
+            names=tuple(names.get(name, name) for name in self.names),
+            units={names.get(name, name): unit for name, unit in self.units.items()},
+            titles={names.get(name, name): title for name, title in self.titles.items()},
+            reversed=frozenset(names.get(name, name) for name in self.reversed),
+        )
+
     def problem(
         self, row: int | None, key: str, expected: str, found: str, hint: str = ""
     ) -> Problem:
@@ -126,10 +138,18 @@ class Sheet:
         line = None if row is None else self.lines[row]
         return located(Location(self.file, line), key, expected, found, hint)
 
-    def numbers(self, names: Sequence[str], *, may_lack: bool = False) -> dict[str, Array]:
+    def numbers(
+        self,
+        names: Sequence[str],
+        *,
+        may_lack: bool = False,
+        factors: Mapping[str, float] = MappingProxyType({}),
+    ) -> dict[str, Array]:
         """Columns as numbers by name; empty cells are NaN if they may be lacking.
 
-        Raises SpecError with every cell that holds no number.
+        Where a caller has looked at a column's unit it says the factor of its numbers. All others
+        are in the unit of their name: Raises SpecError where the file says another one, with every
+        cell that holds no number.
         """
         cells = {name: self.cells(name) for name in names}
         columns = {
@@ -145,12 +165,22 @@ class Sheet:
                 if value is None
             )
         ]
+        problems += self._other_units([name for name in names if name not in factors])
         if problems:
             raise SpecError(in_order(problems))
+        signs = {name: -1.0 if name in self.reversed else 1.0 for name in names}
         return {
-            name: np.array(values, np.float64) * (-1.0 if name in self.reversed else 1.0)
+            name: np.array(values, np.float64) * signs[name] * factors.get(name, 1.0)
             for name, values in columns.items()
         }
+
+    def _other_units(self, names: Sequence[str]) -> Iterator[Problem]:
+        """Columns that the file says another unit of than their names."""
+        for name in names:
+            unit, own = self.units.get(name, ""), stem_and_unit(name_and_unit(name)[0])[1]
+            if unit and own is not None and not is_same(unit, own):
+                expected = f"{own or 'no unit'}, as the name has it"
+                yield self.problem(None, name, expected, f"{shown(unit)} beside it")
 
     @cached_property
     def marks(self) -> Marks:
@@ -229,18 +259,19 @@ def text_of(content: bytes, place: Location) -> str:
 
 
 def read_sheet(
-    source: Tabular, wanted: Container[str] = frozenset(), choice: Choice = AS_IT_IS
+    source: Tabular, wanted: Collection[str] = frozenset(), choice: Choice = AS_IT_IS
 ) -> Sheet:
     """Read a CSV file with a header; lines that start with # are comments.
 
     A file may have its own separators and marks, titles above the header and units below it: see
     `files.layout`. The header is the row with the titles that are chosen or names that are
-    `wanted`. A data frame is read as the CSV that it would be written to, header in line 1, but
-    for comments: it has none, and every row counts.
+    `wanted`, with their units behind them or without. A data frame is read as the CSV that it
+    would be written to, header in line 1, but for comments: it has none, and every row counts.
 
     Below the header a comment has a space behind the #: spreadsheets write #DIV/0!, and of a row
     such as #5,0.2 nobody knows whether it is meant.
-    Raises SpecError for what cannot be read, names that repeat, and rows of another length.
+    Raises SpecError for what cannot be read, names that repeat, rows of another length, and
+    columns that are called as one that is wanted and not there, but for the unit.
     """
     file, content = _content(source)
     is_file = isinstance(source, str | Path)
@@ -272,6 +303,7 @@ def read_sheet(
         tuple(_comments(lines[:line])) if is_file else (),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
+    problems += _renamed(sheet, wanted, line)
     if is_file and below and choice.is_by_place and may_be_titles(below):
         problems.append(_asked(sheet, 0))
     if is_file and separator == ",":
@@ -326,6 +358,22 @@ def _untitled(sheet: Sheet, places: Sequence[int], header: int) -> Iterator[Prob
         if number := next(filter(is_number, cells), ""):
             expected, found = f"a title for column {place + 1}", f"none above {number}"
             yield located(Location(sheet.file, header), "header", expected, found, DECIMALS)
+
+
+def _renamed(sheet: Sheet, wanted: Collection[str], header: int) -> Iterator[Problem]:
+    """Columns called as one that is wanted and not there, but for the unit: they would be lost."""
+    lacking = {
+        stem.casefold(): (name, unit)
+        for name in wanted
+        if name not in sheet.names
+        for stem, unit in [stem_and_unit(name)]
+        if unit
+    }
+    for name in (name for name in sheet.names if name not in wanted):
+        stem, unit = stem_and_unit(re.split(r"\W", name, maxsplit=1)[0])
+        known, own = lacking.get(stem.casefold(), ("", ""))
+        if unit and own and are_alike(unit, own):
+            yield located(Location(sheet.file, header), "header", f"{known}, in {own}", shown(name))
 
 
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:

@@ -1,11 +1,16 @@
 """Tables that are handed in as values: data frames, Arrow tables, columns by name."""
 
+from decimal import Decimal
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from dpgcli.errors import UsageError
+from dpgcli.text import quoted, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
+
+MOST_BITS = 1024  # of a whole number: more than double precision reaches
 
 
 def frame_of(source: Any) -> "pd.DataFrame":
@@ -23,9 +28,31 @@ def frame_of(source: Any) -> "pd.DataFrame":
     convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
     try:
         frame = pd.DataFrame(source if convert is None else convert())  # an array's is a series
-        return with_index(frame)
-    except (ValueError, TypeError, AttributeError) as error:
+        frame = with_index(frame)
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise UsageError(f"expected a table, columns of one length: {error}") from error
+    for name, column in frame.items():
+        if _is_no_cell(name):
+            raise UsageError(f"expected a table, found a column {shortened(quoted(name))}")
+        if column.dtype == object and (wrong := [*islice(filter(_is_no_cell, column), 1)]):
+            found = f"{quoted(name)}: {shortened(quoted(wrong[0]))}"
+            raise UsageError(f"expected a table of numbers and texts, found in column {found}")
+    return frame
+
+
+def _is_no_cell(value: Any) -> bool:
+    """Whether no table holds a value: lists within lists, which may go on without end.
+
+    Neither does it hold numbers of more digits than Python writes, nor any that signal.
+    """
+    import numpy as np
+
+    if isinstance(value, many := list | tuple | dict | set | np.ndarray):
+        parts = value.values() if isinstance(value, dict) else value
+        return any(isinstance(part, many) for part in parts)
+    if isinstance(value, Decimal):
+        return value.is_snan()
+    return isinstance(value, int) and value.bit_length() > MOST_BITS
 
 
 def with_index(frame: "pd.DataFrame") -> "pd.DataFrame":

@@ -45,9 +45,12 @@ def headed(
     titles = list(rows[place].cells)
     if _are_numbers(titles, below, sources):
         below, titles = list(rows[place:]), [str(n) for n in range(1, len(titles) + 1)]
-    units = below.pop(0).cells if below and is_of_units(below[0]) else []
+    if below and is_of_units(below[0]):
+        units = below.pop(0).cells
+    else:
+        units = rows[place - 1].cells if place and is_of_units(rows[place - 1]) else []
     found = dict(_found(titles, columns))
-    names = _named(titles, found)
+    names = _named(titles, found, wanted)
     needed = {*found} | {n for n in names if n in wanted}
     n_names = _width(names, below, needed if may_be_longer else names)
     first = next((place for place, title in enumerate(titles) if title), 0)
@@ -118,12 +121,22 @@ def _place(titles: Sequence[str], source: str) -> int | None:
     return place
 
 
-def _named(titles: Sequence[str], found: Mapping[str, tuple[int, bool]]) -> list[str]:
-    """Our names where columns were chosen; of the others, those that stand there once."""
-    names = list(titles)
+def _named(
+    titles: Sequence[str], found: Mapping[str, tuple[int, bool]], wanted: Container[str]
+) -> list[str]:
+    """Our names where columns were chosen; of the others, those that stand there once.
+
+    A name that is wanted may have its unit behind it.
+    """
+    bare_names = [name_and_unit(title)[0] for title in titles]
+    names = [
+        name if name in wanted and name not in found and name not in titles else title
+        for title, name in zip(titles, bare_names, strict=True)
+    ]
     if found:
         counts = Counter(titles)
-        names = ["" if counts[title] > 1 else title for title in titles]
+        pairs = zip(names, titles, strict=True)
+        names = ["" if counts[title] > 1 else name for name, title in pairs]
     for name, (place, _) in found.items():
         names[place] = name
     return names

@@ -12,7 +12,8 @@ from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
 from dpgcli.files.layout import NUMBER
-from dpgcli.files.places import Location, in_order, located
+from dpgcli.files.places import Location, in_order, located, shown
+from dpgcli.files.units import stem_and_unit
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -24,10 +25,12 @@ PATTERN_OF = {"ground": "0", "inverted": "1"}
 OF_ONE_UNIT = {UNIT: "pattern", "opening_mm": "opening1_mm", "push_N": "push1_N"}
 CLAMPED = "chamber1_angle_rad"  # the first chamber, whose turn counts as none
 STATION, OFFSET = "first_station_mm", "tip_offset_mm"
+FRAME_STEMS = tuple(stem_and_unit(key)[0] for key in (STATION, OFFSET))
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
 UNLIKELY = 30.0  # times what hinge and dome say, or as little of it: another unit
+ODD = 6.0  # times the stroke or the length that is known, or as little of it: another unit
 FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
@@ -96,7 +99,11 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
     problems = []
     for line, text in sheet.comments:
         key, mark, said = (part.strip() for part in text.partition(":"))
-        if not mark or key not in (STATION, OFFSET):
+        if not mark or stem_and_unit(key)[0] not in FRAME_STEMS:
+            continue
+        if key not in (STATION, OFFSET):
+            place = Location(sheet.file, line)
+            problems.append(located(place, key, f"{STATION} or {OFFSET}, in mm", shown(key)))
             continue
         numbers = said.removeprefix("[").removesuffix("]").split(",")
         if len(numbers) == len(TIP) and all(NUMBER.fullmatch(n.strip()) for n in numbers):
@@ -110,12 +117,35 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
 def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
     """Known states that can be those of this finger, in mm and rad.
 
-    Raises SpecError as `read_states`, `check_scale` and `check_loads` do.
+    Raises SpecError as `read_states`, `check_scale` and `check_loads` do, and for openings or
+    layers that are ten times too large or too small for it: centimeters.
     """
     known = read_states(source, finger.n_units, shapes)
     check_scale(source, known, float(finger.straight_length[0]))
     check_loads(source, known, finger)
+    if problems := [*_centimeters(source, shapes, known, finger)]:
+        raise SpecError(tuple(problems))
     return known
+
+
+def _centimeters(
+    source: Tabular, shapes: Tabular | None, known: KnownStates, finger: Finger
+) -> Iterator[Problem]:
+    """Problems of openings of inverted units beside the stroke, and of layers beside the finger."""
+    inverted = known.openings[:, known.moments == 0.0][known.patterns[:, known.moments == 0.0]]
+    opened = float(np.max(inverted, initial=0.0, where=np.isfinite(inverted)))
+    lengths = [float(np.hypot(*np.diff(shape, axis=1)).sum()) for shape in known.shapes]
+    opening = "opening_mm" if finger.n_units == 1 else "opening1_mm"
+    stroke, length = float(finger.stroke.mean()), float(finger.straight_length[0])
+    for table, key, what, found, usual in (
+        (source, opening, "openings of inverted units", opened, stroke),
+        (shapes, "x_mm", "layers from base to tip", max(lengths, default=0.0), length),
+    ):
+        if found > 0.0 and not usual / ODD < found < usual * ODD:
+            place = Location(str(table) if isinstance(table, str | Path) else FRAME)
+            hint = "centimeters?" if found < usual else "is the unit another one?"
+            expected = f"{what} in mm, about {usual:.3g}"
+            yield located(place, key, expected, f"{found:.3g}, the largest", hint)
 
 
 def check_loads(source: Tabular, known: KnownStates, finger: Finger) -> None:
@@ -231,7 +261,6 @@ def _pattern_problems(sheet: Sheet, n_units: int) -> list[Problem]:
 
 def _of_one_unit(sheet: Sheet) -> Sheet:
     """A table of one unit, with the names that a table of states has."""
-    names = tuple(OF_ONE_UNIT.get(name, name) for name in sheet.names)
     place = sheet.names.index(UNIT)
     rows = [[*row] for row in sheet.rows]
     problems = []
@@ -242,7 +271,7 @@ def _of_one_unit(sheet: Sheet) -> Sheet:
             problems.append(sheet.problem(line, UNIT, " or ".join(PATTERN_OF), repr(said)))
     if problems:
         raise SpecError(tuple(problems))
-    return replace(sheet, names=names, rows=rows)
+    return replace(sheet.renamed(OF_ONE_UNIT), rows=rows)
 
 
 def _moments(sheet: Sheet, patterns: Sequence[str]) -> Array:

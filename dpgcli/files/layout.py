@@ -172,7 +172,7 @@ def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str
         if sources and all(source in titles for source in sources):
             return place
     for place, row in enumerate(rows):
-        if any(cell in wanted for cell in row.cells if cell):
+        if any(cell in wanted or name_and_unit(cell)[0] in wanted for cell in row.cells if cell):
             return place
     return _before_numbers(rows)
 

@@ -153,7 +153,7 @@ def read_table(source: Tabular) -> GridTable:
 
     Columns of text are left out. Raises SpecError with every problem at once.
     """
-    sheet = read_sheet(source, Geometry.model_fields)
+    sheet = read_sheet(source, {*Geometry.model_fields, *Values.model_fields})
     keys = [name for name in sheet.names if name in Geometry.model_fields]
     others = [
         name

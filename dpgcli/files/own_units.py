@@ -46,15 +46,15 @@ def in_own_units(
     Raises SpecError for units that are not known, or that say something else than a name does.
     """
     problems = list(_unit_problems(sheet, quantities, given))
+    factors = {name: _factor(sheet, name, kind, given) for name, kind in quantities.items()}
     try:
-        columns = sheet.numbers(list(quantities))
+        columns = sheet.numbers(list(quantities), factors=factors)
     except SpecError as error:
         raise SpecError(in_order([*error.problems, *problems])) from None
     if problems:
         raise SpecError(tuple(problems))
-    factors = {name: _factor(sheet, name, kind, given) for name, kind in quantities.items()}
     return InOwnUnits(
-        {name: columns[name] * factors[name] for name in quantities},
+        columns,
         frozenset(n for n, kind in quantities.items() if kind in given or n in sheet.units),
         tuple(_notes(sheet, quantities, given)),
     )

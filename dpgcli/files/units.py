@@ -38,6 +38,11 @@ BRACKETED = re.compile(r"\((.*)\)|\[(.*)\]|<(.*)>")
 IN_NAME = re.compile(
     r"(?P<name>.*\S)\s*(?:\((?P<a>[^()]*)\)|\[(?P<b>[^][]*)\]|\s(?:/|in)\s*(?P<c>\S+))"
 )
+KNOWN = frozenset(unit for units in FACTORS.values() for unit in units)
+WORDS = "|".join([*sorted(filter(str.isidentifier, KNOWN)), "[cm]?m2"])
+IN_KEY = re.compile(rf"(.+?)_((?:{WORDS})(?:_(?:per_)?(?:{WORDS}))*)")
+SAID_BY_KEY = {"seconds": "s", "force_linearity": ""}  # keys whose unit does not end them
+NO_UNIT = ("-", "1")
 
 
 def factor_of(quantity: str, unit: str) -> float | None:
@@ -51,12 +56,13 @@ def factor_of(quantity: str, unit: str) -> float | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit: one that is known, or whatever stands in brackets.
+    """Whether a text is a unit: one that is known, a quotient of such, or what is in brackets.
 
-    >>> is_unit("kN"), is_unit("[V]"), is_unit("Load")
-    (True, True, False)
+    >>> is_unit("kN"), is_unit("N mm/rad"), is_unit("[V]"), is_unit("Load")
+    (True, True, True, False)
     """
-    is_known = any(_plain(text) in units for units in FACTORS.values())
+    plain = _plain(text)
+    is_known = plain in KNOWN or KNOWN.issuperset(plain.split("/"))
     return is_known or BRACKETED.fullmatch(text) is not None
 
 
@@ -83,6 +89,45 @@ def name_and_unit(title: str) -> tuple[str, str]:
     if match["c"] is not None and not is_unit(unit):  # no unit, but words
         return title, ""
     return match["name"], unit
+
+
+def stem_and_unit(key: str) -> tuple[str, str | None]:
+    """A key without its unit, and the unit as it is written; None where the key says none.
+
+    >>> stem_and_unit("moment_N_mm"), stem_and_unit("hinge_stiffness_N_mm_per_rad")
+    (('moment', 'N mm'), ('hinge_stiffness', 'N mm/rad'))
+    >>> stem_and_unit("force_linearity"), stem_and_unit("pattern")
+    (('force_linearity', ''), ('pattern', None))
+    """
+    match = IN_KEY.fullmatch(key)
+    if match is None:
+        return key, SAID_BY_KEY.get(key)
+    return match[1], match[2].replace("_per_", "/").replace("_", " ")
+
+
+def is_same(unit: str, own: str) -> bool:
+    """Whether a number is the same in both units; where there is none, of what has none.
+
+    >>> is_same("mN m", "N mm"), is_same("N cm", "N mm"), is_same("-", ""), is_same("%", "")
+    (True, False, True, False)
+    """
+    if not own:
+        return unit in NO_UNIT
+    factors = ((units.get(_plain(unit)), units.get(_plain(own))) for units in FACTORS.values())
+    return _plain(unit) == _plain(own) or any(a is not None and a == b for a, b in factors)
+
+
+def are_alike(unit: str, other: str) -> bool:
+    """Whether both are units of one quantity, or of none that is known.
+
+    >>> are_alike("cm", "mm"), are_alike("N/m", "N/mm"), are_alike("min", "mm")
+    (True, True, False)
+    """
+    ours, theirs = (
+        {quantity for quantity, units in FACTORS.items() if _plain(text) in units}
+        for text in (unit, other)
+    )
+    return bool(ours & theirs) or not ours | theirs
 
 
 def units_in(texts: Mapping[str, str], quantities: Mapping[str, str]) -> dict[str, float]:

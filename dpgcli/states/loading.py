@@ -1,10 +1,12 @@
 """Fingers as their dead loads grow: followed from the unloaded state, through units that flip."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import Measure
 from dpgcli.equilibrium.loaded import LoadedPotential, Unchanged
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
@@ -88,8 +90,9 @@ def _family(
     growing = tuple(term for term in potential.terms if term.kind == LOAD)
     others = tuple(term for term in potential.terms if term.kind not in (LOAD, "bistable"))
     scale = units.finger.stroke, units.holding_stiffness
-    law = Unchanged(dome.law)
-    return LoadedPotential(potential.coordinates, others, dome.measure, law, *scale, growing)
+    law, measure = Unchanged(dome.law), cast("Measure", dome.measure)
+    system = potential.coordinates
+    return LoadedPotential(system, others, measure, law, measure, *scale, growing)
 
 
 def _downhill(

@@ -24,9 +24,16 @@ def omissions(
     """Omitted terms, unknowns and solves of a scene."""
     finger = units.finger
     n = finger.n_units
-    is_there = {"loads": finger.is_loaded, "pressure": scene.pressure is not None}
-    what = enumerated([*(name for name, has in is_there.items() if not has), "contact"])
-    left_out = [Omission(what, "the spec has none")]
+    left_out: list[Omission] = []
+    is_there = {
+        "loads": finger.is_loaded,
+        "pressure": scene.pressure is not None,
+        "contact": scene.body is not None,
+    }
+    if missing := [name for name, has in is_there.items() if not has]:
+        left_out.append(Omission(enumerated(missing), "the spec has none"))
+    if scene.body is not None:
+        left_out.append(Omission("contact", "states are those without the body: dpg grasp"))
     if scene.pressure is not None:
         left_out.append(Omission("pressure", "states are those at 0 MPa"))
     if not finger.has_walls:

@@ -32,6 +32,7 @@ from dpgcli.states.quantities import ALWAYS, LEAST, MISSED, Quantity, declared, 
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
+from dpgcli.text import quoted
 
 FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
@@ -221,7 +222,7 @@ def _check(scene: Scene, request: Request) -> None:
     if request.formulation not in FORMULATIONS:
         raise UsageError(
             Field("formulation"),
-            f" {request.formulation!r}: expected {' or '.join(FORMULATIONS)}",
+            f" {quoted(request.formulation)}: expected {' or '.join(FORMULATIONS)}",
         )
     if request.formulation == "lattice" and scene.finger.is_rigid:
         raise UsageError(

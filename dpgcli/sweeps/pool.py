@@ -6,6 +6,8 @@ keep their sockets where the next run finds what a killed one left.
 
 import atexit
 import os
+import re
+import shutil
 import signal
 import sys
 import tempfile
@@ -28,6 +30,8 @@ from dpgcli.temporary import temporary_folder, working_folder_is_gone
 R = TypeVar("R")
 P = ParamSpec("P")
 
+SEMAPHORES = Path("/dev/shm")  # on Linux; elsewhere their names are nowhere to be seen
+SEMAPHORE_PREFIX = re.compile("dpg-[0-9a-f]{8}")
 LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have about 100
 
 
@@ -163,15 +167,32 @@ def _has_fork_server() -> bool:
 
 @cache
 def _own_temporary_folder() -> None:
-    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left."""
+    """Have `multiprocessing` keep its sockets where the next run finds what a killed one left.
+
+    And have it call semaphores by what an empty file there is called: workers find them by name,
+    so they have names for as long as the pool is there.
+    """
     from multiprocessing import current_process
 
     place = tempfile.gettempdir()
     place = place if len(place) < LONGEST_SOCKET_PLACE else "/tmp"
     held = ExitStack()
-    folder = held.enter_context(temporary_folder(Path(place) / f"pool{os.getuid()}"))
+    named = Path(place) / f"pool{os.getuid()}"
+    folder = held.enter_context(temporary_folder(named, _drop_orphan))
     atexit.register(held.close)
-    vars(current_process())["_config"]["tempdir"] = os.fspath(folder)
+    prefix = f"dpg-{os.urandom(4).hex()}"
+    (folder / prefix).touch()
+    settings = vars(current_process())["_config"]
+    settings |= {"tempdir": os.fspath(folder), "semprefix": f"/{prefix}"}
+
+
+def _drop_orphan(folder: Path) -> None:
+    """Remove the folder of a killed run, and its semaphores, which outlive all its processes."""
+    for prefix in filter(SEMAPHORE_PREFIX.fullmatch, [path.name for path in folder.iterdir()]):
+        for semaphore in SEMAPHORES.glob(f"sem.{prefix}-*"):
+            with suppress(OSError):  # somebody else's, or gone
+                semaphore.unlink()
+    shutil.rmtree(folder)
 
 
 class _Pool(ProcessPoolExecutor):

@@ -1,7 +1,9 @@
 """Arguments of a wrong type are the user's mistake: they are named, with what was expected."""
 
+import inspect
 from collections.abc import Callable
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +145,91 @@ def fit(**given: Any) -> Any:
 def test_what_it_cannot_be_is_named(call: Callable[[], Any], said: str) -> None:
     with pytest.raises(dpg.UsageError, match=f"^{said}"):
         call()
+
+
+ITSELF: list[Any] = []
+ITSELF.append(ITSELF)
+DEEP: list[Any] = []
+for _ in range(20_000):
+    DEEP = [DEEP]
+HUGE = 10**5000
+UNWRITABLE = [HUGE, [HUGE, 1], {"a": HUGE}, {HUGE: 1}, {"A": [HUGE, 1]}, Fraction(10**400)]
+UNWRITABLE += [Decimal("sNaN"), {"a": [Decimal("sNaN"), 1]}, {"a": Fraction(10**400)}]
+UNWRITABLE += [{"finger": {"units": value}} for value in (HUGE, Fraction(10**400))]
+UNWRITABLE += [DEEP, {"a": DEEP}, {"a": [DEEP, 1.0]}, {"a": [{"b": DEEP}]}, ITSELF, {"a": ITSELF}]
+NEEDED: dict[Callable[..., Any], dict[str, Any]] = {
+    dpg.actuate: {"spec": BASE, "pressure": "0:0.1"},
+    dpg.bench: {"spec": "none"},
+    dpg.check: {"designs": {**DESIGNS, "n_stable": [4]}, "require": "n_stable > 1"},
+    dpg.compare: {"spec": BASE, "data": TIPS},
+    dpg.explain: {"spec": BASE},
+    dpg.fit_bistable: {"curve": DOME, "travel_to_opening": "equal"},
+    dpg.fit_finger: {"spec": FINGER, "states": TIPS},
+    dpg.fit_grid: {"table": GRID},
+    dpg.fit_hinge: {"curve": {"moment_N_mm": [1.0, 2.0], "rotation_rad": [0.1, 0.2]}},
+    dpg.fit_unit: {
+        "curve": {"unit": ["ground"], "moment_N_mm": [1.0], "chamber2_angle_rad": [-0.1]}
+    },
+    dpg.landscape: {"spec": FINGER, "start": "00", "end": "01"},
+    dpg.merge: {"shards": ["none"], "output": "none"},
+    dpg.predict: {"spec": BASE},
+    dpg.pulses: {"spec": BASE, "end": "11"},
+    dpg.read_calibration: {"path": "none"},
+    dpg.report: {"folder": "none"},
+    dpg.stress: {"only": "none"},
+    dpg.sweep: {"sweep": SWEEP, "executor": "serial"},
+    dpg.transitions: {"spec": BASE},
+    dpg.validate: {},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", NEEDED)
+def test_what_cannot_be_written_is_no_crash(
+    function: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole numbers of thousands of digits, numbers that signal, lists without end."""
+    monkeypatch.chdir(tmp_path)
+    for name in inspect.signature(function).parameters:
+        for value in UNWRITABLE if name != "watch" else ():
+            given = (value,) if name == "specs" else ()
+            named = {**NEEDED[function], **({} if given else {name: value})}
+            try:
+                function(*given, **named)
+            except dpg.DpgError as error:
+                assert len(str(error)) < 20_000
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: dpg.predict(FINGER, tolerance=HUGE), "tolerance an int that cannot be written:"),
+        (lambda: dpg.sweep(SWEEP, jobs=HUGE), "jobs an int that cannot be written: expected"),
+        (lambda: dpg.predict(BASE, patterns=[HUGE]), "patterns a list that cannot be written"),
+        (lambda: dpg.validate(BASE, settings={"finger.units": HUGE}), "a spec has no such number"),
+        (lambda: dpg.predict({"finger": {"units": Fraction(10**400)}}), "a spec has no such"),
+        (lambda: dpg.predict({"finger": {"units": Decimal("sNaN")}}), "a spec has no such"),
+        (lambda: dpg.predict({"finger": {HUGE: 1}}), "spec: an int that cannot be written is no"),
+        (lambda: dpg.check({"a": DEEP}, "a > 1"), "expected a table of numbers and texts, found"),
+        (lambda: dpg.check({"a": [ITSELF, 1]}, "a > 1"), "expected a table of numbers and texts"),
+        (lambda: dpg.compare(BASE, {**TIPS, HUGE: [1]}), "expected a table, found a column an int"),
+        (lambda: dpg.fit_hinge({"a": [HUGE]}), "expected a table of numbers and texts, found in"),
+        (
+            lambda: dpg.predict({"finger": {"overrides": {2: {}, "2": {}}}}),
+            "spec: 2 is there twice, as '2' as well",
+        ),
+        (lambda: dpg.actuate(BASE, pressure={1: "0:1", "1": "0:2"}), "pressure: 1 is there twice"),
+    ],
+)
+def test_what_cannot_be_written_or_is_lost_is_named(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(dpg.UsageError, match=f"^{said}"):
+        call()
+
+
+def test_a_list_in_a_cell_is_no_list_without_end() -> None:
+    frame = pd.DataFrame({**DESIGNS, "n_stable": [4], "mine": [[1, 2]]})
+    (verdict,) = dpg.check(frame, "n_stable > 3")
+    assert verdict.is_met
 
 
 @pytest.mark.parametrize(

@@ -65,6 +65,29 @@ def test_the_pool_of_a_sweep(
     assert not list(place.iterdir())
 
 
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="semaphores have no names to be seen")
+def test_the_semaphores_of_a_sweep_whose_processes_are_all_killed(
+    start: Any,
+    run: Any,
+    folder: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    place = tmp_path_factory.mktemp("t")
+    monkeypatch.setenv("TMPDIR", os.fspath(place))
+    (folder / "sweep.yaml").write_text(SWEEP)
+    command = ("sweep", "sweep.yaml", "-o", "out", "-j", "2", "-q", "-s", "finger.units=5")
+    process = start(*command, start_new_session=True)
+    prefix = until(lambda: [path.name for path in place.rglob("dpg-*")])[0]
+    until(lambda: list(Path("/dev/shm").glob(f"sem.{prefix}-*")))
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert list(Path("/dev/shm").glob(f"sem.{prefix}-*"))
+    assert run(*command).returncode == ExitCode.DONE
+    assert not list(Path("/dev/shm").glob(f"sem.{prefix}-*"))
+    assert not list(place.iterdir())
+
+
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_a_solver_and_its_folder(
     start: Any, run: Any, folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import SpecError
-from dpgcli.files.known_states import check_scale, read_states
+from dpgcli.files.known_states import check_scale, read_states, states_of
+from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 WHOLE = """\
 # by finite elements
@@ -303,3 +304,32 @@ def test_shapes_are_those_of_states_without_a_moment(write):
     states = "pattern,moment_N_mm,tip_x_mm,tip_y_mm\n00,0,27,0\n00,5,,\n"
     known = read_states(write(states), 2, write("pattern,x_mm,y_mm\n00,0,0\n00,27,0\n", "s.csv"))
     assert [shape.shape for shape in known.shapes] == [(2, 2), (2, 0)]
+
+
+CENTIMETERS = pytest.mark.parametrize("factor", [0.1, 10.0])
+STATES = {"pattern": ["00", "11"], "tip_x_mm": [27.0, 22.0], "tip_y_mm": [0.0, -9.0]}
+
+
+@CENTIMETERS
+def test_openings_in_centimeters(factor):
+    finger = uniform_finger(2, **STUDY)
+    opened = {"opening1_mm": [0.0, 3.4 * factor], "opening2_mm": [0.0, 3.5 * factor]}
+    with pytest.raises(SpecError, match=r"opening1_mm: expected openings .* about 3.5, found"):
+        states_of(finger, STATES | opened)
+    under = {"moment_N_mm": [0.0, 1.0]}  # which opens it as far as it may be
+    assert states_of(finger, STATES | opened | under).openings.max() == 3.5 * factor
+
+
+@CENTIMETERS
+def test_shapes_in_centimeters(factor):
+    points = {"x_mm": [0.0, 13 * factor, 27 * factor], "y_mm": [0.0, 0.1, 0.2]}
+    shapes = {"pattern": ["00"] * 3} | points
+    with pytest.raises(SpecError, match=r"x_mm: expected layers .* about 27, found"):
+        states_of(uniform_finger(2, **STUDY), STATES, shapes)
+
+
+@pytest.mark.parametrize("factor", [0.25, 1.0, 4.0])
+def test_openings_and_shapes_of_other_fingers_pass(factor):
+    opened = {"opening1_mm": [0.0, 3.4 * factor]}
+    points = {"x_mm": [0.0, 27 * factor], "y_mm": [0.0, 0.1]}
+    states_of(uniform_finger(2, **STUDY), STATES | opened, {"pattern": ["00"] * 2} | points)

@@ -105,13 +105,11 @@ def test_windows_line_ends(path: Path) -> None:
         ),
         (
             "travel_m,energy_mJ\n0,1\n",
-            "header: expected a column pole_travel_mm or travel_mm, found travel_m, energy_mJ "
-            "(is it travel_m?)",
+            '1: header: expected travel_mm, in mm, found "travel_m"',
         ),
         (
             "travel_mm,energy_J\n0,1\n",
-            "header: expected a column energy_mJ or force_N or pressure_MPa, "
-            "found travel_mm, energy_J (is it energy_J?)",
+            '1: header: expected energy_mJ, in mJ, found "energy_J"',
         ),
         (
             "travel_mm,pole_travel_mm,force_N\n0,0,0\n",
@@ -254,7 +252,7 @@ def test_moments_of_one_variant(path: Path) -> None:
         (MOMENTS, "variant=d", "where: expected a text of variant, found 'd' (a, b; c)"),
         (MOMENTS, "varian=c", "header: expected a column varian, found variant, moment_N_mm"),
         (MOMENTS, "variant", "where: expected COLUMN=TEXT, found 'variant'"),
-        ("moment_N_m,rotation_rad\n1,1\n", None, "expected a column moment_N_mm"),
+        ("moment_N_m,rotation_rad\n1,1\n", None, "expected moment_N_mm, in N mm, found"),
         ("moment_N_mm,angle\n1,1\n", None, "expected a column rotation_rad or rotation_mid"),
         ("moment_N_mm,rotation_rad\n5,10.3\n", None, "found 10.3 (degrees?)"),
         ("moment_N_mm,rotation_rad\n0.005,0.2\n", None, "found 0.005 (N m? if it is right"),

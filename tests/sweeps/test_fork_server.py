@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from dpgcli.sweeps import pool
+
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/cmdline").exists(), reason="needs /proc to look at processes"
 )
@@ -73,3 +75,24 @@ def test_it_is_terminated_without_a_word() -> None:
 def test_beside_other_threads_it_is_a_new_interpreter() -> None:
     """These may hold locks, which nobody would open in a fork."""
     assert said("SIGINT", 1)[0] == ["False", "False", "True", "False"]
+
+
+def test_semaphores_go_with_the_folder_that_names_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And no others, whatever a folder is said to name."""
+    place, folder = tmp_path / "shm", tmp_path / "f"
+    for name in ("sem.dpg-0123abcd-x", "sem.dpg-99999999-x", "sem.mp-a", "sem.dpg-0123abcd"):
+        place.mkdir(exist_ok=True)
+        (place / name).touch()
+    monkeypatch.setattr(pool, "SEMAPHORES", place)
+    folder.mkdir()
+    for name in ("dpg-0123abcd", "dpg-*", "*", "listener-1"):
+        (folder / name).touch()
+    pool._drop_orphan(folder)
+    assert not folder.exists()
+    assert sorted(path.name for path in place.iterdir()) == [
+        "sem.dpg-0123abcd",
+        "sem.dpg-99999999-x",
+        "sem.mp-a",
+    ]

@@ -19,6 +19,7 @@ from dpgcli.api.fits.result import (
 from dpgcli.api.inputs import (
     Texts,
     as_texts,
+    by_text,
     check_positive,
     check_resampling,
     chosen,
@@ -39,6 +40,7 @@ from dpgcli.files.measured import Measured, read_curve
 from dpgcli.files.sections import Geometry
 from dpgcli.reports.fit_figures import bistable_figure, draw_fit
 from dpgcli.reports.fits import bistable_summary, value_rows
+from dpgcli.text import quoted
 
 
 def fit_bistable(
@@ -79,8 +81,7 @@ def fit_bistable(
     >>> round(fit.values["bistable_stiffness_N_per_mm"], 6), round(fit.values["stroke_mm"], 6)
     (2.0, 2.0)
     """
-    mapping = travel_to_opening
-    opening = mapping if isinstance(mapping, Opening) else Opening.of(str(mapping))
+    opening = _opening(travel_to_opening)
     held = _held(fix, None if free is None else as_texts("free", free))
     check_resampling(bootstrap, seed)
     where = geometry_from(geometry, spec)
@@ -127,6 +128,12 @@ def _result(
     )
 
 
+def _opening(said: str | Opening) -> Opening:
+    if isinstance(said, Opening):
+        return said
+    return Opening.of(said if isinstance(said, str) else quoted(said))
+
+
 def limits_of(key: str) -> tuple[float, float]:
     """Smallest and largest value of a key of the law."""
     return (0.0, 1.0) if key == LINEARITY else (SMALLEST, LARGEST)
@@ -136,8 +143,8 @@ def _held(fix: Mapping[str, float] | None, free: Sequence[str] | None) -> dict[s
     """Values that are held, by key."""
     fix = {} if fix is None else fix
     if not isinstance(fix, Mapping):
-        raise UsageError(Field("fix"), f" {fix!r}: expected values by key")
-    for field, keys in (("fix", list(fix)), ("free", free or [])):
+        raise UsageError(Field("fix"), f" {quoted(fix)}: expected values by key")
+    for field, keys in (("fix", list(by_text("fix", fix))), ("free", free or [])):
         for key in keys:
             if key not in LAW_KEYS:
                 nearest = get_close_matches(str(key), LAW_KEYS, n=1)
@@ -146,7 +153,7 @@ def _held(fix: Mapping[str, float] | None, free: Sequence[str] | None) -> dict[s
     for key, value in fix.items():
         low, high = limits_of(key)
         if not (isinstance(value, Real) and low <= value <= high):
-            shown = f"{value:g}" if isinstance(value, float) else repr(value)
+            shown = f"{value:g}" if isinstance(value, float) else quoted(value)
             what = f" {key}={shown}: expected a number from {low:g} to {high:g}"
             raise UsageError(Field("fix"), what)
     for key in LAW_KEYS if free is not None else ():

@@ -24,6 +24,7 @@ from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.measured import read_moments
 from dpgcli.reports.fit_figures import draw_fit, hinge_figure
 from dpgcli.reports.fits import hinge_summary, value_rows
+from dpgcli.text import quoted
 
 
 def fit_hinge(
@@ -53,7 +54,7 @@ def fit_hinge(
     """
     check_resampling(bootstrap, seed)
     if not isinstance(where, str | None):
-        raise UsageError(Field("where"), f" {where!r}: expected a text, COLUMN=TEXT")
+        raise UsageError(Field("where"), f" {quoted(where)}: expected a text, COLUMN=TEXT")
     at = geometry_from(geometry, spec)
     data = read_moments(curve, where, table_choice(column, skip, units))
     weighted = chosen(Loss, "loss", loss)

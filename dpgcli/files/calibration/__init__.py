@@ -39,7 +39,7 @@ from dpgcli.files.sections import (
     wrong_width,
 )
 from dpgcli.files.yaml_file import Document, parse_document, parse_value, read_text
-from dpgcli.text import KeyPath, dotted
+from dpgcli.text import KeyPath, dotted, quoted
 
 __all__ = [
     "VERSION",
@@ -120,7 +120,7 @@ def read_calibration(path: str | Path) -> Calibration:
     try:
         Path(path)
     except TypeError:
-        raise UsageError(f"path {path!r}: expected a path") from None
+        raise UsageError(f"path {quoted(path)}: expected a path") from None
     file, text = read_text(path)
     is_whole = is_whole_text(text)
     if is_whole is False:

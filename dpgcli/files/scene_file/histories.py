@@ -83,14 +83,15 @@ def read_history(source: Tabular, lines: Sequence[str]) -> dict[str, Array]:
     problems = [*few(_header_problems(sheet, names, lines))]
     numbers: dict[str, Array] = {}
     try:
-        numbers = sheet.numbers(list(names))
+        factors = {name: _factor(sheet, name) for name in names}
+        numbers = sheet.numbers(list(names), factors=factors)
     except SpecError as error:
         problems += error.problems
     for name in filter(lambda name: _line(name) == TIME, numbers):
         problems += few(_time_problems(sheet, numbers[name]))
     if problems:
         raise SpecError(in_order(problems))
-    return {_line(name): values * _factor(sheet, name) for name, values in numbers.items()}
+    return {_line(name): values for name, values in numbers.items()}
 
 
 def _line(title: str) -> str:

@@ -17,6 +17,7 @@ from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Des
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.loads import LoadsSpec
+from dpgcli.files.scene_file.objects import ObjectSpec
 from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
@@ -129,6 +130,9 @@ class Spec(Section):
         default=None, description="The pressure lines and how domes answer to pressure."
     )
     loads: LoadsSpec | None = Field(default=None, description="Dead loads and gravity.")
+    object: ObjectSpec | None = Field(
+        default=None, description="A body between the fingers, for dpg grasp."
+    )
     uncertainty: Tolerances | None = Field(
         default=None, description="Standard uncertainties of values, as tolerances of the mold."
     )

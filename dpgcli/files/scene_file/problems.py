@@ -16,7 +16,7 @@ from dpgcli.design.dimensions import (
 from dpgcli.design.loads import DIRECTION
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import in_order, shown
-from dpgcli.files.scene_file import loads
+from dpgcli.files.scene_file import loads, objects
 from dpgcli.files.scene_file.models import (
     DataSpec,
     FingerSpec,
@@ -51,6 +51,8 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("pressure",): PressureSpec,
     ("pressure", "overrides", "*"): UnitPressure,
     ("loads",): loads.LoadsSpec,
+    ("object",): objects.ObjectSpec,
+    ("object", "disc"): objects.DiscSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -70,6 +72,7 @@ OWN = {
     "model_error": "a percentage such as 5%, or leave_one_out",
     **EXPECTED,
     **loads.EXPECTED,
+    **objects.EXPECTED,
 }
 
 HINTS = {
@@ -85,8 +88,8 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
-TEXTS = ("calibration", "law", "model_error", DIRECTION)
-PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE)
+TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
 MOST_SHOWN = 6  # parts of a list
 WHOLE = (("data",), ("loads",))  # sections whose values may be lists
@@ -142,7 +145,8 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    if path[:1] in WHOLE and error["type"] != "extra_forbidden" and len(path) > 1:
+    is_whole = path[:1] in WHOLE or path[:2] == ("object", objects.PLACE)
+    if is_whole and error["type"] != "extra_forbidden" and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":

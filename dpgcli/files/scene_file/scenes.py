@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -23,7 +24,8 @@ def scene_of(spec: Spec) -> Scene:
     if found := resolution.problems.of(0):
         place = Location("spec")
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
-    return resolution.scene()
+    body = None if spec.object is None else spec.object.known
+    return replace(resolution.scene(), body=body)
 
 
 def early_issues(data: Any) -> list[Issue]:

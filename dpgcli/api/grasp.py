@@ -1,0 +1,262 @@
+"""`grasp`: what the fingers of a gripper do with a body between them, state by state."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    as_texts,
+    check_flags,
+    figure_path,
+    path_of,
+    point,
+    scene_input,
+    table_path,
+)
+from dpgcli.api.tables import Table
+from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.design.outputs import Output
+from dpgcli.design.scene import Disc, Scene
+from dpgcli.errors import Field, UsageError
+from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
+from dpgcli.states.columns import Column
+from dpgcli.states.patterns import select
+from dpgcli.text import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_ROWS, MOST_LANES = 2**20, 2**14
+SMALLEST_DISC, LARGEST_DISC = 1e-3, 1e4  # mm
+
+
+@dataclass(frozen=True)
+class GraspResult:
+    """Fingers at rest against a body, and what happened on the way there."""
+
+    given: SceneInput
+    grasps: Grasps
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of the rows."""
+        return columns_of(self.grasps.scene)
+
+    @cached_property
+    def rows(self) -> Columns:
+        """A row for each state, or pair of states, by column."""
+        return grasp_rows(self.grasps)
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each state, or pair of states."""
+        return Table.of(self.columns, self.rows)
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """How many hold, what reset, the largest force, what forces rest on: lines."""
+        return tuple(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        rows = self.rows
+        is_there = rows["status"] == Status.STABLE
+        touches = int((rows["n_contacts"] > 0).sum())
+        changed = int((is_there & (rows["pattern"] != rows["pattern_after"])).sum())
+        n = len(is_there)
+        yield (
+            f"of {counted(n, 'state')} {touches:,} in touch with the body, {changed:,} changed on "
+            f"the way; worst penetration {_worst(rows['penetration_mm']):.2g} mm, worst residual "
+            f"{_worst(rows['residual_N']):.2g} N"
+        )
+        if n_other := int(n - is_there.sum()):
+            yield f"{counted(n_other, 'state')} without an answer: see the column status"
+        if "overlaps" in rows and rows["overlaps"].any():
+            yield (
+                f"{counted(int(rows['overlaps'].sum()), 'state')} in which the fingers overlap "
+                "each other: their contact with each other is not in the model"
+            )
+        for trust in self.given.scene.trusts:
+            if trust.output is Output.FORCES:
+                yield f"forces: {trust.basis_text}, {trust.source}; error {trust.known_error}"
+                if trust.doubt:
+                    yield f"warning: {trust}"
+        yield from (f"warning: {warning}" for warning in self.given.scene.warnings)
+
+    def to_arrow(self) -> Any:
+        """The rows as a `pyarrow.Table`."""
+        return self.table.to_arrow()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The rows as a `pandas.DataFrame`."""
+        return self.table.to_pandas()
+
+    def save(self, path: str | Path) -> None:
+        """Write the rows to a Parquet file, the bytes of `dpg grasp --output`.
+
+        Raises OutputError, and UsageError for a file that was read or a name of another format.
+        """
+        from dpgcli.files.grasp import write_grasps
+        from dpgcli.files.output import Mark, check_outputs
+
+        table = path_of("path", path)
+        check_outputs(self.given.files, (table, Mark.TABLE))
+        write_grasps(table_path(table), self.grasps.scene, self.given.json, self.columns, self.rows)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw the fingers on the body, with forces and inverted units, to a .svg or .png file."""
+        from dpgcli.reports.grasp import draw_grasps
+
+        check_drawable(len(self.rows["pattern"]))
+        draw_grasps(self.grasps, self.rows, figure_path(path))
+
+
+def _worst(values: Any) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.max()) if len(known) else 0.0
+
+
+MOST_DRAWN = 64
+
+
+def check_drawable(n_rows: int, field: str = "plot") -> None:
+    """Raise UsageError for more grasps than one can see."""
+    if n_rows > MOST_DRAWN:
+        what = f" draws at most {MOST_DRAWN} grasps, not {n_rows:,}: select with "
+        raise UsageError(Field(field), what, Field("patterns"))
+
+
+def grasp(
+    spec: SpecInput,
+    *,
+    object: str | None = None,
+    at: Sequence[float] | None = None,
+    patterns: str | Sequence[str] = "*",
+    both: bool = False,
+    settings: Settings = (),
+) -> GraspResult:
+    """What the fingers of a spec do with a body that does not move.
+
+    `object` is such as "disc:40", a disc of 40 mm, and `at` its place (mm) in the gripper's frame;
+    those of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
+    for the upper and the lower finger, "111*/11100"; with `both` every pattern meets every other.
+    The body grows from nothing at its place. Raises SpecError for a wrong spec, UsageError for
+    what is no body or pattern, a body that begins in a base, and for too many states.
+
+    >>> from dpgcli.design.scene import Gripper, Scene
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> finger = uniform_finger(3, **STUDY)
+    >>> gripper = Scene(finger, (), Gripper(base_spacing=30.0, mounting_angle=0.0), 1.5)
+    >>> found = grasp(gripper, object="disc:20", at=(32.0, 0.0), patterns=["001", "111"])
+    >>> found.table["pattern_after"].tolist(), found.table["n_contacts"].tolist()
+    (['001', '011'], [0, 2])
+    """
+    check_flags(both=both)
+    given = scene_input(spec, settings)
+    return grasp_of(given, disc_of(given.scene, object, at), as_texts("patterns", patterns), both)
+
+
+def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
+    """The body of these arguments, or of the scene. Raises UsageError for what is none."""
+    known = scene.body
+    if body is None and known is None:
+        raise UsageError(
+            Field("object"), ": expected a body such as disc:40, here or as object in the spec"
+        )
+    radius = known.radius if body is None and known is not None else 0.5 * _diameter(str(body))
+    if at is None and known is None:
+        raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
+    center = known.center if at is None and known is not None else np.array(point("at", at or ()))
+    return Disc(center, radius)
+
+
+def _diameter(text: str) -> float:
+    kind, _, size = text.partition(":")
+    try:
+        diameter = float(size)
+    except ValueError:
+        diameter = float("nan")
+    if kind != "disc" or not SMALLEST_DISC <= diameter <= LARGEST_DISC:
+        raise UsageError(
+            Field("object"),
+            f" {text}: expected disc and its diameter in mm, from {SMALLEST_DISC:g} to "
+            f"{LARGEST_DISC:g}, such as disc:40",
+        )
+    return diameter
+
+
+def grasp_of(
+    given: SceneInput, body: Disc, patterns: Sequence[str], both: bool = False
+) -> GraspResult:
+    """The same, of what was read before."""
+    scene = given.scene
+    check_body(scene, body)
+    pairs = pairs_of(patterns, scene, both)
+    keep_freed_memory()
+    return GraspResult(given, grasps(replace(scene, body=body), chain_potential, body, pairs))
+
+
+def check_body(scene: Scene, body: Disc) -> None:
+    """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
+    from dpgcli.grasping.grasp import frames
+
+    if scene.layer_thickness is None:
+        raise UsageError(
+            "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
+            "half of it inside the lattice"
+        )
+    height = float(np.max(scene.finger.segment_height))
+    for frame in frames(scene.gripper):
+        x, y = frame.inside(body.center)
+        beside = max(-0.5 * float(np.squeeze(scene.layer_thickness)) - y, y - height, 0.0)
+        if np.hypot(x, beside) < body.radius and x < body.radius:
+            raise UsageError(
+                Field("at"),
+                f" {body.center[0]:g},{body.center[1]:g}: a disc of {2.0 * body.radius:g} mm there "
+                "begins in the base of a finger: move it along x, or take a smaller one",
+            )
+
+
+def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, ...]:
+    """States of the upper and the lower finger by row; of a finger alone one.
+
+    Raises UsageError for what is no pattern, for pairs of one finger, and for too many states.
+    """
+    n, is_pair = scene.finger.n_units, scene.gripper is not None
+    if not is_pair and (both or any("/" in text for text in patterns)):
+        raise UsageError(Field("patterns"), ": pairs of states need a gripper in the spec")
+    found: list[tuple[Codes, Codes]] = []
+    single = [text for text in patterns if "/" not in text]
+    if single:
+        own = _codes(single, n)
+        found.append(_crossed(own, own) if both else (own, own))
+    for text in patterns:
+        upper, is_one, lower = text.partition("/")
+        if is_one:
+            found.append(_crossed(_codes([upper], n), _codes([lower], n)))
+    uppers, lowers = (np.concatenate(part) for part in zip(*found, strict=True))
+    if len(uppers) > MOST_ROWS:
+        raise UsageError(f"{len(uppers):,} grasps: expected at most {MOST_ROWS:,}")
+    return (uppers, lowers) if is_pair else (uppers,)
+
+
+def _codes(globs: Sequence[str], n_units: int) -> Codes:
+    selection = select(globs, n_units)
+    if len(selection) > MOST_LANES:
+        raise UsageError(
+            Field("patterns"), f": {len(selection):,} states, expected at most {MOST_LANES:,}"
+        )
+    return selection.codes(0, len(selection))
+
+
+def _crossed(upper: Codes, lower: Codes) -> tuple[Codes, Codes]:
+    """Every one with every other, the upper's the slower."""
+    return np.repeat(upper, len(lower)), np.tile(lower, len(upper))

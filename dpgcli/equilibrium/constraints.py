@@ -1,0 +1,274 @@
+"""Unilateral constraints g(x) ≥ b on a potential: as energies, exactly, and followed as b changes.
+
+Two ways, for the same minima:
+
+- from afar the augmented Lagrangian, E + Σ (max(0, μ − σ t)² − μ²)/2σ with t = g − b: an energy
+  like others, minimized again and again while μ ← max(0, μ − σ t) (Nocedal and Wright, Numerical
+  Optimization, 2nd ed., 2006, section 17.3);
+- near by the multipliers of a set of active constraints as coordinates: with y = μ/σ the Lagrangian
+  is E + Σ ½ σ (t − y)² over active ones − Σ ½ σ y² over all. It is stationary where active t are 0
+  and the other y are 0, and its Hessian has one negative pivot for each y where the minimum is one
+  on the tangent space (ours; the quadratic term changes nothing there).
+
+So constraints are terms beside others, a measure under a law, and paths know nothing of them.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Generic, Self, TypeVar, cast
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import (
+    Coordinates,
+    Measure,
+    Measured,
+    OwnCoordinate,
+    Response,
+    Row,
+    Term,
+    WideMeasure,
+    WideMeasured,
+    take_lanes,
+)
+
+System = TypeVar("System", bound=Coordinates, covariant=True)
+
+
+@dataclass(frozen=True)
+class AugmentedContact:
+    """The augmented Lagrangian of t = g − b ≥ 0: μ (cell, batch) in N, σ in N/mm, b (batch,) in mm.
+
+    >>> law = AugmentedContact(np.array([[2.0]]), np.array([[10.0]]), np.zeros(1))
+    >>> [float(law(np.array([[gap]])).force[0, 0]) for gap in (-0.1, 0.1, 0.3)]  # N
+    [-3.0, -1.0, 0.0]
+    """
+
+    multiplier: Array
+    stiffness: Array
+    bound: Array
+
+    def pushes(self, gap: Array) -> Array:
+        """max(0, μ − σ t), N."""
+        return np.maximum(0.0, self.multiplier - self.stiffness * (gap - self.bound))
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness."""
+        push = self.pushes(scalar)
+        energy = (push * push - self.multiplier * self.multiplier) / (2.0 * self.stiffness)
+        return Response(energy, -push, np.where(push > 0.0, self.stiffness, 0.0))
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        parts = (self.multiplier, self.stiffness, self.bound)
+        return type(self)(*(take_lanes(part, index) for part in parts))
+
+
+@dataclass(frozen=True)
+class WithMultipliers(Generic[System]):
+    """Coordinates, and behind them one y = μ/σ (mm) for each of `n` constraints.
+
+    `length` (mm) is what is large of a gap, `stiffness` σ (N/mm), both (1, 1 or batch).
+    """
+
+    frame: System
+    n: int
+    length: Array
+    stiffness: Array
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.frame.size + self.n
+
+    def _with(self, own: Array, values: Array) -> Array:
+        batch = np.broadcast_shapes(own.shape[1:], values.shape[1:])
+        parts = np.broadcast_to(own, (len(own), *batch)), np.broadcast_to(values, (self.n, *batch))
+        return np.concatenate(parts)
+
+    @cached_property
+    def force_unit(self) -> Array:
+        """1 for multipliers."""
+        return self._with(self.frame.force_unit, np.ones((1, 1)))
+
+    @cached_property
+    def gradient_scale(self) -> Array:
+        """σ times what is large of a gap, N."""
+        return self._with(self.frame.gradient_scale, self.stiffness * self.length)
+
+    @cached_property
+    def stiffness_scale(self) -> Array:
+        """σ, N/mm."""
+        return self._with(self.frame.stiffness_scale, self.stiffness)
+
+    @cached_property
+    def step_cap(self) -> Array:
+        """What is large of a gap, mm."""
+        return self._with(self.frame.step_cap, self.length)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same coordinates for some lanes of the batch."""
+        length, stiffness = take_lanes(self.length, index), take_lanes(self.stiffness, index)
+        frame = self.frame.take_lanes(index)
+        return replace(self, frame=frame, length=length, stiffness=stiffness)
+
+    def moved(self, coordinates: Array, step: Array) -> Array:
+        """As in the frame; multipliers go straight."""
+        size = self.frame.size
+        own = self.frame.moved(coordinates[:size], step[:size])
+        return np.concatenate((own, coordinates[size:] + step[size:]))
+
+
+@dataclass(frozen=True)
+class Leading:
+    """A measure by the first coordinates only, `size` of them."""
+
+    measure: Measure
+    size: int
+
+    @property
+    def n_cells(self) -> int:
+        """That of the measure."""
+        return self.measure.n_cells
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Those of the measure."""
+        return self.measure.rows
+
+    def __call__(self, coordinates: Array) -> Measured:
+        """The measure."""
+        return self.measure(coordinates[: self.size])
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same measure for some lanes of the batch."""
+        return replace(self, measure=self.measure.take_lanes(index))
+
+
+@dataclass(frozen=True)
+class Slack:
+    """g − y of every constraint, with g by the first `size` coordinates and y behind them."""
+
+    gaps: WideMeasure
+    size: int
+
+    @property
+    def n_cells(self) -> int:
+        """One for each constraint."""
+        return self.gaps.n_cells
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Those of the gaps and of the multipliers."""
+        return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.n_cells)))
+
+    def __call__(self, coordinates: Array) -> WideMeasured:
+        """g − y with its derivatives, (cell, batch)."""
+        gaps = self.gaps(coordinates[: self.size])
+        n, n_rows, batch = self.n_cells, len(self.gaps.rows), coordinates.shape[1]
+        own = np.broadcast_to(-np.eye(n)[..., None], (n, n, batch))
+
+        def bent(force: Array) -> Array:
+            whole = np.zeros((n_rows + n, n_rows + n, batch))
+            whole[:n_rows, :n_rows] = gaps.bent(force)
+            return whole
+
+        value = gaps.value - coordinates[self.size :]
+        return WideMeasured(value, np.concatenate((gaps.gradient, own)), bent, gaps.place)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same measure for some lanes of the batch."""
+        return replace(self, gaps=self.gaps.take_lanes(index))
+
+
+@dataclass(frozen=True)
+class ActiveConstraints:
+    """½ σ (t − y)² of active constraints, as their bounds b = (λ − 1) D rise to 0 with a load λ.
+
+    `active` (cell, batch), `stiffness` σ (1, 1 or batch) in N/mm, `depth` D (batch,) in mm and what
+    is `large` of a gap (batch,), mm.
+    """
+
+    active: Flags
+    stiffness: Array
+    depth: Array
+    large: Array
+
+    @property
+    def is_smooth(self) -> bool:
+        """A law that is linear."""
+        return True
+
+    def at(self, load: Array) -> "ActiveAt":
+        """The law at a load."""
+        return ActiveAt(np.where(self.active, self.stiffness, 0.0), (load - 1.0) * self.depth)
+
+    def rate(self, scalar: Array, load: Array) -> Array:
+        """−σ D of active constraints, N per unit of λ."""
+        return np.where(self.active, -self.stiffness * self.depth, 0.0 * scalar)
+
+    def margin(self, measured: Measured | WideMeasured, load: Array) -> Array:
+        """y of active constraints and t of the others, over what is large.
+
+        Infinite for t at a place that an active constraint is at, or that is another one's own.
+        """
+        assert isinstance(measured, WideMeasured), "places are known"
+        slack = measured.value - (load - 1.0) * self.depth
+        place, numbers = measured.place, np.arange(len(slack))
+        is_same = place[:, None] == place[None]
+        is_held = (is_same & self.active[None]).any(axis=1)
+        is_elsewhere = place != numbers[:, None]
+        other = np.where(is_held | is_elsewhere, np.inf, slack)
+        return np.where(self.active, -slack, other) / self.large
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        parts = (take_lanes(part, index) for part in (self.stiffness, self.depth, self.large))
+        return type(self)(take_lanes(self.active, index), *parts)
+
+
+@dataclass(frozen=True)
+class ActiveAt:
+    """½ σ (q − b)², with σ (cell, batch) of 0 where it does not act."""
+
+    stiffness: Array
+    bound: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness."""
+        away = scalar - self.bound
+        pull = self.stiffness * away
+        return Response(0.5 * pull * away, pull, self.stiffness)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        return type(self)(take_lanes(self.stiffness, index), take_lanes(self.bound, index))
+
+
+@dataclass(frozen=True)
+class Stiffened:
+    """−½ σ y² of multipliers."""
+
+    stiffness: Array
+
+    def __call__(self, scalar: Array) -> Response:
+        """Energy, force and stiffness."""
+        push = -self.stiffness * scalar
+        return Response(0.5 * push * scalar, push, -self.stiffness + 0.0 * scalar)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same law for some lanes of the batch."""
+        return type(self)(take_lanes(self.stiffness, index))
+
+
+def leading_terms(terms: tuple[Term, ...], size: int) -> tuple[Term, ...]:
+    """Terms by the first `size` coordinates of more; none of them wide."""
+    narrow = ((term, cast("Measure", term.measure)) for term in terms)
+    return tuple(Term(term.kind, Leading(measure, size), term.law) for term, measure in narrow)
+
+
+def multiplier_term(system: WithMultipliers[Coordinates]) -> Term:
+    """The term −½ σ y² of the multipliers."""
+    own = OwnCoordinate(Row(1, system.frame.size), system.n)
+    return Term("multipliers", own, Stiffened(system.stiffness))

@@ -1,0 +1,25 @@
+"""Grasps in Parquet files."""
+
+from pathlib import Path
+
+from dpgcli.arrays import Columns
+from dpgcli.design.scene import Scene
+from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.scene_metadata import scene_metadata
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_table
+from dpgcli.files.trust import trust_metadata, with_bases
+from dpgcli.states.columns import Column
+
+
+def write_grasps(
+    path: Path, scene: Scene, spec_json: str, columns: tuple[Column, ...], rows: Columns
+) -> None:
+    """Write a row for each state, or pair of states, against a body."""
+    metadata = {
+        "dpg.schema_version": str(SCHEMA_VERSION),
+        **scene_metadata(scene, spec_json),
+        **trust_metadata(scene.trusts, scene.warnings),
+        "dpg.versions": versions(),
+    }
+    described = with_bases(schema(columns), metadata)
+    write_table(path, described, [record_batch(columns, rows)], metadata)

@@ -1,0 +1,38 @@
+"""The keys of a spec's object, their types and their meaning."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dpgcli.design.scene import Disc
+from dpgcli.files.calibration.models import Bounded
+from dpgcli.files.sections import Positive, Section
+
+PLACE = "at_mm"
+EXPECTED = {
+    PLACE: "two numbers in mm, such as [40, 0]",
+    "held": '"fixed": it does not move',
+}
+
+
+class DiscSpec(Section):
+    """A round body."""
+
+    diameter_mm: Positive = Field(description="Its diameter, in mm.")
+
+
+class ObjectSpec(Section):
+    """A body between the fingers, for dpg grasp."""
+
+    disc: DiscSpec = Field(description="A round body, such as a can.")
+    at_mm: Annotated[list[Bounded], Field(min_length=2, max_length=2)] = Field(
+        description="Where its center is in the gripper's frame, in mm: between the bases, x along "
+        "the fingers; of a finger alone in its own frame."
+    )
+    held: Literal["fixed"] = Field(default="fixed", description="How it is held: it does not move.")
+
+    @property
+    def known(self) -> Disc:
+        """The value that it stands for."""
+        return Disc(np.array(self.at_mm, float), 0.5 * self.disc.diameter_mm)

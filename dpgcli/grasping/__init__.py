@@ -1,0 +1,1 @@
+"""Fingers that touch what they hold."""

@@ -1,0 +1,96 @@
+"""How fingers come to touch a body: it grows from nothing at its place; units reset as they must.
+
+Contacts close and open on the way without any change of shape. Where a finger loses its balance, a
+unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as large as
+it is there; then the body goes on growing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.path import Ends, PathEnd, follow
+from dpgcli.grasping.contact import Obstructed, Touching
+
+DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
+SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
+MOST_HALTS = 40  # by unit
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,)."""
+
+    lanes: Indices
+    load: Array
+    flipped: Flags
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Where fingers came to rest against bodies, what happened on the way, and how far they came.
+
+    `load` (batch,) is 1 where the body is there in full.
+    """
+
+    shapes: Touching
+    load: Array
+    resets: tuple[Reset, ...]
+
+
+def approach(
+    obstructed: Obstructed, start: Touching, load: Array, end: Array, *, to_reset: bool = False
+) -> Approach:
+    """Let bodies grow from one load to another, (batch,), about fingers in balance.
+
+    With `to_reset` only as far as to where a first unit resets or snaps.
+    """
+    shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
+    resets: list[Reset] = []
+    lanes = np.flatnonzero(shapes.is_there & (here < end))
+    for _ in range(MOST_HALTS * obstructed.units.finger.n_units):
+        if not len(lanes):
+            break
+        own = obstructed.take_lanes(lanes)
+        few = own.relabeled(shapes.take_lanes(lanes))
+        family = own.family(few.inverted, few.active)
+        ends = follow(family, own.stacked(few), here[lanes], end[lanes])
+        moved, flipped = _gone_on(own, few, ends, end[lanes])
+        here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
+        shapes.put(lanes, moved)
+        changed = np.flatnonzero(flipped.any(axis=0))
+        if len(changed):
+            resets.append(Reset(lanes[changed], ends.load[changed], flipped[:, changed]))
+        goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
+        lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
+    shapes.is_there[lanes] = False
+    return Approach(shapes, here, tuple(resets))
+
+
+def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple[Touching, Flags]:
+    """The shapes with which paths go on from where they ended, and units that flipped there."""
+    size = len(before.coordinates)
+    coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
+    active, n = before.active.copy(), len(ends.load)
+    events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
+    active[ends.cell[events], events] ^= True
+    push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
+    moved = Touching(coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool))
+    flipped = np.zeros(before.inverted.shape, bool)
+    falls = np.flatnonzero(_beyond(ends) > 0.0)
+    if len(falls):
+        few, begun = own.take_lanes(falls), moved.take_lanes(falls)
+        is_fold = ends.outcome[falls] == PathEnd.FOLD
+        further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
+        beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
+        there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
+        flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
+        moved.put(falls, there)
+    return moved, flipped
+
+
+def _beyond(ends: Ends) -> Array:
+    """How far beyond the ends of paths to go on: over folds, and kinks of laws or contacts."""
+    is_fold, is_kink = ends.outcome == PathEnd.FOLD, ends.outcome == PathEnd.FAILED
+    return np.where(is_fold, SKIPPED, np.where(is_kink, OVER_KINK, 0.0))

@@ -1,0 +1,182 @@
+"""Grasps as a table: a row for each state of a finger, or for each pair of states of a gripper."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Codes, Columns, distinct
+from dpgcli.design.outputs import Output
+from dpgcli.design.scene import Disc, Scene
+from dpgcli.grasping.grasp import Frame, Held, frames, held
+from dpgcli.mechanics.terms import Formulate
+from dpgcli.states.certify import Status
+from dpgcli.states.columns import Column, Kind
+from dpgcli.states.gripper import place_in_gripper
+from dpgcli.states.patterns import inverted_units, texts
+
+FORCES, SHAPES = (Output.FORCES,), (Output.SHAPES,)
+TOUCHES = 1e-12  # N: a smaller push is rounding
+
+COLUMNS = (
+    Column("pattern", "", "state before the body was there; upper/lower of a pair", kind=Kind.TEXT),
+    Column("status", "", "result of certification, with the body there", kind=Kind.STATUS),
+    Column("pattern_after", "", "state with the body there", kind=Kind.TEXT),
+    Column("resets", "", "units that left their wells, at which share of the load", kind=Kind.TEXT),
+    Column("n_contacts", "", "places that touch the body", kind=Kind.COUNT),
+    Column("touching", "", "phalanges that touch it, from the base", kind=Kind.TEXT),
+    Column("finger_force_x_N", "N", "force of the upper finger on the body", outputs=FORCES),
+    Column("finger_force_y_N", "N", "the same along y", outputs=FORCES),
+    Column("squeeze_N", "N", "closing force between the two fingers", outputs=FORCES),
+    Column("max_contact_N", "N", "largest force at one place", outputs=FORCES),
+    Column("aperture_mm", "mm", "distance of the two faces at the tips", outputs=SHAPES),
+    Column("overlaps", "", "whether the fingers overlap each other", kind=Kind.FLAG),
+    Column("object_x_mm", "mm", "x of the body's reference point"),
+    Column("object_y_mm", "mm", "y of the body's reference point"),
+    Column("penetration_mm", "mm", "largest depth of the body in a face"),
+    Column("margin", "", "how much more of the load before a next unit resets", outputs=FORCES),
+    Column("residual_N", "N", "largest force out of balance"),
+    Column("numerical_error_mm", "mm", "error of the tip by solving the equations"),
+)
+OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
+
+
+@dataclass(frozen=True)
+class Grasps:
+    """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
+
+    `pairs` (finger, row) are lanes of the fingers' tables.
+    """
+
+    scene: Scene
+    body: Disc
+    frames: tuple[Frame, ...]
+    fingers: tuple[Held, ...]
+    pairs: NDArray[np.int64]
+
+    def take(self, finger: int, row: int) -> tuple[Held, int]:
+        """The finger of a row, and its lane."""
+        return self.fingers[finger], int(self.pairs[finger, row])
+
+
+def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes]) -> Grasps:
+    """Pairs of states, (row,) each for the upper and the lower finger, against a body.
+
+    Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
+    """
+    placed = frames(scene.gripper)
+    is_alike = body.center[1] == 0.0 and len(placed) > 1
+    shared = distinct(np.concatenate(list(pairs)))
+    needed = [shared if is_alike else distinct(codes) for codes in pairs]
+    fingers: list[Held] = []
+    for frame, codes in zip(placed, needed, strict=True):
+        if fingers and is_alike:
+            fingers.append(fingers[0])
+        else:
+            fingers.append(held(scene, formulate, body, frame, codes))
+    lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
+    return Grasps(scene, body, placed, tuple(fingers), np.array(lanes))
+
+
+def columns_of(scene: Scene) -> tuple[Column, ...]:
+    """The columns of a gripper, or those of a finger alone."""
+    is_pair = scene.gripper is not None
+    return tuple(column for column in COLUMNS if is_pair or column.name not in OF_PAIRS)
+
+
+def grasp_rows(found: Grasps) -> Columns:
+    """Rows by column, (row,). What is not known of states that are not stable is NaN."""
+    n_units = found.scene.finger.n_units
+    of_fingers = [
+        {name: getattr(finger, name)[..., lanes] for name in Held.BY_LANE}
+        for finger, lanes in zip(found.fingers, found.pairs, strict=True)
+    ]
+    status = np.max([own["status"] for own in of_fingers], axis=0)
+    is_there = status == Status.STABLE
+    forces = [
+        frame.outside(own["force"]) for frame, own in zip(found.frames, of_fingers, strict=True)
+    ]
+    touches = [own["push"] > TOUCHES for own in of_fingers]
+
+    def known(values: Array) -> Array:
+        return np.where(is_there, values + 0.0, np.nan)  # no negative zero
+
+    n = len(status)
+    rows: Columns = {
+        "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
+        "status": status,
+        "pattern_after": _joined([_texts(own["after"], n_units) for own in of_fingers], is_there),
+        "resets": _joined(
+            [_resets(f)[lanes] for f, lanes in zip(found.fingers, found.pairs, strict=True)],
+            is_there,
+        ),
+        "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
+        "touching": _joined([_phalanges(t) for t in touches], is_there),
+        "finger_force_x_N": known(forces[0][0]),
+        "finger_force_y_N": known(forces[0][1]),
+        "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
+        "max_contact_N": known(np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)),
+        "object_x_mm": np.full(n, found.body.center[0]),
+        "object_y_mm": np.full(n, found.body.center[1]),
+        "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
+        "margin": known(np.min([own["margin"] for own in of_fingers], axis=0)),
+        "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),
+        "numerical_error_mm": known(np.max([own["error"] for own in of_fingers], axis=0)),
+    }
+    if found.scene.gripper is not None:
+        rows.update(_between(found, is_there))
+    return {column.name: rows[column.name] for column in columns_of(found.scene)}
+
+
+def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
+    """Aperture and overlap of the two fingers of each row."""
+    assert found.scene.gripper is not None, "of a gripper"
+    thickness = found.scene.layer_thickness
+    assert thickness is not None, "the face is known"
+    poses = [place_in_gripper(found.scene.gripper, thickness, f.nodes) for f in found.fingers]
+    halves = [pose.aperture[lanes] for pose, lanes in zip(poses, found.pairs, strict=True)]
+    upper, lower = (_outlines(found, finger)[lanes] for finger, lanes in enumerate(found.pairs))
+    return {
+        "aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan),
+        "overlaps": shapely.intersects(upper, lower) & is_there,
+    }
+
+
+def _outlines(found: Grasps, finger: int) -> NDArray[np.object_]:
+    """Polygons of a finger in the gripper, (lane,): its face, and its tops back."""
+    own, height = found.fingers[finger], found.scene.finger.segment_height
+    base = np.stack((0.0 * own.face[0, :1], own.face[1, :1] * 0.0 + height))
+    tops = np.stack((own.nodes.top_x, own.nodes.top_y))
+    around = np.concatenate((own.face, tops[:, ::-1], base), axis=1)
+    return np.asarray(shapely.polygons(found.frames[finger].placed(around).transpose(2, 1, 0)))
+
+
+def _texts(codes: Codes, n_units: int) -> NDArray[np.str_]:
+    return texts(inverted_units(codes, n_units)).astype(str)
+
+
+def _joined(
+    parts: Sequence[NDArray[np.str_]], is_there: NDArray[np.bool_] | None = None
+) -> NDArray[np.str_]:
+    """Texts of both fingers as one, upper/lower where they differ; empty where nothing is."""
+    rows = zip(*(part.tolist() for part in parts), strict=True)
+    told = [row[0] if len(set(row)) == 1 else "/".join(word or "–" for word in row) for row in rows]
+    joined = np.array(told, str)
+    return joined if is_there is None else np.where(is_there, joined, "")
+
+
+def _resets(finger: Held) -> NDArray[np.str_]:
+    """What happened to each lane on the way: "1 at 0.672; 2 at 0.91"."""
+    words: list[list[str]] = [[] for _ in range(len(finger.code))]
+    for reset in finger.resets:
+        for place, lane in enumerate(reset.lanes):
+            units = ",".join(str(unit + 1) for unit in np.flatnonzero(reset.flipped[:, place]))
+            words[lane].append(f"{units} at {reset.load[place]:.4g}")
+    return np.array(["; ".join(lane) for lane in words])
+
+
+def _phalanges(touches: NDArray[np.bool_]) -> NDArray[np.str_]:
+    numbers = [",".join(str(k + 1) for k in np.flatnonzero(lane)) for lane in touches.T]
+    return np.array(numbers)

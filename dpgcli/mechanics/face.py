@@ -1,0 +1,127 @@
+"""The inner face of a finger, by its chain's coordinates: where it touches what it holds.
+
+The face is the polyline through F_0 … F_n. F_k lies on the line of strut k, half the layer's
+thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). There is a side for each phalanx, and
+corners stay joined however the finger bends (our choice; for equal corner angles sides are parallel
+to the chords).
+
+A corner turns all that lies beyond it by −1 about its station P, so that ∂F/∂θ = R (F − P) with
+R (x, y) = (y, −x); a chord's extension moves all beyond along its direction u. Of coordinates p
+before q along the chain ∂²F/∂p ∂q = R ∂F/∂q if p is a corner, and 0 if it is a chord (our
+derivation).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.equilibrium.contracts import take_lanes
+from dpgcli.mechanics.chain_geometry import internal, pose_of
+from dpgcli.mechanics.coordinates import FingerCoordinates
+
+
+class FaceShape(NamedTuple):
+    """Nodes F_0 … F_n of a face, mm, (2, node, batch), and how they move.
+
+    By row, coordinates in their order along the chain: the first node that one moves, whether it is
+    a corner, and P of a corner or u of a chord, (2, row, batch).
+    """
+
+    nodes: Array
+    first: Indices
+    is_corner: Flags
+    origin: Array
+
+    def pulled(self, forces: Array) -> Array:
+        """Σ f · ∂F over nodes, (row, cell, batch), for forces f (2, node, cell, batch)."""
+        turned = np.stack((self.nodes[1], -self.nodes[0]))
+        beyond = _summed_from_behind(forces)[:, self.first]
+        moment = _summed_from_behind(total(forces * turned[:, :, None]))[self.first]
+        along = total(beyond * self.origin[:, :, None])
+        pivot = np.stack((self.origin[1], -self.origin[0]))[:, :, None]
+        by_corner = moment - total(beyond * pivot)
+        return np.where(self.is_corner[:, None, None], by_corner, along)
+
+    def bent(self, forces: Array) -> Array:
+        """Σ f · ∂²F over nodes, (row, row, batch), for forces f (2, node, batch)."""
+        turned = np.stack((-forces[1], forces[0]))  # f · R v = (Rᵀ f) · v
+        by_later = self.pulled(turned[:, :, None])[:, 0]
+        rows = np.arange(len(self.first))
+        earlier, later = np.minimum.outer(rows, rows), np.maximum.outer(rows, rows)
+        return np.where(self.is_corner[earlier][..., None], by_later[later], 0.0)
+
+
+def _summed_from_behind(values: Array) -> Array:
+    """Σ over nodes from each one on: of (2, node, …) or (node, …), nodes before cells."""
+    axis = values.ndim - 3
+    return np.flip(np.cumsum(np.flip(values, axis), axis), axis)
+
+
+@dataclass(frozen=True)
+class Face:
+    """The face of fingers in some coordinates; lengths in mm, (1 or unit, 1 or batch).
+
+    `places` are the rows of e, a and b of each unit among all coordinates (a, e, b in the order of
+    the chain; rigid bars have no e), and `size` is their number.
+    """
+
+    length: Array
+    half_thickness: Array
+    n_units: int
+    is_rigid: bool
+    places: Indices
+
+    @classmethod
+    def of(cls, coordinates: FingerCoordinates, thickness: Array) -> Self:
+        """The face of a finger whose layer is so thick, mm, (1, 1 or batch).
+
+        >>> from dpgcli.mechanics.chain import Chain
+        >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+        >>> chain = Chain(uniform_finger(2, **STUDY))
+        >>> face = Face.of(chain, np.array([[1.5]]))
+        >>> face.shape(np.zeros((4, 1))).nodes[..., 0].tolist()  # a straight finger
+        [[0.0, 13.5, 27.0], [-0.75, -0.75, -0.75]]
+        """
+        finger = coordinates.finger
+        rows = coordinates.without_walls(np.arange(float(coordinates.size))[:, None]).astype(int)
+        order = [0, 1] if finger.is_rigid else [1, 0, 2]
+        places = rows.reshape(finger.n_units, -1)[:, order].ravel()
+        return cls(finger.segment_length, 0.5 * thickness, finger.n_units, finger.is_rigid, places)
+
+    @cached_property
+    def _moves(self) -> tuple[Indices, Flags]:
+        """The first node that each row moves, and whether the row is a corner."""
+        kinds = [True, True] if self.is_rigid else [True, False, True]
+        first = np.repeat(np.arange(1, self.n_units + 1), len(kinds))
+        return first, np.tile(np.array(kinds), self.n_units)
+
+    def shape(self, coordinates: Array) -> FaceShape:
+        """The face at coordinates, (size, batch)."""
+        n = self.n_units
+        rows = coordinates[self.places].reshape(n, -1, coordinates.shape[1])
+        zero = np.zeros((n, coordinates.shape[1]))
+        near, far = rows[:, 0], rows[:, -1]
+        chord = zero if self.is_rigid else rows[:, 1]
+        pose = pose_of(internal(_as_chain(chord, near, far), is_rigid=False), self.length)
+        base = np.zeros((2, 1, coordinates.shape[1]))
+        stations = np.concatenate((base, np.stack((pose.x, pose.y))), axis=1)
+        angle = np.concatenate((base[0], pose.strut_angle))
+        inwards = np.stack((np.sin(angle), -np.cos(angle)))
+        pivots = [stations[:, :-1], stations[:, 1:]]
+        if not self.is_rigid:
+            pivots.insert(1, np.stack((pose.chord_cos, pose.chord_sin)))
+        origin = np.stack(pivots, axis=2).reshape(2, -1, coordinates.shape[1])
+        return FaceShape(stations + self.half_thickness * inwards, *self._moves, origin)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The faces of some lanes of the batch."""
+        length, half = (take_lanes(part, index) for part in (self.length, self.half_thickness))
+        return replace(self, length=length, half_thickness=half)
+
+
+def _as_chain(chord: Array, near: Array, far: Array) -> Array:
+    """Coordinates of an elastic chain whose struts keep their length."""
+    return np.stack((chord, near, far, 0.0 * near), axis=1).reshape(-1, near.shape[1])

@@ -1,0 +1,192 @@
+"""Gaps between the face of a finger and round bodies, by the finger's coordinates.
+
+Of a body around c with radius r the gap to a side of the face is g − r, with g the distance of c
+from that side, positive where c is on the inner side of it. A gap that is measured on one side
+follows its nearest place to the next sides while that brings it nearer: sides that lead to the same
+place have the same gap. So a body that touches two sides in a corner has two gaps, and one that
+slides over a corner keeps its own.
+
+With A and B the ends of a side of length ℓ, t its direction, m its inner normal and c nearest to
+A + s ℓ t, ∇g is m at c, −(1 − s) m at A and −s m at B. With w = (m, −m)/ℓ at A and B, which is the
+turn of the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g = w τᵀ + τ wᵀ − g w wᵀ. At a
+corner w is 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
+from dpgcli.mechanics.face import Face, FaceShape
+
+FAR = 1e9  # mm: of a gap that is another one's
+
+
+class Nearest(NamedTuple):
+    """Nearest places of sides to bodies, (body, side, batch): numbers of sides, and what is there.
+
+    `place` is the side that the gap of a side has followed its nearest place to; `share` is s there
+    if one stays on a side, `normal` m and `along` t are (2, body, side, batch), `distance` is g.
+    `is_corner` says that the nearest place of a side is one of its ends.
+    """
+
+    place: Indices
+    share: Array
+    distance: Array
+    normal: Array
+    along: Array
+    length: Array
+    is_corner: Flags
+
+
+@dataclass(frozen=True)
+class FaceGaps:
+    """Gaps of bodies, cell by cell: all sides of the face for the first body, then the next.
+
+    `centers` (2, body, 1 or batch) and `radii` (body, 1 or batch) in mm, in the finger's own frame.
+    With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
+    one of the first, or else that of the side itself.
+    """
+
+    face: Face
+    centers: Array
+    radii: Array
+    first: Flags | None = None
+
+    @property
+    def n_cells(self) -> int:
+        """One for each side and body."""
+        return self.face.n_units * len(self.radii)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """All corners and chords."""
+        return tuple(Row(0, int(place)) for place in self.face.places)
+
+    def __call__(self, coordinates: Array) -> WideMeasured:
+        """g − r with its derivatives, (cell, batch)."""
+        shape = self.face.shape(coordinates)
+        near = nearest(shape, self.centers)
+        n_bodies, n, batch = near.place.shape
+        place = (near.place + n * np.arange(n_bodies)[:, None, None]).reshape(-1, batch)
+        cells = n_bodies * n
+        own = (near.distance - self.radii[:, None]).reshape(cells, batch)
+        value = np.take_along_axis(own, place, axis=0)
+        moves = _moves(shape, near)
+        gradient = np.take_along_axis(moves.slope, place[None], axis=1)
+        if self.first is not None:
+            is_told = _one_at(place, self.first)
+            value, gradient = np.where(is_told, value, FAR), np.where(is_told, gradient, 0.0)
+
+        def bent(force: Array) -> Array:
+            is_there = place[:, None] == np.arange(cells)[:, None]
+            return _bent(shape, near, moves, total(np.where(is_there, force[:, None], 0.0)))
+
+        return WideMeasured(value, gradient, bent, place)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """The same gaps for some lanes of the batch."""
+        centers, radii = take_lanes(self.centers, index), take_lanes(self.radii, index)
+        first = None if self.first is None else take_lanes(self.first, index)
+        return type(self)(self.face.take_lanes(index), centers, radii, first)
+
+
+def _one_at(place: Indices, first: Flags) -> Flags:
+    """One cell of each place: the lowest of the first ones there, or its own, (cell, batch)."""
+    n = len(place)
+    numbers = np.arange(n)[:, None]
+    rank = np.where(first, 0, np.where(place == numbers, n, 2 * n)) + numbers
+    is_before = (place[:, None] == place[None]) & (rank[None] < rank[:, None])
+    return np.asarray(~is_before.any(axis=1))
+
+
+def nearest(shape: FaceShape, centers: Array) -> Nearest:
+    """The nearest places of all sides of a face to points (2, point, batch)."""
+    start, side = shape.nodes[:, None, :-1], np.diff(shape.nodes, axis=1)[:, None]
+    length = np.sqrt(total(side * side))
+    along = side / length
+    inwards = np.stack((along[1], -along[0]))
+    away = centers[:, :, None] - start
+    raw = total(away * along) / length
+    place = _followed(raw)
+    n = raw.shape[1]
+    share = np.clip(raw, 0.0, 1.0)
+    is_corner = (raw <= 0.0) | (raw >= 1.0)
+    off_line = total(away * inwards)
+    to_corner = away - share * length * along
+    distance = np.sqrt(total(to_corner * to_corner))
+    side_numbers = np.arange(n)[None, :, None]
+    is_end = ((raw < 0.0) & (side_numbers == 0)) | ((raw > 1.0) & (side_numbers == n - 1))
+    sign = np.where((off_line < 0.0) & ~is_end, -1.0, 1.0)
+    signed = np.where(is_corner, sign * distance, off_line)
+    safe = np.where(distance > 0.0, distance, 1.0)
+    outwards = np.where(distance > 0.0, sign * to_corner / safe, inwards)
+    normal = np.where(is_corner, outwards, inwards)
+    tangent = np.stack((-normal[1], normal[0]))
+    length = np.broadcast_to(length, raw.shape)
+    return Nearest(place, share, signed, normal, tangent, length, is_corner)
+
+
+def _followed(raw: Array) -> Indices:
+    """The sides to which nearest places lead, (body, side, batch), from shares s beyond 0 and 1.
+
+    A corner that is nearest to both its sides belongs to the first of them.
+    """
+    n = raw.shape[1]
+    numbers = np.broadcast_to(np.arange(n)[None, :, None], raw.shape)
+    target = numbers.copy()
+    target[:, 1:] = np.where(raw[:, 1:] <= 0.0, numbers[:, :-1], target[:, 1:])
+    onwards = (raw[:, :-1] >= 1.0) & (raw[:, 1:] > 0.0)
+    target[:, :-1] = np.where(onwards, numbers[:, 1:], target[:, :-1])
+    place = target
+    for _ in range(n - 1):
+        place = np.take_along_axis(target, place, axis=1)
+    return place
+
+
+class _Moves(NamedTuple):
+    """∇g, w and τ of every side and body by the coordinates, (row, cell, batch).
+
+    `push` (2, node, cell, batch) are the forces on nodes of which ∇g is made.
+    """
+
+    slope: Array
+    turn: Array
+    slide: Array
+    push: Array
+
+
+def _moves(shape: FaceShape, near: Nearest) -> _Moves:
+    _, n_bodies, n, batch = near.normal.shape
+    rest = 1.0 - near.share
+    per_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
+    at_start = (-rest * near.normal, per_length * near.normal, -rest * near.along)
+    at_end = (-near.share * near.normal, -per_length * near.normal, -near.share * near.along)
+    forces = np.zeros((2, n + 1, 3, n_bodies, n, batch))
+    sides = np.arange(n)
+    forces[:, sides, :, :, sides] = np.moveaxis(np.stack(at_start, axis=1), 3, 0)
+    forces[:, sides + 1, :, :, sides] += np.moveaxis(np.stack(at_end, axis=1), 3, 0)
+    flat = forces.reshape(2, n + 1, 3 * n_bodies * n, batch)
+    pulled = shape.pulled(flat).reshape(-1, 3, n_bodies * n, batch)
+    slope, turn, slide = np.moveaxis(pulled, 1, 0)
+    return _Moves(slope, turn, slide, flat[:, :, : n_bodies * n])
+
+
+def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array:
+    """Σ F ∇²g over places, (row, row, batch), for forces (place, batch)."""
+    batch = force.shape[1]
+    result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
+    distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
+    safe = np.where(distance != 0.0, distance, 1.0)
+    around = np.where(is_corner & (distance != 0.0), force / safe, 0.0)
+    for cell in range(len(force)):
+        if not force[cell].any():
+            continue
+        w, tau, f = moves.turn[:, cell], moves.slide[:, cell], force[cell]
+        mixed = (f * w)[:, None] * tau
+        result += mixed + np.swapaxes(mixed, 0, 1)
+        result += (around[cell] * tau)[:, None] * tau - (f * distance[cell] * w)[:, None] * w
+    return result

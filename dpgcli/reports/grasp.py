@@ -1,0 +1,138 @@
+"""Figures of grasps: fingers on a body with the forces on it, a panel for each state."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dpgcli.arrays import Array, Columns
+from dpgcli.grasping.grasp import Frame, Held
+from dpgcli.grasping.table import TOUCHES, Grasps
+from dpgcli.reports.drawing import figure_to
+from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
+from dpgcli.reports.fingers import EDGE, MEASURE, WORD, draw_finger, handles, set_window
+from dpgcli.reports.outlines import FingerShape, Points, Profile, finger_shape, notes
+from dpgcli.reports.panels import Grid, Window
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import inverted_units
+
+BODY = "#DCE9F3"
+LONGEST = 0.2  # of the window: the arrow of the largest force
+SHORTEST = 4.0  # points: an arrow's head
+
+
+def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
+    """Draw every grasp to an SVG or PNG file, the same bytes each time."""
+    n = len(rows["pattern"])
+    profile = Profile.of(found.scene)
+    shapes = [_fingers(found, profile, row, rows) for row in range(n)]
+    circle = _circle(found)
+    drawn = [finger.points for own in shapes for finger in own]
+    window = Window.of(np.concatenate([circle, *drawn]))
+    largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
+    grid = Grid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
+    said = [*notes(found.scene), _said(largest)]
+    explained = [handle for handle in handles(is_gripper=False) if handle.get_label() != "tip"]
+    foot = Foot(said, [*explained, *_handles()], grid.page[0] > WIDE)
+    grid = replace(grid, foot=foot.height)
+    text = "\n".join(_described(rows, row) for row in range(n))
+    with figure_to(path, *grid.page, "Grasps", text, layout=None) as figure:
+        for row, fingers in enumerate(shapes):
+            axes = figure.add_axes(grid.box(row))
+            scale = window.size[1] / grid.shape_height  # mm per inch
+            set_window(axes, window, window.left + scale * grid.panel_width, 1.0 / scale)
+            is_leftmost, is_lowest = grid.is_outer(row)
+            axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
+            axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)
+            axes.set_title(_title(rows, row), fontsize=TITLE_SIZE, pad=3.0)
+            axes.fill(circle.real, circle.imag, facecolor=BODY, edgecolor=EDGE, lw=0.7, zorder=0)
+            for finger in fingers:
+                draw_finger(axes, finger, POINTS / scale)
+            if fingers:
+                _draw_forces(axes, found, row, LONGEST * max(window.size) / max(largest, TOUCHES))
+            else:
+                word = Status(rows["status"][row]).text.replace("_", "\n", 1)
+                middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
+                axes.text(0.5, 0.5, word, color=WORD, style="italic", **middle)
+        foot.draw(figure, window, grid)
+
+
+def _circle(found: Grasps) -> Points:
+    turn = np.linspace(0.0, 2.0 * np.pi, 121)
+    points: Points = complex(*found.body.center) + found.body.radius * np.exp(1j * turn)
+    return points
+
+
+def _fingers(found: Grasps, profile: Profile, row: int, rows: Columns) -> tuple[FingerShape, ...]:
+    """The shapes of a row's fingers; none without an answer."""
+    if rows["status"][row] != Status.STABLE:
+        return ()
+    taken = [(frame, *found.take(place, row)) for place, frame in enumerate(found.frames)]
+    return tuple(_shape(found, profile, frame, own, lane) for frame, own, lane in taken)
+
+
+def _shape(found: Grasps, profile: Profile, frame: Frame, own: Held, lane: int) -> FingerShape:
+    finger = found.scene.finger
+    nodes = own.nodes
+    as_upper = frame._replace(side=1)
+    height = float(finger.segment_height[0, 0])
+    base = _complex(as_upper.placed(_with(nodes.base_x, nodes.base_y, lane, 0.0)))
+    top = _complex(as_upper.placed(_with(nodes.top_x, nodes.top_y, lane, height)))
+    inverted = inverted_units(own.after[lane : lane + 1], finger.n_units)[:, 0]
+    shape = finger_shape(profile, base, top, inverted)
+    return shape if frame.side > 0 else shape.mirrored()
+
+
+def _with(x: Array, y: Array, lane: int, height: float) -> Array:
+    """Nodes of a lane, behind the clamped one, (2, station)."""
+    return np.stack((np.append(0.0, x[:, lane]), np.append(height, y[:, lane])))
+
+
+def _complex(points: Array) -> Points:
+    together: Points = points[0] + 1j * points[1]
+    return together
+
+
+def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
+    """Arrows from the places of contact into the body; `scale` in mm per N."""
+    for place, frame in enumerate(found.frames):
+        own, lane = found.take(place, row)
+        for side in np.flatnonzero(own.push[:, lane] > TOUCHES):
+            way = frame.outside(own.normal[:, side, lane])
+            start = found.body.center - found.body.radius * way
+            end = start + scale * own.push[side, lane] * way
+            arrow = {"arrowstyle": "-|>", "color": MEASURE, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
+            arrow["mutation_scale"] = SHORTEST * 2.0
+            axes.annotate("", end, start, arrowprops=arrow, zorder=5)
+
+
+def _handles() -> list[Any]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    return [
+        Patch(facecolor=BODY, edgecolor=EDGE, lw=0.7, label="body"),
+        Line2D([], [], color=MEASURE, marker=">", lw=1.1, ms=5, label="force on the body"),
+    ]
+
+
+def _said(largest: float) -> str:
+    if largest <= TOUCHES:
+        return "no finger touches the body"
+    return f"arrows are to scale: the longest is {largest:.3g} N"
+
+
+def _title(rows: Columns, row: int) -> str:
+    before, after = rows["pattern"][row], rows["pattern_after"][row]
+    return before if after in ("", before) else f"{before} → {after}"
+
+
+def _described(rows: Columns, row: int) -> str:
+    """A grasp in one line, for those who do not see it."""
+    status = Status(rows["status"][row])
+    if status is not Status.STABLE:
+        return f"{_title(rows, row)}: {status.text.replace('_', ' ')}"
+    n = rows["n_contacts"][row]
+    force = f", largest force {rows['max_contact_N'][row]:.4g} N" if n else ""
+    return f"{_title(rows, row)}: {n} contacts{force}"

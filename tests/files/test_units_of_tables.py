@@ -1,0 +1,254 @@
+"""Units that a table says itself, for every reader: converted or refused, never passed."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import dpgcli
+from dpgcli.errors import SpecError
+from dpgcli.files.known_states import read_states
+from dpgcli.files.measured import read_curve, read_moments, read_table
+from dpgcli.files.scene_file.histories import read_history
+from dpgcli.files.sweep_file import read_sweep
+
+STATES = {"pattern": ["00", "11"], "tip_x_mm": [27.0, 22.0], "tip_y_mm": [0.1, -9.0]}
+
+
+def of_states(path: Path, n_units: int = 2) -> list[Any]:
+    known = read_states(path, n_units)
+    return [known.tip, known.angles, known.openings, known.pushes, known.moments, known.seconds]
+
+
+def of_one_unit(path: Path) -> list[Any]:
+    return of_states(path, 1)
+
+
+def of_shapes(path: Path) -> list[Any]:
+    return [*read_states(STATES, 2, path).shapes]
+
+
+def of_curve(path: Path) -> list[Any]:
+    curve = read_curve(path).curve
+    return [curve.travel, curve.energy, curve.force, curve.pressure, curve.volume, curve.time]
+
+
+def of_hinge(path: Path) -> list[Any]:
+    return [(found := read_moments(path)).moment, found.rotation]
+
+
+def of_grid(path: Path) -> list[Any]:
+    return [(found := read_table(path)).geometry, *found.quantities.values()]
+
+
+def of_history(path: Path) -> list[Any]:
+    return [*read_history(path, ["A", "B"]).values()]
+
+
+def of_designs(path: Path) -> list[Any]:
+    base = Path(dpgcli.__file__).parent.parent / "configs" / "three_unit.yaml"
+    sweep = path.with_name("sweep.yaml")
+    sweep.write_text(f"base: {base}\nspace: [{{table: {path.name}}}]\n")
+    (axis,) = read_sweep(sweep).space.axes
+    return [*axis.values.values()]
+
+
+Reader = Callable[[Path], list[Any]]
+READERS: dict[str, tuple[Reader, dict[str, list[Any]]]] = {
+    "states": (
+        of_states,
+        STATES
+        | {"tip_angle_rad": [0.0, -0.5], "chamber2_angle_rad": [0.0, -0.25]}
+        | {"opening1_mm": [0.0, 3.5], "push2_N": [0.0, 1.0]}
+        | {"moment_N_mm": [0.0, 2.0], "seconds": [1.0, 2.0]},
+    ),
+    "one unit": (
+        of_one_unit,
+        {"unit": ["ground", "inverted"], "moment_N_mm": [1.0, 2.0]}
+        | {"chamber2_angle_rad": [-0.1, -0.3], "opening_mm": [1.0, 3.5], "push_N": [0.0, 1.2]},
+    ),
+    "shapes": (of_shapes, {"pattern": ["00"] * 2, "x_mm": [0.0, 27.0], "y_mm": [1.0, 2.0]}),
+    "curve": (
+        of_curve,
+        {"travel_mm": [0.0, 3.0, 14.0], "energy_mJ": [0.0, 20.0, 60.0]}
+        | {"force_N": [0.0, 9.0, 4.0], "pressure_MPa": [0.0, 0.1, 0.15]}
+        | {"volume_mm3": [0.0, 200.0, 900.0], "time_s": [0.0, 1.0, 2.0]},
+    ),
+    "hinge": (of_hinge, {"moment_N_mm": [1.0, 5.0], "rotation_rad": [0.1, 0.4]}),
+    "grid": (
+        of_grid,
+        {"dome_height_mm": [4.5, 6.5], "elastic_modulus_MPa": [20.0, 26.0]}
+        | {"hinge_stiffness_N_mm_per_rad": [24.0, 25.0], "wall_compliance_mm_per_N": [0.8, 0.9]}
+        | {"bistable_stiffness_N_per_mm": [0.4, 0.5], "force_linearity": [0.04, 0.05]}
+        | {"limit_pressure_MPa": [0.1, 0.15]},
+    ),
+    "history": (
+        of_history,
+        {"time_s": [0.0, 1.0], "A_MPa": [0.0, 0.15], "B_MPa": [0.0, 0.1]},
+    ),
+    "designs": (
+        of_designs,
+        {"finger.geometry.dome_height_mm": [6.0, 6.5]}
+        | {"finger.geometry.dome_thickness_mm": [0.7, 0.75]},
+    ),
+}
+OTHER = {  # by how a name ends, another unit of the quantity, and how a name may have it instead
+    "_N_mm_per_rad": ("N m/rad", "_N_m_per_rad"),
+    "_mm_per_N": ("cm/N", "_cm_per_N"),
+    "_N_per_mm": ("N/m", "_N_per_m"),
+    "_N_mm": ("N cm", "_N_cm"),
+    "_mm3": ("ml", "_ml"),
+    "_mm": ("cm", "_cm"),
+    "_rad": ("deg", "_deg"),
+    "_N": ("cN", "_cN"),
+    "_mJ": ("J", "_J"),
+    "_MPa": ("kPa", "_kPa"),
+    "_s": ("ms", "_ms"),
+    "seconds": ("min", "seconds_min"),
+    "force_linearity": ("%", "force_linearity_percent"),
+}
+COLUMNS = [
+    (reader, name, next(end for end in OTHER if name.endswith(end)))
+    for reader, (_, table) in READERS.items()
+    for name in table
+    if name not in ("pattern", "unit")
+]
+
+
+def written(path: Path, table: dict[str, list[Any]], units: dict[str, str] | None = None) -> Path:
+    rows = [list(table), *([units.get(name, "") for name in table] for _ in range(bool(units)))]
+    rows += map(list, zip(*table.values(), strict=True))
+    path.write_text("".join(",".join(map(str, row)) + "\n" for row in rows))
+    return path
+
+
+def renamed(table: dict[str, list[Any]], name: str, other: str) -> dict[str, list[Any]]:
+    return {other if key == name else key: values for key, values in table.items()}
+
+
+def is_refused(read: Reader, path: Path, *words: str) -> bool:
+    try:
+        read(path)
+    except SpecError as error:
+        said = str(error)
+        return all(word in said for word in words)
+    return False
+
+
+def are_same(found: list[Any], expected: list[Any]) -> bool:
+    pairs = zip(found, expected, strict=True)
+    return all(a is b or np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+
+@pytest.mark.parametrize(("reader", "name", "end"), COLUMNS)
+def test_another_unit_is_refused_wherever_the_file_says_it(
+    tmp_path: Path, reader: str, name: str, end: str
+) -> None:
+    """Below the header, above it, behind the name, and in a data frame."""
+    read, table = READERS[reader]
+    unit, _ = OTHER[end]
+    others = dict.fromkeys(table, "") | {name: f"[{unit}]"}
+    path = written(tmp_path / "t.csv", table, others)
+    shown = name.replace("opening_", "opening1_").replace("push_", "push1_").split(".")[-1]
+    assert is_refused(read, path, shown, f"[{unit}]" if reader == "designs" else unit)
+    for title in (f"{name} ({unit})", f"{name} [{unit}]"):
+        assert is_refused(read, written(path, renamed(table, name, title)), shown), title
+    head, units, *rows = written(path, table, others).read_text().splitlines(keepends=True)
+    path.write_text("".join((units, head, *rows)))
+    assert is_refused(read, path), "above the header"
+    if reader != "designs":
+        frame = pd.DataFrame(table).astype(object)
+        top = pd.DataFrame({key: [text] for key, text in others.items()})
+        assert is_refused(read, pd.concat([top, frame]), shown, unit)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("reader", "name", "end"), COLUMNS)
+def test_the_own_unit_changes_nothing(tmp_path: Path, reader: str, name: str, end: str) -> None:
+    read, table = READERS[reader]
+    own = end.replace("_per_", "/").replace("_", " ").strip()
+    unit = {"seconds": "s", "force linearity": "-"}.get(own, own)
+    expected = read(written(tmp_path / "t.csv", table))
+    if reader == "designs":  # whose columns are keys and nothing else
+        return
+    for title in (f"{name} ({unit})", f"{name} [{unit}]"):
+        assert are_same(read(written(tmp_path / "t.csv", renamed(table, name, title))), expected)
+    if unit != "-":
+        assert are_same(read(written(tmp_path / "t.csv", table, {name: unit})), expected)
+
+
+@pytest.mark.parametrize(
+    ("reader", "name", "end"), [each for each in COLUMNS if each[2].startswith("_")]
+)
+def test_a_name_with_another_unit_is_no_column_that_is_left_out(
+    tmp_path: Path, reader: str, name: str, end: str
+) -> None:
+    read, table = READERS[reader]
+    if name == "limit_pressure_MPa":  # which is nothing of ours, and stays what it is
+        return
+    other = name.removesuffix(end) + OTHER[end][1]
+    assert is_refused(
+        read, written(tmp_path / "t.csv", renamed(table, name, other)), other.split(".")[-1]
+    )
+    if reader not in ("designs", "history"):
+        for title in (f"{name}<x>", name.replace(name[0], name[0].upper(), 1)):
+            path = written(tmp_path / "t.csv", renamed(table, name, title))
+            assert is_refused(read, path, f"expected {name}, in "), title
+
+
+@pytest.mark.slow
+def test_every_reader_of_tables_is_here() -> None:
+    """Whoever reads a sheet, or a table of designs."""
+    found = {}
+    for path in Path(dpgcli.__file__).parent.rglob("*.py"):
+        calls = re.findall(
+            r"(?<!def )\b(?:read_sheet|frame_in|read_csv)\(", path.read_text("utf-8")
+        )
+        found |= {path.name: len(calls)} if calls else {}
+    assert found == {"known_states.py": 2, "measured.py": 3, "histories.py": 1} | {
+        "space.py": 1,  # of designs
+        "tables.py": 1,
+    }
+
+
+def test_a_frame_in_another_unit(tmp_path: Path) -> None:
+    for said in ("first_station_cm: 0.5, 0.07", "tip_offset_m: 0, 0", "tip_offset: 1, 2"):
+        path = written(tmp_path / "t.csv", STATES)
+        path.write_text(f"# {said}\n{path.read_text()}")
+        with pytest.raises(SpecError, match="first_station_mm or tip_offset_mm, in mm"):
+            read_states(path, 2)
+
+
+def test_a_chosen_column_has_the_unit_that_the_file_says(tmp_path: Path) -> None:
+    """Whatever stands in brackets behind another title."""
+    from dpgcli.files.csv_file import Choice
+
+    table = {"Weg (cm)": [0.0, 1.4], "force_N (raw)": [1, 1], "Load [kN]": [0.0, 0.009]}
+    choice = Choice(columns={"travel_mm": "Weg", "force_N": "Load"})
+    found = read_curve(written(tmp_path / "t.csv", table), choice=choice)
+    assert found.curve.travel.tolist() == [0.0, 14.0]
+    assert found.curve.force is not None
+    assert found.curve.force.tolist() == [0.0, 9.0]
+    assert found.ignored == ("force_N (raw)",)
+
+
+def test_two_columns_of_a_name_are_told_apart_by_what_is_behind_it(tmp_path: Path) -> None:
+    path = written(tmp_path / "t.csv", {**STATES, "tip_x_mm (std)": [1.0, 2.0]})
+    known = read_states(path, 2)
+    assert known.tip[0].tolist() == STATES["tip_x_mm"]
+    assert known.unused == ("tip_x_mm (std)",)
+
+
+def test_a_header_whose_names_all_have_units_is_found_below_other_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    above = "1,2,3\n4,5,6\n7,8,9\n"
+    path.write_text(f"Lot,7\n{above}travel_mm [mm],energy_mJ [mJ]\n0,0\n14,60\n")
+    assert read_curve(path).curve.travel.tolist() == [0.0, 14.0]
+
+
+def test_a_name_that_ends_in_a_unit_of_something_else_is_another_column(tmp_path: Path) -> None:
+    table = {"travel_mm": [0.0, 14.0], "force_N": [0.0, 9.0], "energy_min": [0.0, 1.0]}
+    assert read_curve(written(tmp_path / "t.csv", table)).ignored == ("energy_min",)

@@ -1,0 +1,182 @@
+"""Fingers about a growing disc: energy, limits, and what results must not depend on."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dpgcli.arrays import Array
+from dpgcli.equilibrium import path
+from dpgcli.grasping import approach as approaching
+from dpgcli.mechanics.finger import Finger
+
+Fingers = Callable[..., Finger]
+Grow = Callable[..., Any]
+TWO_SIDES = (["010"], (24.0, -16.0), 15.6)
+RESETS = (["11"], (20.0, -16.0), 15.0)
+
+
+def test_a_body_in_a_corner_touches_both_sides(
+    reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
+) -> None:
+    """Against the balance of an energy and gaps of the tests' own, with two pushes."""
+    patterns, center, radius = TWO_SIDES
+    found = grown(reference_finger(3), patterns, center, radius)
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
+    assert (push > 0.0).tolist() == [False, True, True]
+    finger = own(reference_finger(3), np.array([False, True, False]), 1.5, center, radius)
+    assert finger.gaps(q[:, None])[1:, 0] == pytest.approx(0.0, abs=1e-12)
+    rest = finger.gradient(finger.energy, q) - push @ finger.gradient(finger.gaps, q)
+    assert np.abs(rest).max() / 10.75 <= 1e-9
+
+
+def test_a_side_that_is_let_go_of_opens(
+    reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
+) -> None:
+    """In the same corner the larger disc ends on one side: the end phalanx has come off."""
+    patterns, center, _ = TWO_SIDES
+    found = grown(reference_finger(3), patterns, center, 17.2)
+    assert found.shapes.is_there.all() and not found.came.resets
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
+    assert (push > 0.0).tolist() == [False, True, False]
+    finger = own(reference_finger(3), np.array([False, True, False]), 1.5, center, 17.2)
+    assert finger.gaps(q[:, None])[2, 0] > 1e-3
+    rest = finger.gradient(finger.energy, q) - push @ finger.gradient(finger.gaps, q)
+    assert np.abs(rest).max() / 10.75 <= 1e-9
+
+
+@pytest.mark.parametrize("walls", [0.0, 0.6])
+def test_a_penalty_comes_to_the_same_at_first_order(
+    walls: float, reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
+) -> None:
+    """½ k max(0, −g)², minimized by Newton's method from definitions: errors fall as 1/k."""
+    finger = reference_finger(2).changed(wall_compliance=np.array([[walls]]))
+    found = grown(finger, ["10"], (20.0, -16.0), 15.0)
+    exact, push = (
+        found.shapes.coordinates[:, 0],
+        found.obstructed.relabeled(found.shapes).push[:, 0],
+    )
+    soft = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0)
+    off = []
+    for k in (1e4, 1e5):
+
+        def energy(q: Array, k: float = k) -> Array:
+            return np.asarray(
+                soft.energy(q) + 0.5 * k * (soft.gaps(q)[push > 0.0] ** 2).sum(axis=0)
+            )
+
+        q = exact.copy()
+        for _ in range(12):
+            q = q - np.linalg.solve(soft.hessian(energy, q), soft.gradient(energy, q))
+        assert np.abs(soft.gradient(energy, q)).max() < 1e-7
+        pushes = -k * np.minimum(soft.gaps(q[:, None])[:, 0], 0.0)
+        assert (pushes > 0.0).tolist() == (push > 0.0).tolist()
+        off.append([np.abs(q - exact).max(), np.abs(pushes - push).max()])
+    assert off[0][0] > 1e-6
+    assert np.divide(*off) == pytest.approx([10.0, 10.0], rel=0.02)
+
+
+@pytest.mark.parametrize("walls", [0.0, 0.6])
+@pytest.mark.parametrize("bars", [np.inf, 1e4])
+def test_the_work_of_the_body_is_the_change_of_energy(
+    bars: float, walls: float, reference_finger: Fingers, begun: Grow, own: Callable[..., Any]
+) -> None:
+    """∫ push D dλ by 24 places of Gauss's rule, from the first touch on."""
+    finger = reference_finger(2, bars).changed(wall_compliance=np.array([[walls]]))
+    obstructed, start = begun(finger, ["10"] * 26, (20.0, -16.0), 15.0)
+    depth = float(obstructed.depth[0])
+    touch = 1.0 + float(obstructed.gaps()(start.coordinates).value.min()) / depth
+    place, weight = np.polynomial.legendre.leggauss(24)
+    half = 0.5 * (1.0 - touch)
+    loads = np.array([touch, *(touch + half * (1.0 + place)), 1.0])
+    came = approaching.approach(obstructed, start, 0.0 * loads, loads)
+    assert came.shapes.is_there.all() and not came.resets
+    push = obstructed.relabeled(came.shapes).push.sum(axis=0)
+    energy = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0).energy(
+        came.shapes.coordinates
+    )
+    assert energy[-1] - energy[0] > 0.1, "N mm"
+    work = half * depth * (weight * push[1:-1]).sum()
+    assert work == pytest.approx(energy[-1] - energy[0], rel=1e-7)
+
+
+def test_a_lane_does_not_depend_on_others(reference_finger: Fingers, grown: Grow) -> None:
+    patterns = ["10", "11", "01", "00"]
+    finger = reference_finger(2, 1e4)
+    together = grown(finger, patterns, (20.0, -16.0), 15.0)
+    for lane, pattern in enumerate(patterns):
+        alone = grown(finger, [pattern], (20.0, -16.0), 15.0)
+        for name, values in vars(alone.shapes).items():
+            assert (values[..., 0] == getattr(together.shapes, name)[..., lane]).all(), name
+        resets = [reset.load[0] for reset in alone.came.resets]
+        of_lane = [r.load[r.lanes == lane][0] for r in together.came.resets if lane in r.lanes]
+        assert resets == of_lane
+
+
+def test_steps_do_not_matter(
+    reference_finger: Fingers, grown: Grow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finger = reference_finger(2, 1e4)
+    coarse = grown(finger, *RESETS)
+    halved = partial(path.follow, largest_step=0.5 * path.LARGEST_STEP)
+    monkeypatch.setattr(approaching, "follow", halved)
+    fine = grown(finger, *RESETS)
+    assert fine.shapes.coordinates == pytest.approx(coarse.shapes.coordinates, abs=1e-11)
+    assert fine.shapes.push == pytest.approx(coarse.shapes.push, abs=1e-10)
+    (one,), (other,) = coarse.came.resets, fine.came.resets
+    assert one.load == pytest.approx(other.load, rel=1e-10)
+    assert (one.flipped == other.flipped).all()
+
+
+def test_it_can_stop_halfway(reference_finger: Fingers, begun: Grow) -> None:
+    """To λ = 0.7 and from there on is the same as at once, and as a smaller disc."""
+    finger = reference_finger(2)
+    obstructed, start = begun(finger, *RESETS)
+    zero, part = np.zeros(1), np.array([0.7])
+    first = approaching.approach(obstructed, start, zero, part)
+    then = approaching.approach(obstructed, first.shapes, part, zero + 1.0)
+    once = approaching.approach(obstructed, start, zero, zero + 1.0)
+    assert then.shapes.coordinates == pytest.approx(once.shapes.coordinates, abs=1e-12)
+    smaller, begin = begun(finger, ["11"], (20.0, -16.0), 10.5)
+    small = approaching.approach(smaller, begin, zero, zero + 1.0)
+    assert small.shapes.push.max() > 0.01, "N"
+    assert first.shapes.coordinates == pytest.approx(small.shapes.coordinates, abs=1e-12)
+    assert first.shapes.push == pytest.approx(small.shapes.push, abs=1e-11)
+
+
+def test_to_reset_stops_at_the_first(reference_finger: Fingers, begun: Grow) -> None:
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    zero = np.zeros(1)
+    came = approaching.approach(obstructed, start, zero, zero + 1.0, to_reset=True)
+    (reset,) = came.resets
+    assert came.load == pytest.approx(reset.load, abs=2e-6)
+    assert reset.load < 0.95
+
+
+@pytest.mark.parametrize("bars", [1e2, 1e3])
+def test_soft_bars_balance(
+    bars: float, reference_finger: Fingers, grown: Grow, own: Callable[..., Any]
+) -> None:
+    finger = reference_finger(2, bars)
+    found = grown(finger, ["10"], (20.0, -16.0), 15.0)
+    push, q = found.obstructed.relabeled(found.shapes).push[:, 0], found.shapes.coordinates[:, 0]
+    mine = own(finger, np.array([True, False]), 1.5, (20.0, -16.0), 15.0)
+    assert push.max() > 0.1
+    rest = mine.gradient(mine.energy, q) - push @ mine.gradient(mine.gaps, q)
+    assert np.abs(rest).max() <= 1e-9
+
+
+def test_stiff_bars_come_to_rigid_ones(reference_finger: Fingers, grown: Grow) -> None:
+    """At first order in k_b/k_L, to the last digits at 1e15 N/mm."""
+
+    def push(bars: float) -> float:
+        found = grown(reference_finger(2, bars), ["10"], (20.0, -16.0), 15.0)
+        assert found.shapes.is_there.all()
+        return float(found.shapes.push.max())
+
+    rigid = push(np.inf)
+    off = [abs(push(bars) - rigid) / rigid for bars in (1e5, 1e6, 1e12, 1e15)]
+    assert off[0] / off[1] == pytest.approx(10.0, rel=0.01)
+    assert off[2] < 1e-9 and off[3] < 1e-11
