@@ -45,6 +45,7 @@ from dpgcli.cli.fit.finger import finger
 from dpgcli.cli.fit.grid import grid
 from dpgcli.cli.fit.hinge import hinge
 from dpgcli.cli.main import NAMES
+from dpgcli.design.scatter import OF_FINGERS
 from dpgcli.design.scene import Origin
 from dpgcli.files.scene_file import json_schema, read_spec
 from dpgcli.files.sweep_file import read_sweep
@@ -335,6 +336,11 @@ def test_every_column_group_and_status_is_on_its_page() -> None:
     assert not names - named_in("columns")
     assert not {c.name for c in (*METRICS, *LEVEL_COLUMNS)} - named_in("sweeps")
     assert not {*DesignStatus} - named_in("sweeps")
+
+
+def test_what_is_one_draw_for_the_whole_finger_is_named() -> None:
+    named = text_of("pressure").split("What is one value of the whole finger")[1].split(". ")[0]
+    assert set(re.findall(r"`(\w+)`", named)) == set(OF_FINGERS)
 
 
 def test_every_verdict_family_and_ablation_is_on_its_page() -> None:

@@ -53,8 +53,18 @@ class PressedDomes:
 
     def rate(self, scalar: Array, load: Array) -> Array:
         """−A Δp of domes in touch, N per unit of λ."""
-        push = -self.change * self.volumes.swept(scalar, self._domes).area
+        push = self.free_rate(scalar)
         return push if self.touching is None else np.where(self.touching, push, 0.0)
+
+    def free_rate(self, scalar: Array) -> Array:
+        """−A Δp of all domes, N per unit of λ."""
+        return np.asarray(-self.change * self.volumes.swept(scalar, self._domes).area)
+
+    def free(self, scalar: Array, load: Array) -> Response:
+        """Of domes and pressures by themselves, whether in touch or not."""
+        return in_touch(
+            self.finger, PressureWork(self.pressures(load), self.volumes, self._domes), scalar
+        )
 
     def margin(self, measured: Measured | WideMeasured, load: Array) -> Array | None:
         """Push of domes in touch, and what keeps the others from it, over the forces in play.
@@ -66,7 +76,7 @@ class PressedDomes:
             return None
         assert self.inverted is not None and self.peak is not None, "given beside touching"
         scalar = measured.value
-        force = free_force(self.finger, self.volumes, scalar, self.pressures(load))
+        force = self.free(scalar, load).force
         is_away = ~self.touching & ~self.inverted & (scalar > self.peak)
         margin = np.where(self.touching, -force, force) / self.finger.force_scale
         return np.where(is_away, np.inf, margin)

@@ -6,12 +6,14 @@ another state, or in the same, if it turns back after each.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.actuation.directions import Directions, Rows, on_line, raised
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.staircase import UNKNOWN
 from dpgcli.arrays import Array, Codes, Flags, Indices, distinct
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
@@ -44,7 +46,8 @@ class Graph:
 
     `design` and `code` (state,) are in the order in which they are found, those of fewest pulses
     first; `n_pulses` says how many each needs. `n_lost` ranges of peaks led to no certified state,
-    or were not looked at, as the finger folds onto itself before.
+    or were not looked at, as the finger folds onto itself before; in `n_unknown` directions what
+    happens is not known: no equilibrium is found, or no certified state after release.
     """
 
     design: Indices
@@ -52,6 +55,7 @@ class Graph:
     n_pulses: Indices
     pulses: Pulses
     n_lost: int
+    n_unknown: int
 
 
 def reachable(
@@ -79,21 +83,22 @@ def reachable(
     design = np.flatnonzero(_is_state(pressed, np.arange(n_designs), begin))
     states = [(design, begin[design])]
     is_known = np.zeros(n_designs << n_units, bool)
-    parts, n_lost = [_no_pulses()], 0
+    parts, n_lost, n_unknown = [_no_pulses()], 0, 0
     while len(states[-1][0]):
         design, code = states[-1]
         is_known[_keys(design, code, n_units)] = True
         directions = Directions.of(design, code, int(line_of.max()) + 1)
         found = [_pulses(pressed, line_of, reach, part) for part in directions.chunks(n_units)]
-        parts += [pulses for pulses, _ in found]
-        n_lost += sum(lost for _, lost in found)
-        targets = [_keys(pulses.design, pulses.target, n_units) for pulses, _ in found]
+        parts += [part.pulses for part in found]
+        n_lost += sum(part.n_lost for part in found)
+        n_unknown += sum(len(part.unknown) for part in found)
+        targets = [_keys(pulses.design, pulses.target, n_units) for pulses in parts[-len(found) :]]
         new = distinct(np.concatenate(targets))
         new = new[~is_known[new]]
         states.append(_of_keys(new, n_units))
     n_pulses = np.repeat(np.arange(len(states)), [len(code) for _, code in states])
     designs, codes = (np.concatenate(part) for part in zip(*states, strict=True))
-    return Graph(designs, codes, n_pulses, Pulses.joined(parts), n_lost)
+    return Graph(designs, codes, n_pulses, Pulses.joined(parts), n_lost, n_unknown)
 
 
 def stable_states(pressed: Pressed, n_designs: int) -> Flags:
@@ -112,8 +117,8 @@ def reached_from_rest(
     reach: Array,
     is_stable: Flags,
     known: tuple[Indices, Indices] | None = None,
-) -> Flags:
-    """Which states pulses of any height lead to from rest, (design, pattern by code).
+) -> "Reached":
+    """Which states pulses of any height lead to from rest.
 
     `known` are sources and targets of the first transition of every state, if they have been found,
     as codes of one finger. Whole staircases are climbed only where these do not lead to all states.
@@ -123,7 +128,7 @@ def reached_from_rest(
     is_reached = np.zeros_like(is_stable)
     is_reached[:, 0] = is_stable[:, 0]
     for n_stairs in (1, None) if known is None else (None,):
-        is_done = np.zeros_like(is_stable)
+        is_done, n_unknown = np.zeros_like(is_stable), np.zeros(len(is_stable), np.int64)
         while True:
             _close(is_reached.ravel(), source, target)
             is_open = (is_reached != is_stable).any(axis=1)
@@ -133,10 +138,22 @@ def reached_from_rest(
             is_done |= is_reached
             directions = Directions.of(*_of_keys(key, n_units), int(line_of.max()) + 1)
             for part in directions.chunks(n_units):
-                found, _ = _pulses(pressed, line_of, reach, part, n_stairs)
+                found, _, unknown = _pulses(pressed, line_of, reach, part, n_stairs)
+                np.add.at(n_unknown, unknown, 1)
                 source = np.append(source, _keys(found.design, found.source, n_units))
                 target = np.append(target, _keys(found.design, found.target, n_units))
-    return is_reached
+    return Reached(is_reached, n_unknown)
+
+
+class Reached(NamedTuple):
+    """Which states pulses lead to from rest, (design, pattern by code).
+
+    Where these are not all there are, `n_unknown` (design,) directions in which no equilibrium is
+    found, or no certified state after release, may lead to others.
+    """
+
+    is_reached: Flags
+    n_unknown: Indices
 
 
 def _close(is_reached: Flags, source: Indices, target: Indices) -> None:
@@ -175,14 +192,12 @@ def _pulses(
     reach: Array,
     directions: Directions,
     n_stairs: int | None = None,
-) -> tuple[Pulses, int]:
-    """The pulses in these directions, and how many ranges of peaks lead to no certified state.
-
-    Those of the first `n_stairs` flips, if that is given.
-    """
+) -> "_Found":
+    """The pulses in these directions; of the first `n_stairs` flips, if that is given."""
     own, stairs, way = raised(pressed, line_of, reach, directions, n_stairs)
     n, ends = len(directions), on_line(way.shapes, line_of, directions.line)
     here, no = directions.code, np.zeros(n, bool)
+    is_unknown = np.isin(way.reason, UNKNOWN)
     begin = _Ranges(np.arange(n), np.zeros(n), here, here, ~no, no)
     parts = [begin]
     for stair in stairs:
@@ -191,11 +206,24 @@ def _pulses(
         is_fine = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
         is_tie = np.asarray(halted.tied.any(axis=0))
         at_peak, after = (codes_of(s.inverted) for s in (stair.events.after, stair.rest))
+        is_unknown[lanes[~is_fine]] = True
         parts.append(_Ranges(lanes, start, at_peak, after, is_fine, is_tie))
     ranges = _Ranges.joined(parts)
     ranges = ranges.take(np.argsort(ranges.lane, kind="stable"))
     found, n_lost = ranges.pulses(directions, ends)
-    return found, n_lost + int((way.reason != Halt.ARRIVED).sum())
+    n_lost += int((way.reason != Halt.ARRIVED).sum())
+    return _Found(found, n_lost, directions.design[is_unknown])
+
+
+class _Found(NamedTuple):
+    """Pulses; how many ranges of peaks lead to no certified state; designs of unknown directions.
+
+    Such a direction is one in which a search failed.
+    """
+
+    pulses: Pulses
+    n_lost: int
+    unknown: Indices
 
 
 @dataclass(frozen=True)

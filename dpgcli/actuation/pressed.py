@@ -12,11 +12,11 @@ from dpgcli.actuation.domes import (
     DomesAt,
     PressedDomes,
     PushingDomes,
-    free_force,
     limits,
     pushing,
 )
 from dpgcli.actuation.folding import folded
+from dpgcli.actuation.meeting import about_to_touch, with_touching
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
@@ -242,8 +242,9 @@ class Pressed:
 
         `watch` is told what is on the way, with shares of it as loads.
         """
-        shapes = self._about_to_touch(shapes, target)
         family = self.family(shapes, target)
+        touching = about_to_touch(family, shapes.coordinates)
+        shapes, family = replace(shapes, touching=touching), with_touching(family, touching)
         end, alone = self._lost_alone(shapes, target)
         ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step, watch)
         pressure = shapes.pressure + ends.load * (target - shapes.pressure)
@@ -297,17 +298,6 @@ class Pressed:
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL
         return np.asarray(near & is_alike & (ends.outcome == PathEnd.EVENT))
-
-    def _about_to_touch(self, shapes: Shapes, target: Array) -> Shapes:
-        """The shapes; domes that are just in touch remain so if pressure will push them there."""
-        if shapes.touching is None:
-            return shapes
-        extension = self.extensions(shapes.coordinates)
-        force = free_force(self.finger, self.volumes, extension, shapes.pressure)
-        is_level = np.abs(force) <= LARGEST_RESIDUAL * self.finger.force_scale
-        change = target - shapes.pressure
-        touching = np.where(is_level & (change != 0.0), change > 0.0, shapes.touching)
-        return replace(shapes, touching=touching)
 
     def _lost_alone(self, shapes: Shapes, target: Array) -> tuple[Array, Flags]:
         """The share of the way at which the first dome that is apart loses its place, at most 1.

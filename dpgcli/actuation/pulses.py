@@ -149,8 +149,9 @@ class Intervals(Rows):
     """What peaks of single pulses do to states, by lane and size of the peak, (interval,).
 
     Peaks from `low` up to below `high` (MPa) lead to the pattern with the code `at_peak`, and after
-    release to `after`; −1 stands for no certified state. `is_tie` says that units whose thresholds
-    the model does not tell apart go at `low`.
+    release to `after`; −1 stands for no certified state, at the peak for what is not known, as the
+    finger folds onto itself before or no equilibrium is found. `is_tie` says that units whose
+    thresholds the model does not tell apart go at `low`.
     """
 
     lane: Indices
@@ -194,8 +195,13 @@ def intervals(
         parts.append(
             Intervals(lanes, low, low, at_peak, after, np.asarray(halted.tied.any(axis=0)))
         )
+    ends = on_line(way.shapes, line_of, directions.line)
+    furthest = directions.sign * reach[directions.design]
+    short = np.flatnonzero(np.abs(ends) < (1.0 - WHOLE) * np.abs(furthest))
+    none, begins = np.full(len(short), -1), ends[short]
+    parts.append(Intervals(short, begins, begins, none, none, np.zeros(len(short), bool)))
     found = Intervals.joined(parts)
     found = found.take(np.argsort(found.lane, kind="stable"))
     is_last = np.append(found.lane[1:] != found.lane[:-1], True)
-    ends = on_line(way.shapes, line_of, directions.line)[found.lane]
+    ends = furthest[found.lane]
     return replace(found, high=np.where(is_last, ends, np.append(found.low[1:], 0.0)))

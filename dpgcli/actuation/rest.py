@@ -1,21 +1,29 @@
 """Fingers at rest, before any pressure: the stable states that ways begin at and end in."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from dpgcli.actuation.pressed import Pressed, Shapes
-from dpgcli.arrays import Flags
+from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.settle import settle
 
+CLOSED = 1e-6  # of a stroke: far above any rounding
 SAME_SHAPE = 1e-6  # of the largest change of a coordinate in one step: far above any rounding
 
 
 def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     """Shapes of patterns, (unit, batch), without pressure, and what certifies them.
 
-    Only those whose status is stable are states; others begin no way.
+    Only those whose status is stable are states; others begin no way. Domes that only push do not
+    act in units that are not inverted, whatever their gaps do: stable states leave them out. Under
+    pressure they act, and rest where their own energy says. A state with a gap closed beyond that
+    is one of the first model and none of the second: `GAP_CLOSED`. It takes loads that close gaps,
+    or hinges that turn each other the other way (κ < 0), and a dome whose energy is not a curve by
+    its own travel.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
@@ -31,7 +39,20 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     touching, finger = None if pressed.limits is None else inverted.copy(), pressed.finger
     if touching is not None and finger.is_loaded:  # a gap may be open further than a dome reaches
         touching &= pressed.extensions(coordinates) <= finger.law.touching(finger.domes).highest
-    return Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching), settled
+    shapes = Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching)
+    if touching is not None:
+        is_closed = (settled.status == Status.STABLE) & _closed(pressed, shapes)
+        status = np.where(is_closed, Status.GAP_CLOSED, settled.status).astype(np.uint8)
+        settled = replace(settled, status=status)
+    return shapes, settled
+
+
+def _closed(pressed: Pressed, shapes: Shapes) -> Flags:
+    """Where a gap is closed beyond the place of its dome, which is at rest, (batch,)."""
+    finger = pressed.finger
+    place: Array = -finger.domes.contact - CLOSED * finger.stroke
+    is_beyond = ~shapes.inverted & (pressed.extensions(shapes.coordinates) < place)
+    return np.asarray(is_beyond.any(axis=0))
 
 
 def is_certified(pressed: Pressed, shapes: Shapes) -> Flags:

@@ -10,6 +10,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
 
 EVENTS = (Halt.FOLD, Halt.ALONE, Halt.CONTACT, Halt.RELEASE)
+UNKNOWN = (Halt.FAILED, Halt.CONTACT, Halt.RELEASE)  # nobody knows how these ways go on
 MOST_EVENTS = 64  # for each unit, on one way: curves with many bends have many
 
 

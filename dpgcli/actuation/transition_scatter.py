@@ -7,9 +7,9 @@ import numpy as np
 from dpgcli.actuation.directions import Directions, on_line
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest
-from dpgcli.actuation.staircase import MOST_EVENTS, Journey
+from dpgcli.actuation.staircase import MOST_EVENTS, UNKNOWN, Journey
 from dpgcli.actuation.transitions import Transitions
-from dpgcli.arrays import Array, Columns, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import Output
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
@@ -20,6 +20,7 @@ TAIL = 2.5  # % of draws on each side
 PRESSURES = (Output.PRESSURES,)
 SPREAD_COLUMNS = (
     Column("share_leaving", "", "share of draws that leave the state at some pressure"),
+    Column("share_unknown", "", "share of which no equilibrium is found: they may leave as well"),
     Column("share_same_unit", "", "share in which the same unit leaves, or one tied with it"),
     Column("pressure_mean_MPa", "MPa", "mean of the thresholds of draws", outputs=PRESSURES),
     Column("pressure_deviation_MPa", "MPa", "their standard deviation", outputs=PRESSURES),
@@ -38,15 +39,16 @@ def spread_rows(
     """How the thresholds of transitions scatter, by column; draws in no batch leave nothing."""
     pressure = np.full((len(rows.code), n_draws), np.nan)
     unit = np.full((len(rows.code), n_draws), -1)
+    is_unknown = np.zeros(unit.shape, bool)
     for draws, pressed in batches:
         found = _first_flips(pressed, line_of, reach, rows)
-        pressure[:, draws], unit[:, draws] = found
+        pressure[:, draws], unit[:, draws], is_unknown[:, draws] = found
     leaves = ~np.isnan(pressure)
     alike = inverted_units(rows.tied, len(line_of))  # (unit, row)
     alike[np.maximum(rows.unit, 0), np.arange(len(rows.unit))] |= rows.unit >= 0
     is_same = (unit >= 0) & alike[unit, np.arange(len(unit))[:, None]]
     columns = np.array([_statistics(own[has]) for own, has in zip(pressure, leaves, strict=True)])
-    shares = np.stack([leaves.mean(axis=1), is_same.mean(axis=1)], axis=1)
+    shares = np.stack([share.mean(axis=1) for share in (leaves, is_unknown, is_same)], axis=1)
     table = np.concatenate([shares, columns.reshape(len(shares), 4)], axis=1)
     return dict(zip((column.name for column in SPREAD_COLUMNS), table.T, strict=True))
 
@@ -62,10 +64,11 @@ def _statistics(pressures: Array) -> tuple[float, float, float, float]:
 
 def _first_flips(
     pressed: Pressed, line_of: Indices, reach: float, rows: Transitions
-) -> tuple[Array, Indices]:
+) -> tuple[Array, Indices, Flags]:
     """Pressures at which draws first flip in the directions of rows, and by which unit.
 
-    Both (row, draw); NaN and −1 where they do not, or the state is none.
+    Both (row, draw); NaN and −1 where they do not, or the state is none. And where no equilibrium
+    is found, so that nobody knows.
     """
     n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
     n = len(rows.code) * n_draws
@@ -75,18 +78,19 @@ def _first_flips(
         rows.line.repeat(n_draws),
         rows.sign.repeat(n_draws),
     )
-    pressure, unit = np.full(n, np.nan), np.full(n, -1)
+    pressure, unit, is_unknown = np.full(n, np.nan), np.full(n, -1), np.zeros(n, bool)
     size = lanes_at_once(n_units)
     for first in range(0, n, size):
         lanes = np.arange(first, min(first + size, n))
         few = directions.take(lanes)
-        pressure[lanes], unit[lanes] = _flips(pressed, line_of, reach, few)
-    return pressure.reshape(-1, n_draws), unit.reshape(-1, n_draws)
+        pressure[lanes], unit[lanes], is_unknown[lanes] = _flips(pressed, line_of, reach, few)
+    shape = len(rows.code), n_draws
+    return pressure.reshape(shape), unit.reshape(shape), is_unknown.reshape(shape)
 
 
 def _flips(
     pressed: Pressed, line_of: Indices, reach: float, directions: Directions
-) -> tuple[Array, Indices]:
+) -> tuple[Array, Indices, Flags]:
     """The same of some directions, (lane,)."""
     pressure, unit = np.full(len(directions), np.nan), np.full(len(directions), -1)
     own = pressed.take_lanes(directions.design)
@@ -106,4 +110,6 @@ def _flips(
         pressure[states[which]] = on_line(halted.shapes, line_of, line[which])
         unit[states[which]] = halted.unit
         journey.go_on(~is_flip[events.is_fine])
-    return pressure, unit
+    is_unknown = np.zeros(len(directions), bool)
+    is_unknown[states] = np.isin(journey.reason, UNKNOWN) & np.isnan(pressure[states])
+    return pressure, unit, is_unknown

@@ -71,12 +71,14 @@ class StateGraph:
     """All stable states of a finger, and their transitions on its lines.
 
     `is_stable` and `is_reached`, by code of the pattern, say which states there are, and which of
-    them pulses of any height lead to from rest; `reach` is how far pressures went, MPa.
+    them pulses of any height lead to from rest; `n_unknown` directions may lead to others, see
+    `graph.Reached`; `reach` is how far pressures went, MPa.
     """
 
     transitions: Transitions
     is_stable: Flags
     is_reached: Flags
+    n_unknown: int
     reach: float
 
 
@@ -105,8 +107,9 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     transitions = Transitions.joined([_none(), *parts])
     leads = transitions.take(np.flatnonzero(transitions.outcome == Departure.LEAVES))
     known = leads.code.astype(np.int64), leads.after.astype(np.int64)
-    is_reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
-    return StateGraph(transitions, is_stable[0], is_reached[0], float(reach[0]))
+    reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
+    n_unknown = int(reached.n_unknown[0])
+    return StateGraph(transitions, is_stable[0], reached.is_reached[0], n_unknown, float(reach[0]))
 
 
 def _none() -> Transitions:

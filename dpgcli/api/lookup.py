@@ -25,7 +25,7 @@ INTERVAL_COLUMNS = (
     Column("direction", "", "+ up from zero, - down", kind=Kind.TEXT),
     Column("from_MPa", "MPa", "peaks from here", outputs=PRESSURES),
     Column("to_MPa", "MPa", "up to, but not at, here", outputs=PRESSURES),
-    Column("pattern_at_peak", "", "pattern at such a peak", kind=Kind.PATTERN),
+    Column("pattern_at_peak", "", "pattern at such a peak; empty: not known", kind=Kind.PATTERN),
     Column("pattern_after", "", "pattern after it, at rest; empty: no state", kind=Kind.PATTERN),
 )
 
@@ -71,6 +71,11 @@ class LookupResult:
 
     def _lines(self) -> Iterator[str]:
         yield f"single pulses from {self.start}, up to {self.reach:.4g} MPa"
+        if n_unknown := int((self.intervals.at_peak < 0).sum()):
+            yield (
+                f"{counted(n_unknown, 'interval')} without patterns: the finger folds onto itself "
+                "before, or no equilibrium is found"
+            )
         if n_tied := int(self.intervals.is_tie.sum()):
             yield (
                 f"ties where {counted(n_tied, 'interval')} begin{'s' * (n_tied == 1)}: "

@@ -24,7 +24,7 @@ from dpgcli.api.scatter import (
     share_interval,
 )
 from dpgcli.api.tables import Table
-from dpgcli.api.transitions import pressure_lines
+from dpgcli.api.transitions import failed_searches, pressure_lines
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, UsageError
@@ -141,18 +141,25 @@ class PulsesResult:
     def _lines(self) -> Iterator[str]:
         way, found = f"from {self.start} to {self.end}", self.sequence
         if found.pulses is None:
-            n_reached = counted(len(found.graph.code), "state")
-            yield f"no pulses up to {found.reach:.4g} MPa lead {way}: {n_reached} can be reached"
+            unknown, states = found.graph.n_unknown, counted(len(found.graph.code), "state")
+            lead, can_be = ("are found", "found to be") if unknown else ("lead", "can be")
+            yield f"no pulses up to {found.reach:.4g} MPa {lead} {way}: {states} {can_be} reached"
+            if unknown:
+                yield f"{failed_searches(unknown)}: more may be reached"
             yield from self.reasons
         elif not found.pulses:
             yield f"{self.start} is the state to start from: no pulse is needed"
         else:
             smallest, size = min((pulse.margin, abs(pulse.peak)) for pulse in found.pulses)
+            unknown = found.graph.n_unknown
             yield (
-                f"{counted(len(found.pulses), 'pulse')} {way}, the fewest there are; smallest "
+                f"{counted(len(found.pulses), 'pulse')} {way}, the fewest "
+                f"{'found' if unknown else 'there are'}; smallest "
                 f"margin {smallest:.4g} MPa, {100.0 * smallest / size:.2g}% of its peak; "
                 f"replayed from {self.start}, it ends there"
             )
+            if unknown and len(found.pulses) > 1:
+                yield f"{failed_searches(unknown)}: fewer pulses may do"
             yield from _notes(found)
         if self.scattered is not None:
             yield from self._scatter_lines(self.scattered)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dpgcli.actuation.alone import REACH
+from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transition_table import COLUMNS, transition_rows
 from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
@@ -20,6 +21,7 @@ from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
+from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
@@ -106,11 +108,19 @@ class TransitionsResult:
         if n_left_out:
             left_out = counted(n_left_out, "pattern")
             yield f"{left_out} without a certified stable state left out: dpg predict says why"
+            if n_closed := self._n_closed():
+                yield f"{n_closed} of these under pressure only: {Status.GAP_CLOSED.meaning}"
         if n_tied := int((graph.transitions.tied != 0).sum()):
             tied = counted(n_tied, "transition")
             yield f"ties in {tied}: the model does not say which of these units goes first"
         yield f"reachable from rest: {_listed(self.reachable)}"
-        yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
+        if graph.n_unknown:
+            yield (
+                f"not found to be reachable from rest: {_listed(self.unreachable)}; "
+                f"{failed_searches(graph.n_unknown)}, which may lead there"
+            )
+        else:
+            yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
         if self.draws is not None:
             yield from self.draws.lines
         yield from pressure_lines(self.given)
@@ -161,10 +171,29 @@ class TransitionsResult:
         check_drawable_graph(self.given)
         draw_transitions(self.states[1], self.rows, figure_path(path))
 
+    def _n_closed(self) -> int:
+        """How many states are left out that are stable until pressure comes."""
+        pressed = self.given.pressed
+        if pressed.limits is None:
+            return 0
+        codes = np.flatnonzero(~self.graph.is_stable).astype(np.uint64)
+        _, settled = at_rest(pressed, inverted_units(codes, pressed.finger.n_units))
+        return int((settled.status == Status.GAP_CLOSED).sum())
+
     def _patterns(self, which: Flags) -> tuple[str, ...]:
         codes = np.flatnonzero(which).astype(np.uint64)
         n_units = self.given.pressed.finger.n_units
         return tuple(texts(inverted_units(codes, n_units)).astype(str).tolist())
+
+
+def failed_searches(n_directions: int) -> str:
+    """In how many directions searches failed, for summaries.
+
+    >>> failed_searches(1)
+    'no equilibrium or no certified state is found in 1 direction of pressure'
+    """
+    directions = counted(n_directions, "direction")
+    return f"no equilibrium or no certified state is found in {directions} of pressure"
 
 
 _COUNTED = {

@@ -28,6 +28,7 @@ FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
 AT_KINK = 1e-6  # of the load: as near a path comes to a kink beyond which nothing is found
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
+AWAY = 1e-9  # of the forces in play: what is nearer to an event may be at it, rounding aside
 SMALLEST_STEP = 1e-9  # of the scale
 PLACES = 64  # on a step, at which laws from points are looked at,
 SMALLEST_GUARDED = 1e-3  # of the scale, if it is longer
@@ -210,9 +211,12 @@ def _one_step(
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
     dip = _first_dip(family, walk, trial, towards)
     is_over = trial.is_fine & ~is_beyond & (dip < 1.0)
-    crossed = np.where(margin < -TOLERANCE, margin / (walk.margin - margin), 0.0)
-    is_new = (margin < -TOLERANCE) & np.isinf(walk.margin)  # where it began is not known
-    crossed = np.where(is_new, -0.5, crossed)
+    is_away = walk.margin > AWAY
+    meets = is_away & (np.abs(margin) <= AWAY)
+    is_crossed = margin < np.where(is_away, -TOLERANCE, -AWAY)
+    by_secant = np.where(is_away, margin / (walk.margin - margin), SHRINKING - 1.0)
+    is_new = np.isinf(walk.margin)  # where it began is not known
+    crossed = np.where(is_crossed, np.where(is_new, -0.5, by_secant), 0.0)
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
     accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
@@ -220,7 +224,6 @@ def _one_step(
     to_root = walk.slope / (walk.slope - slope)
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
-    meets = (np.abs(margin) <= TOLERANCE) & (margin < walk.margin)
     is_kinked = (walk.cell < 0) & (family.n_multipliers > 0) & ~is_event
     is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
@@ -230,7 +233,7 @@ def _one_step(
     walk.is_beyond = is_event
     if family.n_multipliers:
         _go_by_load(walk, ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK))
-    event_cell = np.where(is_event, crossed, np.abs(margin)).argmin(axis=0)
+    event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
         _move(family, walk, trial, accepted, towards)

@@ -30,8 +30,9 @@ class Status(IntEnum):
     MARGINAL = 1
     ANOTHER_PATTERN = 2
     NOT_BISTABLE = 3
-    FOLDED = 4
-    NOT_CONVERGED = 5
+    GAP_CLOSED = 4  # under pressure only: see `actuation.rest`
+    FOLDED = 5
+    NOT_CONVERGED = 6
 
     @property
     def text(self) -> str:
@@ -50,6 +51,8 @@ _MEANINGS = {
     Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern, or in a ripple of "
     "a dome's curve",
     Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
+    Status.GAP_CLOSED: "a gap is closed beyond the place of its dome at rest, which would push as "
+    "pressure comes; where that dome really is a calibration's curve knows",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
     "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",

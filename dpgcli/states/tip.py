@@ -113,7 +113,9 @@ def min_eigenvalues(settled: Settled) -> Array:
     nodes = settled.potential.coordinates.station_jacobian(equilibrium.coordinates)
     sides = forward(equilibrium.factorization, nodes)
     roots = np.sqrt(np.where(positive, equilibrium.factorization.pivots, 1.0))
-    matrices = np.where(positive, sides / roots[:, None], 0.0).transpose(2, 0, 1)
+    scaled = np.where(positive, sides / roots[:, None], 0.0)
+    # by the layout of memory, which of one lane is another, products are summed in another order
+    matrices = np.ascontiguousarray(scaled.transpose(2, 0, 1))
     largest = np.linalg.eigvalsh(matrices @ matrices.transpose(0, 2, 1))[:, -1]
     with np.errstate(divide="ignore"):
         return np.where(positive, 1.0 / largest, np.nan)

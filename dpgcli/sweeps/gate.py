@@ -10,7 +10,9 @@ from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
-from dpgcli.text import printable
+from dpgcli.text import counted, printable
+
+REACHABLE, UNKNOWN = "n_reachable", "n_unknown_directions"
 
 
 @dataclass(frozen=True)
@@ -190,10 +192,23 @@ def check_requirements(
         )
     return tuple(
         RequirementVerdict(
-            designs, rule, n_checked, failing(designs, rule), doubts(rule, trusts or {})
+            designs,
+            rule,
+            n_checked,
+            failing(designs, rule),
+            (*doubts(rule, trusts or {}), *_failed_searches(designs, rule)),
         )
         for rule in requirements
     )
+
+
+def _failed_searches(designs: Columns, rule: Expression) -> tuple[Message, ...]:
+    """That a count of states is that of those found, where searches failed."""
+    if REACHABLE not in rule.names or UNKNOWN not in designs:
+        return ()
+    n = int(((designs[UNKNOWN] > 0) & _in_question(designs)).sum())
+    why = f"searches failed in {counted(n, 'design')} ({UNKNOWN}): more states may be reached there"
+    return (Message(Field("require"), f" {rule.text!r}: {why}"),) if n else ()
 
 
 def _in_question(designs: Columns) -> Flags:

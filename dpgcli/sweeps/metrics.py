@@ -188,6 +188,13 @@ UNDER_PRESSURE = (
         Kind.TEXT,
     ),
     _under_pressure(
+        "n_unknown_directions",
+        "",
+        "directions of pressure in which searches failed: more states may be reached",
+        lambda d: d.n_unknown_directions,
+        Kind.COUNT,
+    ),
+    _under_pressure(
         "snap_pressure_min_MPa",
         "MPa",
         "pressure at which the first unit snaps, each by itself",

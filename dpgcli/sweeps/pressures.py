@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.actuation.alone import Thresholds, thresholds_alone
-from dpgcli.actuation.graph import reached_from_rest, stable_states
+from dpgcli.actuation.graph import Reached, reached_from_rest, stable_states
 from dpgcli.actuation.pressed import TIE, Pressed
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.units import UnitSolutions
@@ -52,8 +52,8 @@ class PressedDesigns:
         return np.where(np.isnan(found).any(axis=0), np.nan, found)
 
     @cached_property
-    def is_reached(self) -> Flags:
-        """Which states pulses lead to from rest, (design, pattern by code)."""
+    def reached(self) -> Reached:
+        """Which states pulses lead to from rest, and where more may be."""
         is_stable = stable_states(self.pressed, self.n_designs)
         reach = self.thresholds.reach
         return reached_from_rest(self.pressed, self.pressure.line_of, reach, is_stable)
@@ -61,14 +61,19 @@ class PressedDesigns:
     @property
     def n_reachable(self) -> Indices:
         """How many states pulses lead to from rest, that one among them, (design,)."""
-        return np.asarray(self.is_reached.sum(axis=1))
+        return np.asarray(self.reached.is_reached.sum(axis=1))
+
+    @property
+    def n_unknown_directions(self) -> Indices:
+        """In how many directions searches failed, so that more states may be reached, (design,)."""
+        return self.reached.n_unknown
 
     @property
     def reachable_patterns(self) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
         """Their patterns in order, with commas between them, (design,)."""
         n_units = self.units.finger.n_units
         patterns = texts(inverted_units(np.arange(2**n_units, dtype=np.uint64), n_units))
-        return np.array([b",".join(patterns[own].tolist()) for own in self.is_reached])
+        return np.array([b",".join(patterns[own].tolist()) for own in self.reached.is_reached])
 
     @property
     def smallest_gap(self) -> Array:

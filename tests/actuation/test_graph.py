@@ -154,7 +154,9 @@ def test_designs_in_one_batch_do_not_feel_each_other(
 def of_design(found: Graph, design: int) -> Graph:
     which = np.flatnonzero(found.design == design)
     pulses = found.pulses.take(np.flatnonzero(found.pulses.design == design))
-    return Graph(which * 0, found.code[which], found.n_pulses[which], pulses, found.n_lost)
+    return Graph(
+        which * 0, found.code[which], found.n_pulses[which], pulses, found.n_lost, found.n_unknown
+    )
 
 
 def same(one: Graph, other: Graph) -> bool:

@@ -246,7 +246,7 @@ def test_states_are_reached_as_the_graph_of_pulses_says(
     by_pulses = reachable(own, line_of, reach)
     by_transitions = state_graph(own, line_of).is_reached
     assert np.flatnonzero(by_transitions).tolist() == sorted(by_pulses.code.tolist())
-    alone = reached_from_rest(own, line_of, reach, stable_states(own, 1))
+    alone = reached_from_rest(own, line_of, reach, stable_states(own, 1)).is_reached
     assert (alone[0] == by_transitions).all()
 
 
@@ -256,8 +256,8 @@ def test_whole_staircases_are_climbed_only_where_states_are_missing(
     own, line = pressed(study(3).changed(stroke=STROKES[:3])), np.zeros(3, np.int64)
     reach, is_stable = thresholds_alone(own).reach, stable_states(own, 1)
     nothing = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    found = reached_from_rest(own, line, reach, is_stable, nothing)
+    found = reached_from_rest(own, line, reach, is_stable, nothing).is_reached
     assert found.all()
     monkeypatch.setattr(graph, "_pulses", None)  # not asked
     all_known = np.zeros(7, np.int64), np.arange(1, 8)
-    assert reached_from_rest(own, line, reach, is_stable, all_known).all()
+    assert reached_from_rest(own, line, reach, is_stable, all_known).is_reached.all()

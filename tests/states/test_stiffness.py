@@ -135,3 +135,18 @@ def test_a_unit_is_as_stiff_along_its_chord_as_the_bar(
 def test_a_stiff_unit_is_as_stiff_along_its_chord_as_the_bar(reference_finger: Fingers) -> None:
     rows = compliances(reference_finger(1, 1e12), "1")
     assert rows["tip_stiffness_max_N_per_mm"] == pytest.approx(1e12, rel=1e-8)
+
+
+@pytest.mark.parametrize("bars", [np.inf, 1e4])
+def test_the_smallest_eigenvalue_of_one_state_is_that_among_others(
+    bars: float, reference_finger: Fingers, all_patterns: Patterns
+) -> None:
+    """To the last bit, whatever else is solved at once."""
+    units, patterns = UnitSolutions.of(reference_finger(3, bars)), all_patterns(3)
+
+    def found(which: slice) -> list[float]:
+        return min_eigenvalues(settle(units, chain_potential, patterns[:, which], 1e-12)).tolist()
+
+    alone = [value for k in range(8) for value in found(slice(k, k + 1))]
+    assert found(slice(None)) == alone
+    assert found(slice(2, 5)) == alone[2:5]

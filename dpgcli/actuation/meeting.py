@@ -1,0 +1,81 @@
+"""Domes that rest against their neighbors without a push: which go on in touch, and which apart.
+
+At such a place both laws hold. As pressures begin to change each dome either goes on in touch, and
+its push must not become a pull, or apart, and it must not run into its neighbor: with the rate r of
+its free force, E' − p A at its neighbor's place, r ≤ 0 in touch and r ≥ 0 apart. What the others do
+is in that rate: bars and hinges between the units move a neighbor away, or towards a dome whose own
+pressure does not change. This is a linear complementarity problem, whose matrix is that of stable
+fingers, positive definite: it has one solution (Cottle, Pang, Stone, The Linear Complementarity
+Problem, 1992, section 3.3), and changing the first wrong one again and again finds it (Murty 1974;
+there 4.2). All wrong ones at once is mostly faster, and is tried before.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dpgcli.actuation.domes import PressedDomes
+from dpgcli.arrays import Array, Flags
+from dpgcli.equilibrium.corrector import corrected
+from dpgcli.equilibrium.loaded import LoadedPotential, along
+from dpgcli.equilibrium.path import AWAY
+from dpgcli.mechanics.coordinates import FingerCoordinates
+
+NO_RATE = 1e-9  # of the largest rate: less is rounding, or of second order
+AT_ONCE = 4  # times, before one after the other
+PASSES = 8  # for each unit
+
+Family = LoadedPotential[FingerCoordinates, PressedDomes]
+
+
+def about_to_touch(family: Family, coordinates: Array) -> Flags | None:
+    """Which domes are in touch as the load begins to rise, (unit, batch); None where all are.
+
+    Others than those between both remain as they are.
+    """
+    law = family.law
+    if law.touching is None:
+        return None
+    value = family.measure(coordinates).value
+    is_level, touching = _level(law, value), law.touching.copy()
+    lanes = np.flatnonzero(is_level.any(axis=0))
+    for count in range(PASSES * len(value)):
+        if not len(lanes):
+            break
+        own = family.take_lanes(lanes)
+        wrong = _wrong(own, coordinates[:, lanes], touching[:, lanes], is_level[:, lanes])
+        if count >= AT_ONCE:
+            wrong &= np.arange(len(wrong))[:, None] == wrong.argmax(axis=0)
+        touching[:, lanes] ^= wrong
+        lanes = lanes[wrong.any(axis=0)]
+    return touching
+
+
+def with_touching(family: Family, touching: Flags | None) -> Family:
+    """The same energies with these domes in touch."""
+    return replace(family, law=replace(family.law, touching=touching))
+
+
+def _level(law: PressedDomes, value: Array) -> Flags:
+    """Domes whose own rest is where their neighbors are, within rounding."""
+    free = law.free(value, np.zeros(value.shape[1]))
+    is_rest = (np.abs(free.force) <= AWAY * law.finger.force_scale) & (free.stiffness > 0.0)
+    return np.asarray(is_rest)
+
+
+def _wrong(family: Family, coordinates: Array, touching: Flags, is_level: Flags) -> Flags:
+    """Domes between both that would pull, or run into their neighbors, (unit, batch).
+
+    None where the finger loses its balance with these in touch: that is for its path to tell.
+    """
+    there, none = with_touching(family, touching), np.full(touching.shape[1], -1)
+    nothing, depth = np.zeros(len(none)), max(family.column_depths)
+    here = corrected(there, coordinates, nothing, none, nothing, depth)
+    value = here.measured.value
+    moved = along(there.measure.rows, here.measured, here.along_load)
+    by_neighbor = family.law.free(value, nothing).stiffness * moved
+    by_pressure = family.law.free_rate(value)
+    rate = by_neighbor + by_pressure
+    least = NO_RATE * (np.abs(by_neighbor) + np.abs(by_pressure)).max(axis=0)
+    is_wrong = np.where(touching, rate > least, rate < -least)
+    return np.asarray(is_wrong & is_level & here.is_fine)
