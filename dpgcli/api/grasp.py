@@ -14,6 +14,7 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_flags,
+    check_texts,
     figure_path,
     path_of,
     point,
@@ -30,7 +31,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import select
-from dpgcli.text import counted
+from dpgcli.text import counted, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,16 +167,18 @@ def grasp(
 
 def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
     """The body of these arguments, or of the scene. Raises UsageError for what is none."""
+    check_texts(object=body)
     known = scene.body
     if body is None and known is None:
         raise UsageError(
             Field("object"), ": expected a body such as disc:40, here or as object in the spec"
         )
     radius = known.radius if body is None and known is not None else 0.5 * _diameter(str(body))
-    if at is None and known is None:
+    if at is not None:
+        return Disc(np.array(point("at", at)), radius)
+    if known is None:
         raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
-    center = known.center if at is None and known is not None else np.array(point("at", at or ()))
-    return Disc(center, radius)
+    return Disc(known.center, radius)
 
 
 def _diameter(text: str) -> float:
@@ -187,7 +190,7 @@ def _diameter(text: str) -> float:
     if kind != "disc" or not SMALLEST_DISC <= diameter <= LARGEST_DISC:
         raise UsageError(
             Field("object"),
-            f" {text}: expected disc and its diameter in mm, from {SMALLEST_DISC:g} to "
+            f" {shortened(text)}: expected disc and its diameter in mm, from {SMALLEST_DISC:g} to "
             f"{LARGEST_DISC:g}, such as disc:40",
         )
     return diameter
@@ -235,7 +238,7 @@ def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, 
         raise UsageError(Field("patterns"), ": pairs of states need a gripper in the spec")
     found: list[tuple[Codes, Codes]] = []
     single = [text for text in patterns if "/" not in text]
-    if single:
+    if single or not patterns:  # none at all selects nothing
         own = _codes(single, n)
         found.append(_crossed(own, own) if both else (own, own))
     for text in patterns:

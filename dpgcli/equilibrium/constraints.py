@@ -57,7 +57,7 @@ class AugmentedContact:
         """Energy, force and stiffness."""
         push = self.pushes(scalar)
         energy = (push * push - self.multiplier * self.multiplier) / (2.0 * self.stiffness)
-        return Response(energy, -push, np.where(push > 0.0, self.stiffness, 0.0))
+        return Response(energy, 0.0 - push, np.where(push > 0.0, self.stiffness, 0.0))
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""

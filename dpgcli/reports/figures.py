@@ -1,6 +1,8 @@
 """Figures of states: a panel for each, all at one scale, or all in one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
@@ -47,7 +49,8 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
     grid = Grid.of(
         len(states), prediction.plan.n_units, window, DIMENSION if scene.gripper else 0.0
     )
-    foot = Foot(notes(scene), handles(is_gripper=scene.gripper is not None), grid.page[0] > WIDE)
+    explained = partial(handles, is_gripper=scene.gripper is not None)
+    foot = Foot(notes(scene), explained, grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
     with figure_to(path, *grid.page, title, text, layout=None) as figure:
         for place, state in enumerate(states):
@@ -97,7 +100,7 @@ class Foot:
     """What stands below the panels: a legend, in two rows if the page is not wide, and notes."""
 
     notes: list[str]
-    handles: list[Any]
+    handles: Callable[[], list[Any]]
     is_wide: bool
 
     @property
@@ -113,11 +116,12 @@ class Foot:
         figure.text(left, middle, f"y ({window.unit})", rotation=90, va="center")
         top = (self.height - 0.22) / height
         figure.text(0.5, top, f"x ({window.unit})", ha="center", va="top")
+        explained = self.handles()
         figure.legend(
-            handles=self.handles,
+            handles=explained,
             loc="upper center",
             bbox_to_anchor=(0.5, (self.height - AXIS_LABELS) / height),
-            ncols=len(self.handles) if self.is_wide else NARROW_LEGEND,
+            ncols=len(explained) if self.is_wide else NARROW_LEGEND,
             frameon=False,
             fontsize=8,
             borderaxespad=0.0,

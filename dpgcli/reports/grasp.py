@@ -33,8 +33,7 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
     grid = Grid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
     said = [*notes(found.scene), _said(largest)]
-    explained = [handle for handle in handles(is_gripper=False) if handle.get_label() != "tip"]
-    foot = Foot(said, [*explained, *_handles()], grid.page[0] > WIDE)
+    foot = Foot(said, _handles, grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
     text = "\n".join(_described(rows, row) for row in range(n))
     with figure_to(path, *grid.page, "Grasps", text, layout=None) as figure:
@@ -111,7 +110,9 @@ def _handles() -> list[Any]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
+    of_fingers = [handle for handle in handles(is_gripper=False) if handle.get_label() != "tip"]
     return [
+        *of_fingers,
         Patch(facecolor=BODY, edgecolor=EDGE, lw=0.7, label="body"),
         Line2D([], [], color=MEASURE, marker=">", lw=1.1, ms=5, label="force on the body"),
     ]

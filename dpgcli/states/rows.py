@@ -19,7 +19,8 @@ from dpgcli.states.units import UnitSolutions
 def as_text(column: Column, values: NDArray[Any]) -> NDArray[Any]:
     """Patterns and statuses as strings; all else unchanged.
 
-    >>> as_text(Column("status", "", "", kind=Kind.STATUS), np.array([0, 4])).tolist()
+    >>> codes = np.array([Status.STABLE, Status.FOLDED])
+    >>> as_text(Column("status", "", "", kind=Kind.STATUS), codes).tolist()
     ['stable', 'folded']
     """
     if column.kind is Kind.PATTERN:

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
+from dpgcli.design.scene import Scene
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 FINGER = uniform_finger(2, **STUDY)
@@ -44,6 +45,7 @@ SPEC = {
     }
 }
 SWEEP = {"base": SPEC, "space": [{"key": "finger.units", "values": [1]}]}
+TOUCHING = Scene(FINGER, (), None, 1.5)
 FACE: dict[str, dict[str, Any]] = {
     "actuate": {"spec": FINGER, "pressure": "0..0.1"},
     "bench": {"spec": FINGER, "repeats": -1},  # refused in the end
@@ -55,6 +57,7 @@ FACE: dict[str, dict[str, Any]] = {
     "fit_grid": {"table": GRID},
     "fit_hinge": {"curve": HINGE},
     "fit_unit": {"curve": TURNS},
+    "grasp": {"spec": TOUCHING, "object": "disc:10", "at": (20.0, -10.0)},
     "landscape": {"spec": FINGER, "start": "0x", "end": "11"},
     "lookup": {"spec": FINGER},
     "merge": {"shards": ["nowhere"], "output": "new"},

@@ -105,6 +105,7 @@ def test_loads_that_grow(
         tuple(others),
         dome.measure,
         Unchanged(dome.law),
+        dome.measure,
         finger.stroke,
         np.ones((3, 1)),
         loads_of(whole).terms,

@@ -319,7 +319,8 @@ def test_settings_reach_overrides_written_as_numbers(read):
         (
             "zzz=3",
             "settings: zzz: expected a known key, found zzz "
-            "(known here: finger, gripper, pressure, loads, uncertainty, model_error, data)",
+            "(known here: finger, gripper, pressure, loads, object, uncertainty, model_error, "
+            "data)",
         ),
     ],
 )
