@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import Ends, PathEnd, follow
-from dpgcli.grasping.contact import Obstructed, Touching
+from dpgcli.grasping.contact import ContactShapes, Obstructed
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
@@ -34,13 +34,13 @@ class Approach:
     `load` (batch,) is 1 where the body is there in full.
     """
 
-    shapes: Touching
+    shapes: ContactShapes
     load: Array
     resets: tuple[Reset, ...]
 
 
 def approach(
-    obstructed: Obstructed, start: Touching, load: Array, end: Array, *, to_reset: bool = False
+    obstructed: Obstructed, start: ContactShapes, load: Array, end: Array, *, to_reset: bool = False
 ) -> Approach:
     """Let bodies grow from one load to another, (batch,), about fingers in balance.
 
@@ -68,7 +68,9 @@ def approach(
     return Approach(shapes, here, tuple(resets))
 
 
-def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple[Touching, Flags]:
+def _gone_on(
+    own: Obstructed, before: ContactShapes, ends: Ends, end: Array
+) -> tuple[ContactShapes, Flags]:
     """The shapes with which paths go on from where they ended, and units that flipped there."""
     size = len(before.coordinates)
     coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
@@ -76,7 +78,9 @@ def _gone_on(own: Obstructed, before: Touching, ends: Ends, end: Array) -> tuple
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
     push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
-    moved = Touching(coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool))
+    moved = ContactShapes(
+        coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)
+    )
     flipped = np.zeros(before.inverted.shape, bool)
     falls = np.flatnonzero(_beyond(ends) > 0.0)
     if len(falls):

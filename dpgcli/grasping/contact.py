@@ -37,7 +37,7 @@ Constrained = WithMultipliers[FingerCoordinates]
 
 
 @dataclass(frozen=True)
-class Touching:
+class ContactShapes:
     """Shapes against bodies, a lane each: coordinates (size, batch) and pushes (cell, batch), N.
 
     `inverted` (unit, batch) are the domes that act as inverted ones, `active` (cell, batch) the
@@ -50,14 +50,14 @@ class Touching:
     inverted: Flags
     is_there: Flags
 
-    def put(self, index: Indices, others: "Touching") -> None:
+    def put(self, index: Indices, others: "ContactShapes") -> None:
         """Replace the lanes at `index`."""
         for name, values in vars(self).items():
             values[..., index] = getattr(others, name)
 
-    def take_lanes(self, index: Indices) -> "Touching":
+    def take_lanes(self, index: Indices) -> "ContactShapes":
         """Some of them."""
-        return Touching(*(np.take(values, index, axis=-1) for values in vars(self).values()))
+        return ContactShapes(*(np.take(values, index, axis=-1) for values in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Obstructed:
             system, terms, slack, law, dome, scale, stiffness, n_multipliers=gaps.n_cells
         )
 
-    def relabeled(self, shapes: Touching) -> Touching:
+    def relabeled(self, shapes: ContactShapes) -> ContactShapes:
         """Shapes with each contact counted as that of the side to which it has come."""
         place = self.gaps()(shapes.coordinates).place
         is_there = place[:, None] == np.arange(len(place))[:, None]
@@ -142,11 +142,11 @@ class Obstructed:
         push = total(np.where(is_there, shapes.push[:, None], 0.0))
         return replace(shapes, active=active, push=push)
 
-    def stacked(self, shapes: Touching) -> Array:
+    def stacked(self, shapes: ContactShapes) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
         return np.concatenate((shapes.coordinates, shapes.push / self.stiffness))
 
-    def relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> Touching:
+    def relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Go downhill from coordinates at some loads to the next minima, by short steps.
 
         Domes that only push and are pushed out of their wells are let go, and the others go on.
@@ -162,17 +162,17 @@ class Obstructed:
             found.put(lanes, own._relaxed(few.coordinates, left, few.push, load[lanes]))
         return found
 
-    def _fallen(self, shapes: Touching) -> Flags:
+    def _fallen(self, shapes: ContactShapes) -> Flags:
         if not isinstance(self.units.finger.law, PushOnly):
             return np.zeros(shapes.inverted.shape, bool)
         return shapes.inverted & ~self.is_open(shapes)
 
-    def is_open(self, shapes: Touching) -> Flags:
+    def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are beyond their barriers, (unit, batch)."""
         springs = self.potential(shapes.inverted).coordinates.springs(shapes.coordinates)
         return np.asarray(springs.extension > self.units.wells.spring_barrier)
 
-    def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> Touching:
+    def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         here, push, lanes = start.copy(), push.copy(), np.arange(start.shape[1])
         for _ in range(MOST_UPDATES):
             own = self.take_lanes(lanes)
@@ -190,7 +190,7 @@ class Obstructed:
                 break
         return self.finished(here, inverted, push, load)
 
-    def finished(self, near: Array, inverted: Flags, push: Array, load: Array) -> Touching:
+    def finished(self, near: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Equilibria with the active set that pushes say, (cell, batch), from nearby."""
         active = push > 0.0
         family, n = self.family(inverted, active), len(load)
@@ -202,4 +202,4 @@ class Obstructed:
         margin = family.law.margin(there.loaded, load)
         is_there = there.is_fine & (margin >= -CLOSE).all(axis=0)
         pushes = np.where(active, y * self.stiffness, 0.0)
-        return Touching(there.coordinates[:size], pushes, active, inverted.copy(), is_there)
+        return ContactShapes(there.coordinates[:size], pushes, active, inverted.copy(), is_there)

@@ -24,7 +24,7 @@ from dpgcli.states.units import UnitSolutions
 MARGIN_TO = 2.0  # of the load: margins are looked for so far
 
 
-class Frame(NamedTuple):
+class FingerFrame(NamedTuple):
     """A finger's frame in the gripper's: angle (rad), base (mm) and side, 1 or −1 if mirrored.
 
     >>> upper, lower = frames(Gripper(base_spacing=60.0, mounting_angle=0.0))
@@ -55,16 +55,16 @@ class Frame(NamedTuple):
         return self.outside(point) + shift
 
 
-def frames(gripper: Gripper | None) -> tuple[Frame, ...]:
+def frames(gripper: Gripper | None) -> tuple[FingerFrame, ...]:
     """The frames of the upper and the lower finger; of one alone its own."""
     if gripper is None:
-        return (Frame(0.0, 0.0, 1),)
+        return (FingerFrame(0.0, 0.0, 1),)
     angle, half = float(gripper.mounting_angle), 0.5 * float(gripper.base_spacing)
-    return Frame(angle, half, 1), Frame(angle, half, -1)
+    return FingerFrame(angle, half, 1), FingerFrame(angle, half, -1)
 
 
 @dataclass(frozen=True)
-class Held:
+class Grasped:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
@@ -92,7 +92,9 @@ class Held:
     )
 
 
-def held(scene: Scene, formulate: Formulate, disc: Disc, frame: Frame, codes: Codes) -> Held:
+def held(
+    scene: Scene, formulate: Formulate, disc: Disc, frame: FingerFrame, codes: Codes
+) -> Grasped:
     """Let a body grow at its place about fingers in these states.
 
     Raises ValueError for a scene without the thickness of its layer.
@@ -134,14 +136,14 @@ def _certified(own: Obstructed, grown: Approach) -> Settled:
 
 def _described(
     own: Obstructed, codes: Codes, grown: Approach, settled: Settled, status: NDArray[np.uint8]
-) -> Held:
+) -> Grasped:
     """What there is to say of fingers that have come to rest."""
     shapes, coordinates = own.relabeled(grown.shapes), settled.potential.coordinates
     face = own.face.shape(shapes.coordinates)
     near = nearest(face, own.centers)
     push = shapes.push
     at_tip = tip(settled, with_compliance=False)
-    return Held(
+    return Grasped(
         code=codes,
         after=codes_of(settled.reached),
         status=status,

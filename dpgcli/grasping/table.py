@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Disc, Scene
-from dpgcli.grasping.grasp import Frame, Held, frames, held
+from dpgcli.grasping.grasp import FingerFrame, Grasped, frames, held
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -52,11 +52,11 @@ class Grasps:
 
     scene: Scene
     body: Disc
-    frames: tuple[Frame, ...]
-    fingers: tuple[Held, ...]
+    frames: tuple[FingerFrame, ...]
+    fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
 
-    def take(self, finger: int, row: int) -> tuple[Held, int]:
+    def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
         return self.fingers[finger], int(self.pairs[finger, row])
 
@@ -70,7 +70,7 @@ def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes
     is_alike = body.center[1] == 0.0 and len(placed) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
-    fingers: list[Held] = []
+    fingers: list[Grasped] = []
     for frame, codes in zip(placed, needed, strict=True):
         if fingers and is_alike:
             fingers.append(fingers[0])
@@ -90,7 +90,7 @@ def grasp_rows(found: Grasps) -> Columns:
     """Rows by column, (row,). What is not known of states that are not stable is NaN."""
     n_units = found.scene.finger.n_units
     of_fingers = [
-        {name: getattr(finger, name)[..., lanes] for name in Held.BY_LANE}
+        {name: getattr(finger, name)[..., lanes] for name in Grasped.BY_LANE}
         for finger, lanes in zip(found.fingers, found.pairs, strict=True)
     ]
     status = np.max([own["status"] for own in of_fingers], axis=0)
@@ -167,7 +167,7 @@ def _joined(
     return joined if is_there is None else np.where(is_there, joined, "")
 
 
-def _resets(finger: Held) -> NDArray[np.str_]:
+def _resets(finger: Grasped) -> NDArray[np.str_]:
     """What happened to each lane on the way: "1 at 0.672; 2 at 0.91"."""
     words: list[list[str]] = [[] for _ in range(len(finger.code))]
     for reset in finger.resets:

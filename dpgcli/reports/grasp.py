@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
-from dpgcli.grasping.grasp import Frame, Held
+from dpgcli.grasping.grasp import FingerFrame, Grasped
 from dpgcli.grasping.table import TOUCHES, Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
@@ -71,7 +71,9 @@ def _fingers(found: Grasps, profile: Profile, row: int, rows: Columns) -> tuple[
     return tuple(_shape(found, profile, frame, own, lane) for frame, own, lane in taken)
 
 
-def _shape(found: Grasps, profile: Profile, frame: Frame, own: Held, lane: int) -> FingerShape:
+def _shape(
+    found: Grasps, profile: Profile, frame: FingerFrame, own: Grasped, lane: int
+) -> FingerShape:
     finger = found.scene.finger
     nodes = own.nodes
     as_upper = frame._replace(side=1)

@@ -15,7 +15,7 @@ import pytest
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.grasping.approach import Approach, approach
-from dpgcli.grasping.contact import Obstructed, Touching
+from dpgcli.grasping.contact import ContactShapes, Obstructed
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.terms import chain_potential
@@ -134,11 +134,11 @@ class Grown(NamedTuple):
     """A finger about which a body has grown, lane by lane, and how it came there."""
 
     obstructed: Obstructed
-    start: Touching
+    start: ContactShapes
     came: Approach
 
     @property
-    def shapes(self) -> Touching:
+    def shapes(self) -> ContactShapes:
         return self.came.shapes
 
 
@@ -149,7 +149,7 @@ def own() -> type[Own]:
 
 
 @pytest.fixture(scope="session")
-def begun() -> Callable[..., tuple[Obstructed, Touching]]:
+def begun() -> Callable[..., tuple[Obstructed, ContactShapes]]:
     """Fingers in their free states with a disc of nothing about a center, for each lane."""
 
     def begin(
@@ -158,7 +158,7 @@ def begun() -> Callable[..., tuple[Obstructed, Touching]]:
         center: tuple[float, float],
         radius: float,
         thickness: float = 1.5,
-    ) -> tuple[Obstructed, Touching]:
+    ) -> tuple[Obstructed, ContactShapes]:
         inverted = np.array([[digit == "1" for digit in text] for text in patterns]).T
         units = UnitSolutions.of(finger)
         free = settle(units, chain_potential, inverted, 1e-12)
@@ -175,7 +175,7 @@ def begun() -> Callable[..., tuple[Obstructed, Touching]]:
 
 
 @pytest.fixture(scope="session")
-def grown(begun: Callable[..., tuple[Obstructed, Touching]]) -> Callable[..., Grown]:
+def grown(begun: Callable[..., tuple[Obstructed, ContactShapes]]) -> Callable[..., Grown]:
     """The same when the disc has grown, `grown(finger, patterns, center, radius, end=1.0)`."""
 
     def grow(*args: object, end: float = 1.0, **options: object) -> Grown:

@@ -8,7 +8,7 @@ import pytest
 
 from dpgcli.design.scene import Disc, Gripper, Scene
 from dpgcli.grasping import grasp
-from dpgcli.grasping.grasp import Held, frames, held
+from dpgcli.grasping.grasp import Grasped, frames, held
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
@@ -26,7 +26,7 @@ def without_margins(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def on_disc(
     finger: Finger, center: tuple[float, float], radius: float, patterns: list[str], **options: Any
-) -> Held:
+) -> Grasped:
     inverted = np.array([[digit == "1" for digit in text] for text in patterns]).T
     scene = Scene(finger, (), layer_thickness=1.5)
     frame = options.get("frame", ALONE)
