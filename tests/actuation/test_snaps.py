@@ -40,6 +40,7 @@ def test_no_way_leads_through_a_shape_that_crosses_itself(study: Study, pressed:
     assert way.reason[0] == Halt.FOLDED
 
 
+@pytest.mark.slow
 def test_commands_agree_on_a_snap_that_folds() -> None:
     lattice = {
         "segment_length_mm": 13.5,

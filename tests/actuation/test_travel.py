@@ -226,6 +226,7 @@ def test_units_on_two_lines_can_be_tied(study: Study, pressed: Made) -> None:
     assert [(event.units, event.tied) for event in way.events] == [((0, 1), (1,))]
 
 
+@pytest.mark.slow
 def test_a_finger_folds_onto_itself_where_it_does_whatever_the_step(
     study: Study, pressed: Made
 ) -> None:

@@ -130,6 +130,7 @@ def test_cycles_close_to_a_billionth_of_a_millimeter(graded: ActuateResult) -> N
     assert not any("cycles" in line for line in graded.summary)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pressure", "cycles", "found"),
     [

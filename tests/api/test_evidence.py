@@ -67,6 +67,7 @@ def compared(**settings: Any) -> dict[str, np.ndarray[Any, Any]]:
     }
 
 
+@pytest.mark.slow
 def test_walls_that_are_fitted_to_the_states_of_a_finger() -> None:
     """The states that they are fitted to: others are predicted as well, by `fit finger` itself."""
     fit = dpg.fit_finger(PUSHED, PUSHES, free=(WALL, HINGE)).values

@@ -87,6 +87,7 @@ def test_the_fingers_of_a_gripper_stay_mirror_images() -> None:
             assert (lower == sign * pair[f"upper_{node}_{axis}_mm"]).all()
 
 
+@pytest.mark.slow
 def test_a_sweep_gives_what_predict_gives() -> None:
     space = [
         {"key": "loads.tip_force_y_N", "values": [0.0, 0.3, 0.9]},

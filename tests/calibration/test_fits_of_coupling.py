@@ -76,6 +76,7 @@ def test_no_fit_has_hinges_that_run_away() -> None:
         FingerFit(finger, known, FRAME, (HINGES,), (Target.PUSHES,)).fit()
 
 
+@pytest.mark.slow
 def test_unseen_states_and_stiffness_of_finite_elements_are_met_by_one_fit() -> None:
     """Of a finger on the hinge's axis: shapes, pushes, closed gaps, and what moments meet."""
     seen, unseen = (

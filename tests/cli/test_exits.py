@@ -218,6 +218,7 @@ def test_closed_standard_input_is_a_missing_file(run: Any) -> None:
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["explain", "validate"])
 def test_a_name_that_the_output_cannot_spell_is_escaped(
     run: Any, folder: Path, command: str
@@ -228,6 +229,7 @@ def test_a_name_that_the_output_cannot_spell_is_escaped(
     assert (result.returncode, result.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -257,6 +259,7 @@ def test_what_is_no_time(text: str) -> None:
         seconds("--wait", text)
 
 
+@pytest.mark.slow
 def test_warnings_of_libraries_reach_only_those_who_ask(run: Callable[..., Any]) -> None:
     before = (
         "import warnings, dpgcli.api.inputs as inputs; read = inputs.read_document\n"

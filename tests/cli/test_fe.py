@@ -434,6 +434,7 @@ def test_units_that_differ_are_named(call: Any) -> None:
     assert call(*HINGE, "-s", other).stderr == "", "a hinge has no dome"
 
 
+@pytest.mark.slow
 @needs_solver
 def test_a_real_hinge_is_as_stiff_as_the_reference(call: Any, folder: Path) -> None:
     """Reference: 27.7 N mm/rad; 25.2 to 27.7 over its meshes, lids and walls.

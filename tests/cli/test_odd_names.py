@@ -65,6 +65,7 @@ COMMANDS = [  # an @ stands for the odd name
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("commands", COMMANDS, ids=lambda text: text.split(" @")[0])
 def test_names_that_are_no_text_will_do(call: Any, odd: Path, commands: str) -> None:
     for command in commands.replace("@", ODD).split("; "):

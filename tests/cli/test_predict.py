@@ -306,6 +306,7 @@ def test_files_get_the_permissions_of_new_files(run: Any, folder: Path) -> None:
             assert stat.S_IMODE((folder / name).stat().st_mode) == mode
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "name"),
     [

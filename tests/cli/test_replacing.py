@@ -74,6 +74,7 @@ def test_files_of_somebody_else_stay(
     assert everything(inputs) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "name"), FOREIGN)
 def test_own_files_are_replaced_and_keep_their_mode(
     call: Call, inputs: Path, command: tuple[str, ...], name: str

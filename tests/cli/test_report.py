@@ -44,6 +44,7 @@ def test_markdown_goes_to_standard_output(call: Call, swept: Path) -> None:
     assert f"| workspace_area_mm2 | best | {areas[4]:.5g} mm² | 4 | 6.5 mm | 2 mm |" in lines
 
 
+@pytest.mark.slow
 def test_the_kind_of_file_follows_from_its_name(call: Call, swept: Path, folder: Path) -> None:
     for name in ("report.md", "report.HTML"):
         result = call("report", "out", "-o", name)

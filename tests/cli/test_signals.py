@@ -129,6 +129,7 @@ run_and_exit(app)
     assert done.stderr == f"dpg: {word}; nothing half-written is left\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code", "word"), [SIGTERM, pytest.param(*SIGINT, marks=SLOW)])
 def test_an_interrupt_while_nobody_reads(
     start: Any, number: signal.Signals, code: int, word: str
@@ -157,6 +158,7 @@ def test_an_interrupt_while_writing_leaves_nothing(
     assert not list(folder.glob("*states*")) + list(folder.glob(".states*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code", "word"), [SIGTERM, pytest.param(*SIGINT, marks=SLOW)])
 def test_an_interrupt_leaves_the_old_table_as_it_was(
     start: Any, folder: Path, number: int, code: int, word: str
@@ -182,6 +184,7 @@ def test_a_closed_terminal_leaves_nothing(start: Any, folder: Path) -> None:
     assert not list(folder.glob(".states*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["json", pytest.param("csv", marks=pytest.mark.slow)])
 def test_an_interrupt_while_printing(start: Any, form: str) -> None:
     process = start("predict", "twenty_unit.yaml", "--format", form)

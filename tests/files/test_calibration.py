@@ -143,6 +143,7 @@ def test_what_data_do_not_tell_may_have_a_huge_error(path: Path) -> None:
     assert found.uncertain["bistable_stiffness_N_per_mm"] == 1e23
 
 
+@pytest.mark.slow
 def test_other_processes_can_have_it(path: Path) -> None:
     found = read(path, WHOLE)
     assert found.grid is not None

@@ -94,6 +94,7 @@ def test_rows_can_be_skipped_by_what_is_given_and_not_by_what_is_computed(tmp_pa
     assert not group.column(1).is_stats_set
 
 
+@pytest.mark.slow
 def test_a_large_table_has_large_row_groups(tmp_path: Path) -> None:
     table = written(tmp_path / "states.parquet", "twenty_unit")
     sizes = [table.metadata.row_group(i).num_rows for i in range(table.num_row_groups)]

@@ -143,6 +143,7 @@ def test_the_force_is_along_the_line_from_the_finger_to_the_center(
     assert found.force[1, 0] < 0.0, "the disc is below"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bars", [np.inf, pytest.param(1e4, marks=pytest.mark.slow)])
 def test_margins(bars: float, reference_finger: Fingers, grown: Callable[..., Any]) -> None:
     """A disc larger by slightly less than the margin keeps the state, by slightly more not."""

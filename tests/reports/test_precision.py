@@ -68,6 +68,7 @@ def test_the_models_error_is_a_line_above_the_points() -> None:
     assert any("against the data given, 3 mm" in line for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".svg", ".png"])
 def test_the_picture_is_the_same_every_time(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("matplotlib")

@@ -201,6 +201,7 @@ def test_the_largest_moment_of_a_rigid_unit(reference_finger: Fingers, units_of:
     assert 50.0 * way.share[0] == pytest.approx(-least.fun, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("linear_stiffness", [1e2, 1e6, 1e12, np.inf])
 def test_states_exist_up_to_the_load_at_which_a_unit_resets(
     reference_finger: Fingers, units_of: UnitsOf, linear_stiffness: float

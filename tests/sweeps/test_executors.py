@@ -136,6 +136,7 @@ def test_several_die_at_once(deadly: Any, tmp_path: Path) -> None:
     assert found == {case: None if case in (0, 3) else case**2 for case in range(12)}
 
 
+@pytest.mark.slow
 def test_workers_that_always_die_end_the_run(deadly: Any, tmp_path: Path) -> None:
     """Then it is not the cases' fault, and none of them is reported as failed."""
     runner = Runner(processes(2), deadly.squares, deadly.arguments(tmp_path, always=range(64)))
