@@ -157,6 +157,17 @@ def test_wrong_keys_of_an_object(call: Any, folder: Path, gripper: str) -> None:
         assert said in result.stderr
 
 
+@pytest.mark.parametrize("key", ["object.disc.diameter_mm", "object.at_mm", "object"])
+def test_a_sweep_does_not_vary_a_body(call: Any, folder: Path, gripper: str, key: str) -> None:
+    """It would be the same design again and again."""
+    text = f"base: {gripper}\nspace:\n  - {{key: {key}, values: [20, 40]}}\n"
+    (folder / "sweep.yaml").write_text(text, encoding="utf-8")
+    result = call("sweep", "sweep.yaml", "-o", "out")
+    assert result.exit_code == ExitCode.USAGE
+    assert "a key that designs can differ in" in result.stderr
+    assert "sweeps have no body: dpg grasp" in result.stderr
+
+
 def test_the_summary_says_what_forces_rest_on(call: Any, gripper: str) -> None:
     result = call("grasp", gripper, *DISC, *RIGID, "--pattern", "11100")
     assert "of 1 state 1 in touch with the body, 1 changed on the way" in result.stderr

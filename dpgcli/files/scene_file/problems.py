@@ -88,6 +88,7 @@ HINTS = {
 
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
+OBJECT: KeyPath = ("object",)
 TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
 PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
 MAPPINGS = ("overrides", *EXPECTED)
@@ -145,7 +146,7 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    is_whole = path[:1] in WHOLE or path[:2] == ("object", objects.PLACE)
+    is_whole = path[:1] in WHOLE or path[:2] == (*OBJECT, objects.PLACE)
     if is_whole and error["type"] != "extra_forbidden" and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
@@ -201,6 +202,8 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     if path[:1] == UNCERTAINTY:
         return "a key that designs can differ in", dotted(path), "the tables have no uncertainties"
+    if path[:1] == OBJECT:
+        return "a key that designs can differ in", dotted(path), "sweeps have no body: dpg grasp"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
     if pattern in SECTIONS or str(path[-1]) in (*MAPPINGS, *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
