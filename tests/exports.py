@@ -6,7 +6,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import law
-from dpgcli.calibration.choices import Quantity
+from dpgcli.calibration.choices import CurveQuantity
 
 TRUE = np.array([12.84, 0.043, 3.5])  # N/mm, 1, mm
 KEYS = ("bistable_stiffness_N_per_mm", "force_linearity", "stroke_mm")
@@ -28,7 +28,7 @@ def measured(
     up = np.linspace(0.0, largest, points)
     runs = [(up, 1.0 + hysteresis), *([(up[::-1], 1.0 - hysteresis)] if both else [])] * cycles
     travel = np.concatenate([along for along, _ in runs])
-    force = np.concatenate([size * law(along, TRUE, Quantity.FORCE) for along, size in runs])
+    force = np.concatenate([size * law(along, TRUE, CurveQuantity.FORCE) for along, size in runs])
     time = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(travel)) / RATE + 1e-3)))
     return time, travel, force + np.random.default_rng(1).normal(0.0, noise, len(force))
 

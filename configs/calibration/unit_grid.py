@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.calibration.fe.curves import UnitCurve, unit_stiffness
-from dpgcli.calibration.fe.hinge import Chambers
+from dpgcli.calibration.fe.hinge import HingeChambers
 from dpgcli.calibration.fe.models import Model, unit_model
 from dpgcli.calibration.fe.pushed import Push, lever
 from dpgcli.design.geometry import stroke
@@ -58,9 +58,9 @@ def distance(at: Geometry) -> tuple[int, bool]:
 GEOMETRIES = [*sorted(CUBE, key=distance), *BESIDE]
 
 
-def chambers_of(at: Geometry) -> Chambers:
+def chambers_of(at: Geometry) -> HingeChambers:
     """The chambers of a geometry."""
-    return Chambers(
+    return HingeChambers(
         at.chamber_length_mm,
         at.chamber_width_mm,
         at.dome_thickness_mm,

@@ -17,7 +17,7 @@ SIGNS = (1, -1)  # above and below the pressure around
 
 
 @dataclass(frozen=True)
-class Rows:
+class SideBySide:
     """Arrays of the same length, side by side."""
 
     def take(self, which: Indices) -> Self:
@@ -32,7 +32,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Directions(Rows):
+class Directions(SideBySide):
     """States and what is done to each, (lane,): `line` gets a pressure of this `sign`.
 
     `design` and `code` are places among the designs and of patterns, see `states.patterns`.

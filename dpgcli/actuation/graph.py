@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dpgcli.actuation.directions import Directions, Rows, on_line, raised
+from dpgcli.actuation.directions import Directions, SideBySide, on_line, raised
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
 from dpgcli.actuation.staircase import UNKNOWN
@@ -21,7 +21,7 @@ from dpgcli.states.settle import lanes_at_once
 
 
 @dataclass(frozen=True)
-class Pulses(Rows):
+class Pulses(SideBySide):
     """Pulses that lead from state to state, (pulse,), by design, state, line, sign and pressure.
 
     One on `line` with a peak from `start` up to below `stop` (MPa, both of the `sign` ±1) leads
@@ -227,7 +227,7 @@ class _Found(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Ranges(Rows):
+class _Ranges(SideBySide):
     """Ranges of peaks in the order of lanes and pressures: where each begins, what it leads to.
 
     The first range of each lane begins without pressure and leads to the state itself.

@@ -25,10 +25,10 @@ NO_RATE = 1e-9  # of the largest rate: less is rounding, or of second order
 AT_ONCE = 4  # times, before one after the other
 PASSES = 8  # for each unit
 
-Family = LoadedPotential[FingerCoordinates, PressedDomes]
+PressedFamily = LoadedPotential[FingerCoordinates, PressedDomes]
 
 
-def about_to_touch(family: Family, coordinates: Array) -> Flags | None:
+def about_to_touch(family: PressedFamily, coordinates: Array) -> Flags | None:
     """Which domes are in touch as the load begins to rise, (unit, batch); None where all are.
 
     Others than those between both remain as they are.
@@ -51,7 +51,7 @@ def about_to_touch(family: Family, coordinates: Array) -> Flags | None:
     return touching
 
 
-def with_touching(family: Family, touching: Flags | None) -> Family:
+def with_touching(family: PressedFamily, touching: Flags | None) -> PressedFamily:
     """The same energies with these domes in touch."""
     return replace(family, law=replace(family.law, touching=touching))
 
@@ -63,7 +63,7 @@ def _level(law: PressedDomes, value: Array) -> Flags:
     return np.asarray(is_rest)
 
 
-def _wrong(family: Family, coordinates: Array, touching: Flags, is_level: Flags) -> Flags:
+def _wrong(family: PressedFamily, coordinates: Array, touching: Flags, is_level: Flags) -> Flags:
     """Domes between both that would pull, or run into their neighbors, (unit, batch).
 
     None where the finger loses its balance with these in touch: that is for its path to tell.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dpgcli.actuation.directions import Directions, Rows, on_line, raised
+from dpgcli.actuation.directions import Directions, SideBySide, on_line, raised
 from dpgcli.actuation.graph import Graph
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
@@ -145,7 +145,7 @@ def _ties(way: Travel, n_pulses: int) -> tuple[tuple[tuple[int, ...], ...], ...]
 
 
 @dataclass(frozen=True)
-class Intervals(Rows):
+class Intervals(SideBySide):
     """What peaks of single pulses do to states, by lane and size of the peak, (interval,).
 
     Peaks from `low` up to below `high` (MPa) lead to the pattern with the code `at_peak`, and after

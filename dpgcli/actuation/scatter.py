@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dpgcli.actuation.directions import Directions, Rows
+from dpgcli.actuation.directions import Directions, SideBySide
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.pulses import WHOLE, Pulse, intervals
 from dpgcli.actuation.rest import at_rest, is_certified
@@ -17,7 +17,7 @@ from dpgcli.states.settle import lanes_at_once
 
 
 @dataclass(frozen=True)
-class Ranges(Rows):
+class Ranges(SideBySide):
     """Sizes of peaks, MPa, that lead a draw from the source of a pulse to its target, (range,).
 
     Up to below `high`, which is infinite where no event ends the range.

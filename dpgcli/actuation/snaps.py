@@ -29,7 +29,7 @@ SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is steppe
 NEAR_FOLD = 0.005  # of the stiffness in play; within `TIE` of a fold 0.002 or less is left
 
 
-class Outcome(NamedTuple):
+class SnapOutcome(NamedTuple):
     """Where fingers halted, with all that is tied there, what they become, and `Halt` codes.
 
     They have come to rest (`ARRIVED`), fold onto themselves or have no rest.
@@ -54,7 +54,7 @@ class _Rest(NamedTuple):
         self.is_there[lanes] = others.is_there[taken]
 
 
-def after(pressed: Pressed, halted: Halted) -> Outcome:
+def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     """What becomes of shapes that halted, at their pressures.
 
     Domes that meet or leave their neighbors change nothing else.
@@ -83,7 +83,7 @@ def after(pressed: Pressed, halted: Halted) -> Outcome:
         ending[falls[~rest.is_there]] = Halt.FAILED
         tied[:, falls] |= undecided
         moved.put(falls, rest.shapes)
-    return Outcome(replace(halted, tied=tied), moved, ending)
+    return SnapOutcome(replace(halted, tied=tied), moved, ending)
 
 
 def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:

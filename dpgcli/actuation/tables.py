@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from dpgcli.actuation.readings import Readings
-from dpgcli.actuation.travel import Event, Points, Travel, joined
+from dpgcli.actuation.travel import Event, PathPoints, Travel, joined
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.pressure import History, Pressure
@@ -134,7 +134,7 @@ def path_columns(
 
 def path_rows(
     way: Travel,
-    branches: Mapping[int, Points],
+    branches: Mapping[int, PathPoints],
     readings: Readings,
     pressure: Pressure,
     history: History,
@@ -176,7 +176,7 @@ def path_rows(
     )
 
 
-def _times(points: Points, time: Array) -> Array:
+def _times(points: PathPoints, time: Array) -> Array:
     """Times of points, between those of the pressures that they are between."""
     before = time[np.maximum(points.step - 2, 0)]
     return np.asarray(before + points.share * (time[points.step - 1] - before))

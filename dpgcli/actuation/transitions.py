@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from dpgcli.actuation.alone import thresholds_alone
-from dpgcli.actuation.directions import Directions, Rows, on_line, raised
+from dpgcli.actuation.directions import Directions, SideBySide, on_line, raised
 from dpgcli.actuation.graph import reached_from_rest, stable_states
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import is_certified
@@ -43,7 +43,7 @@ _TEXTS = {
 
 
 @dataclass(frozen=True)
-class Transitions(Rows):
+class Transitions(SideBySide):
     """What first happens to states, (row,): by pattern, line and sign ±1.
 
     `pressure` (MPa) is where units flip, or else how far the state was followed, and `outcome` says

@@ -16,7 +16,7 @@ from dpgcli.equilibrium.path import LARGEST_STEP
 HALVINGS = 20  # of the way to where a finger folds onto itself
 
 
-class Kind(StrEnum):
+class EventKind(StrEnum):
     """What an event is, by the unit that gives rise to it."""
 
     SNAP = "snap"
@@ -25,7 +25,7 @@ class Kind(StrEnum):
     RELEASE = "release"
 
 
-MEETINGS = {Halt.CONTACT: Kind.CONTACT, Halt.RELEASE: Kind.RELEASE}
+MEETINGS = {Halt.CONTACT: EventKind.CONTACT, Halt.RELEASE: EventKind.RELEASE}
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Event:
     way; `released` is the energy (mJ) that is lost.
     """
 
-    kind: Kind
+    kind: EventKind
     units: tuple[int, ...]
     tied: tuple[int, ...]
     before: int
@@ -46,7 +46,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Points:
+class PathPoints:
     """Points of a way in their order: shapes, and where in the history they are, (point,).
 
     Cycles and steps count from 1; a point is on the way to its step's pressures, and has gone a
@@ -61,10 +61,10 @@ class Points:
     def __len__(self) -> int:
         return len(self.cycle)
 
-    def take(self, index: Indices) -> "Points":
+    def take(self, index: Indices) -> "PathPoints":
         """Some of them."""
         shapes = self.shapes.take_lanes(index)
-        return Points(shapes, self.cycle[index], self.step[index], self.share[index])
+        return PathPoints(shapes, self.cycle[index], self.step[index], self.share[index])
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Travel:
     the units inverted in the shape that it would snap to there, if that is what folds.
     """
 
-    points: Points
+    points: PathPoints
     events: tuple[Event, ...]
     holds: tuple[int, ...]
     reason: Halt
@@ -140,7 +140,7 @@ class _Traveler:
         self.reason, self.pressure = Halt.ARRIVED, start.pressure[:, 0]
         self.folded: Flags | None = None
         self.place, self.share = (1, 1), 0.0  # cycle and step; how much of it is done
-        self.behind: list[Points] = []
+        self.behind: list[PathPoints] = []
         self.n_points = 0
         self.events: list[Event] = []
         self.holds: list[int] = []
@@ -235,7 +235,7 @@ class _Traveler:
         order = [*alike, *(unit for unit in range(len(flipped)) if unit not in alike)]
         units = tuple(unit for unit in order if flipped[unit]) or (alike[0],)
         rises = pressed.travels(after)[units[0], 0] > pressed.travels(before)[units[0], 0]
-        kind = MEETINGS.get(reason, Kind.SNAP if rises else Kind.RESET)
+        kind = MEETINGS.get(reason, EventKind.SNAP if rises else EventKind.RESET)
         tied = tuple(unit for unit in alike if unit != units[0] and len(alike) > 1)
         released = 0.0 if reason in MEETINGS else pressed.energy(before) - pressed.energy(after)
         return Event(kind, units, tied, 0, 0, float(np.squeeze(released)))
@@ -250,7 +250,7 @@ class _Traveler:
         is_folded = folded(self.pressed.coordinates, shapes.coordinates)
         n = int(is_folded.argmax()) if is_folded.any() else len(share)
         cycle, step = (np.full(len(share), count) for count in self.place)
-        points = Points(shapes, cycle, step, share).take(np.arange(n))
+        points = PathPoints(shapes, cycle, step, share).take(np.arange(n))
         self.behind.append(points)
         self.n_points += n
         if n:
@@ -273,7 +273,7 @@ class _Traveler:
         return beyond[:, 0]
 
 
-def joined(parts: Sequence[Points]) -> Points:
+def joined(parts: Sequence[PathPoints]) -> PathPoints:
     """Points one after the other."""
     touching = [part.shapes.touching for part in parts if part.shapes.touching is not None]
     shapes = Shapes(
@@ -282,7 +282,7 @@ def joined(parts: Sequence[Points]) -> Points:
         np.concatenate([part.shapes.inverted for part in parts], axis=1),
         np.concatenate(touching, axis=1) if touching else None,
     )
-    return Points(
+    return PathPoints(
         shapes,
         np.concatenate([part.cycle for part in parts]),
         np.concatenate([part.step for part in parts]),

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.travel import MEETINGS, Event, Points, Travel
+from dpgcli.actuation.travel import MEETINGS, Event, PathPoints, Travel
 from dpgcli.arrays import Indices
 from dpgcli.equilibrium.beyond import beyond
 
 NEAREST, BESIDE, FURTHEST = 0.01, 0.05, 0.3  # of a stroke: from a fold to where its branch begins
 
 
-def branches(pressed: Pressed, way: Travel) -> Mapping[int, Points]:
+def branches(pressed: Pressed, way: Travel) -> Mapping[int, PathPoints]:
     """The unstable branches beyond folds, by the number of the event, each fold once.
 
     Domes that lose their places while they are apart leave the finger as it is, and have none.
@@ -44,7 +44,7 @@ def branches(pressed: Pressed, way: Travel) -> Mapping[int, Points]:
     return found
 
 
-def _branch(pressed: Pressed, points: Points, event: Event) -> Points | None:
+def _branch(pressed: Pressed, points: PathPoints, event: Event) -> PathPoints | None:
     """The branch beyond the fold of an event, if there is one."""
     unit, fold = event.units[0], points.take(np.array([event.before]))
     touching = fold.shapes.touching
@@ -67,7 +67,7 @@ def _branch(pressed: Pressed, points: Points, event: Event) -> Points | None:
     return replace(along, shapes=shapes, share=share)
 
 
-def _beside(pressed: Pressed, points: Points, event: Event) -> Indices:
+def _beside(pressed: Pressed, points: PathPoints, event: Event) -> Indices:
     """The place of a stable point at a small distance before the fold of an event, or none.
 
     In the same step of the history, and after whatever happened last.

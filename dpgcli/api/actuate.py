@@ -13,7 +13,7 @@ from dpgcli.actuation.pressed import Halt, Shapes
 from dpgcli.actuation.readings import Drift, Readings, drift
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.tables import event_columns, event_rows, path_columns, path_rows
-from dpgcli.actuation.travel import Points, Travel, joined, travel
+from dpgcli.actuation.travel import PathPoints, Travel, joined, travel
 from dpgcli.actuation.unstable import branches
 from dpgcli.api.histories import GivenHistory, PressureInput, history_input
 from dpgcli.api.inputs import (
@@ -58,7 +58,7 @@ class ActuateResult:
     given: PressedInput
     history: GivenHistory
     way: Travel
-    branches: Mapping[int, Points] = field(default_factory=dict)
+    branches: Mapping[int, PathPoints] = field(default_factory=dict)
 
     @cached_property
     def table(self) -> Table:
@@ -104,7 +104,7 @@ class ActuateResult:
         """Quantities of all points of the way."""
         return self._read(self.way.points)
 
-    def _read(self, points: Points) -> Readings:
+    def _read(self, points: PathPoints) -> Readings:
         scene = self.given.given.scene
         around = Surroundings(scene.gripper, scene.layer_thickness or 0.0)
         return Readings(self.given.pressed, points.shapes, around)

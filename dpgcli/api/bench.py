@@ -21,7 +21,7 @@ from dpgcli.api.inputs import (
     table_path,
 )
 from dpgcli.api.tables import Table
-from dpgcli.benchmark.bench import COLUMNS, Bench, Row, as_columns
+from dpgcli.benchmark.bench import COLUMNS, Bench, BenchRow, as_columns
 from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
@@ -45,9 +45,9 @@ class BenchResult:
 
     name: str
     spec_json: str
-    rows: tuple[Row, ...]
+    rows: tuple[BenchRow, ...]
     target_error: float | None = None
-    recorded: tuple[Row, ...] | None = None
+    recorded: tuple[BenchRow, ...] | None = None
     files: tuple[Path, ...] = ()
 
     @property
@@ -94,7 +94,7 @@ def bench(
     first_station: Place = None,
     tip_offset: Place = None,
     compare: str | Path | None = None,
-    watch: Callable[[Row], None] = lambda row: None,
+    watch: Callable[[BenchRow], None] = lambda row: None,
 ) -> BenchResult:
     """Measure error against run time, beside what else there is; needs mpmath.
 
@@ -129,7 +129,7 @@ def bench(
     return BenchResult(given.name, given.json, tuple(rows), target_error, then, files)
 
 
-def _recorded(path: Path, spec_json: str) -> tuple[Row, ...]:
+def _recorded(path: Path, spec_json: str) -> tuple[BenchRow, ...]:
     """The rows of a record of the same finger."""
     facts = read_record(path)
     changed = differences({"spec": str(facts.get("spec"))}, {"spec": spec_json})

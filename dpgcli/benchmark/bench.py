@@ -53,7 +53,7 @@ GROWTH_DESIGNS = (1, 4, 16, 64, 256, 1024)
 GROWTH_RATIOS = (1.0, 1e2, 1e4, 1e6, 1e9, 1e12, 1e15, math.inf)
 REFERENCE_DIGITS = 50
 
-Row = dict[str, Any]
+BenchRow = dict[str, Any]
 
 COLUMNS = (
     Column("group", "", "what was varied", kind=Kind.TEXT),
@@ -114,14 +114,14 @@ class Bench:
         for name in self.keep:
             check_ablation(self.scene, name, self.target_error)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[BenchRow]:
         """Measure, group by group, a row at a time."""
         keep_freed_memory()
         kernel = numpy_kernel()
         for row in self._measured():
             yield {**_blank(), **row, "relative_time": _relative(row, kernel, self.repeats)}
 
-    def _measured(self) -> Iterator[Row]:
+    def _measured(self) -> Iterator[BenchRow]:
         patterns = chosen_patterns(self.finger.n_units)
         reference = extended_states(self.finger, patterns, digits=REFERENCE_DIGITS)
         yield from self._ladder(patterns, reference)
@@ -144,19 +144,19 @@ class Bench:
         for name in self.keep:
             yield from self._kept(name)
 
-    def _ladder(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
+    def _ladder(self, patterns: Flags, reference: ExtendedStates) -> Iterator[BenchRow]:
         """The package's methods in a batch as large as those of a sweep."""
         n_copies = max(1, BATCH // patterns.shape[1])
         tiled = np.tile(patterns, (1, n_copies))
         for method in package_methods(self.finger, tiled):
             yield self._row(method, reference)
 
-    def _alone(self, patterns: Flags, reference: ExtendedStates) -> Iterator[Row]:
+    def _alone(self, patterns: Flags, reference: ExtendedStates) -> Iterator[BenchRow]:
         """The same for this finger's states only."""
         for method in package_methods(self.finger, patterns):
             yield self._row(method._replace(group="one finger"), reference)
 
-    def _row(self, method: BenchmarkMethod, reference: ExtendedStates) -> Row:
+    def _row(self, method: BenchmarkMethod, reference: ExtendedStates) -> BenchRow:
         found = method.run()
         n_states = reference.energy.shape[0]
         first = BenchmarkResult(found.pose[:, :n_states], found.energy[:n_states])
@@ -167,7 +167,7 @@ class Bench:
             **_times(measured(method.run, self.repeats), method.n_states),
         }
 
-    def _thresholds(self, pressure: Pressure) -> Iterator[Row]:
+    def _thresholds(self, pressure: Pressure) -> Iterator[BenchRow]:
         """What follows the straight finger to its first snap, all lines at one pressure."""
         case = SnapCase.of(Pressed.of(UnitSolutions.of(self.finger), pressure))
         own = math.nan
@@ -184,7 +184,9 @@ class Bench:
                 "times_as_long": times["seconds_per_state"] / own,
             }
 
-    def _facts(self, group: str, method: str, n_states: int, finger: Finger | None = None) -> Row:
+    def _facts(
+        self, group: str, method: str, n_states: int, finger: Finger | None = None
+    ) -> BenchRow:
         finger = finger or self.finger
         ratio = finger.linear_stiffness.max() / finger.bistable_stiffness.max()
         return {
@@ -196,7 +198,7 @@ class Bench:
             "n_states": n_states,
         }
 
-    def _model_error(self, known: KnownStates) -> Row:
+    def _model_error(self, known: KnownStates) -> BenchRow:
         """The lattice's own error: its states beside those that were given."""
         found = compare(self.finger, known, self.frame)
         is_state = np.isfinite(found.states.pose[0])
@@ -211,7 +213,7 @@ class Bench:
             "rms_angle_error_rad": _rms(angle),
         }
 
-    def _by_units(self) -> Iterator[Row]:
+    def _by_units(self) -> Iterator[BenchRow]:
         """All 2^n states of fingers that repeat this one's units, as `predict` finds them."""
         for n_units in GROWTH_UNITS:
             finger = repeated(self.finger, n_units)
@@ -228,7 +230,7 @@ class Bench:
                 "peak_MiB": peak_bytes(whole) / 2**20,
             }
 
-    def _by_designs(self) -> Iterator[Row]:
+    def _by_designs(self) -> Iterator[BenchRow]:
         """Designs that all differ, by 1 % in their strokes."""
         patterns = chosen_patterns(self.finger.n_units)
         for n_designs in GROWTH_DESIGNS:
@@ -248,7 +250,7 @@ class Bench:
                 "peak_MiB": peak_bytes(whole) / 2**20,
             }
 
-    def _by_stiffness(self) -> Iterator[Row]:
+    def _by_stiffness(self) -> Iterator[BenchRow]:
         """Bars from as soft as the springs to rigid, in both formulations."""
         n_units = min(self.finger.n_units, 3)
         patterns = chosen_patterns(n_units)
@@ -265,7 +267,7 @@ class Bench:
                         "peak_MiB": peak_bytes(method.run) / 2**20,
                     }
 
-    def _to_parquet(self, write: Callable[[Prediction, Path], None]) -> Row:
+    def _to_parquet(self, write: Callable[[Prediction, Path], None]) -> BenchRow:
         """All states of a long finger, computed, certified and written to a file."""
         finger = repeated(self.finger, TABLE_UNITS)
 
@@ -279,7 +281,7 @@ class Bench:
         method = "predicted into a Parquet file"
         return {**self._facts("units", method, n_states, finger), **_times(times, n_states)}
 
-    def _kept(self, name: str) -> Iterator[Row]:
+    def _kept(self, name: str) -> Iterator[BenchRow]:
         """The scene as planned, and with one thing put back that the plan leaves out."""
         for method in ablations(self.scene, name, self.target_error):
             yield {
@@ -291,7 +293,7 @@ class Bench:
             }
 
 
-def errors(found: BenchmarkResult, reference: ExtendedStates) -> Row:
+def errors(found: BenchmarkResult, reference: ExtendedStates) -> BenchRow:
     """Errors of what was found, over the states that exist."""
     exists = reference.is_minimum & reference.in_pattern
     is_found = np.isfinite(found.pose).all(axis=0)
@@ -330,19 +332,19 @@ def _only(reference: ExtendedStates, few: slice) -> ExtendedStates:
     return ExtendedStates(*(values[..., few] for values in vars(reference).values()))
 
 
-def _blank() -> Row:
+def _blank() -> BenchRow:
     empty: dict[Kind, Any] = {Kind.TEXT: "", Kind.COUNT: 0, Kind.FLAG: False}
     return {column.name: empty.get(column.kind, math.nan) for column in COLUMNS}
 
 
-def _relative(row: Row, kernel: Callable[[], object], repeats: int) -> float:
+def _relative(row: BenchRow, kernel: Callable[[], object], repeats: int) -> float:
     """The shortest time of a state over that of the kernel, measured next to each other."""
     if "seconds_min" not in row:
         return math.nan
     return float(row["seconds_min"] / row["n_states"] / measured(kernel, repeats).wall_min)
 
 
-def _times(times: Times, n_states: int) -> Row:
+def _times(times: Times, n_states: int) -> BenchRow:
     return {
         "seconds": times.wall,
         "seconds_min": times.wall_min,
@@ -352,7 +354,7 @@ def _times(times: Times, n_states: int) -> Row:
     }
 
 
-def as_columns(rows: Sequence[Row]) -> Columns:
+def as_columns(rows: Sequence[BenchRow]) -> Columns:
     """Rows as the columns of one table."""
     return {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS}
 

@@ -18,12 +18,12 @@ from dpgcli.calibration.choices import (
     STIFFNESS,
     STROKE,
     Branches,
+    CurveQuantity,
     Loss,
-    Quantity,
     Rule,
 )
 from dpgcli.calibration.fits import Fit, Parameter, fit, mean_errors
-from dpgcli.calibration.opening import Opening
+from dpgcli.calibration.opening import OpeningRule
 from dpgcli.calibration.record import (
     Record,
     cleaned,
@@ -54,7 +54,12 @@ ADDED_UP = (
     "bootstrap: errors of a work add up along the curve, and intervals from points that are drawn "
     "one by one are too narrow: take the standard errors"
 )
-UNITS = {Quantity.ENERGY: "mJ", Quantity.WORK: "mJ", Quantity.FORCE: "N", Quantity.PRESSURE: "N"}
+UNITS = {
+    CurveQuantity.ENERGY: "mJ",
+    CurveQuantity.WORK: "mJ",
+    CurveQuantity.FORCE: "N",
+    CurveQuantity.PRESSURE: "N",
+}
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,8 @@ class BistableOptions:
     Without `branches` both are fitted, if they are not too far apart.
     """
 
-    opening: Opening
-    quantity: Quantity
+    opening: OpeningRule
+    quantity: CurveQuantity
     branches: Branches | None = None
     area: float = float("nan")
     fixed: Mapping[str, float] | None = None
@@ -102,10 +107,10 @@ class BistableFit:
     snap_pressure: float | None = None
 
 
-def law(opening: Array, values: Array, quantity: Quantity) -> Array:
+def law(opening: Array, values: Array, quantity: CurveQuantity) -> Array:
     """Energy (mJ) or force (N, by the opening) of the law; `values` are k_b, α, d.
 
-    >>> at_stroke = law(np.array([3.5]), np.array([12.84, 0.043, 3.5]), Quantity.ENERGY)
+    >>> at_stroke = law(np.array([3.5]), np.array([12.84, 0.043, 3.5]), CurveQuantity.ENERGY)
     >>> round(float(at_stroke[0]), 8)  # ½ α k_b d²
     3.381735
     """
@@ -113,7 +118,7 @@ def law(opening: Array, values: Array, quantity: Quantity) -> Array:
     return response.energy if UNITS[quantity] == "mJ" else response.force
 
 
-def slopes(opening: Array, values: Array, quantity: Quantity) -> Array:
+def slopes(opening: Array, values: Array, quantity: CurveQuantity) -> Array:
     """Derivatives of `law` by k_b, α and d, shape (point, 3).
 
     With u = x/d, β = 1−α: E_α = ½ k_b x² u(2−u), E_d = k_b x² β u(1−u)/d,
@@ -153,7 +158,7 @@ def fit_bistable(record: Record, choice: BistableOptions) -> BistableFit:
     if choice.branches in (Branches.LOADING, Branches.UNLOADING):
         record = branch_of(record, choice.branches)
     ordered, said = in_order(_by_travel(record))
-    if choice.quantity is not Quantity.ENERGY:
+    if choice.quantity is not CurveQuantity.ENERGY:
         check_sign(ordered)
     observed = _observed(ordered, choice)
     kept = np.ones(len(observed), bool)
@@ -220,22 +225,22 @@ def _alone(choice: BistableOptions, factor: float, branch: Record) -> Fit:
 
 def _observed(record: Record, choice: BistableOptions) -> Array:
     """The observations to fit: energies in mJ, or forces along the travel in N."""
-    if choice.quantity is Quantity.WORK:
+    if choice.quantity is CurveQuantity.WORK:
         return work(record)
     column = getattr(record, choice.quantity.value)
     if column is None:
         raise FitError(f"no {choice.quantity.value} in the curve")
-    return np.asarray(column * choice.area if choice.quantity is Quantity.PRESSURE else column)
+    return np.asarray(column * choice.area if choice.quantity is CurveQuantity.PRESSURE else column)
 
 
 def _along(record: Record, choice: BistableOptions) -> Array | None:
     """What work is the integral over, whose errors add up along it; None of other quantities."""
-    if choice.quantity is not Quantity.WORK:
+    if choice.quantity is not CurveQuantity.WORK:
         return None
     return record.volume if record.force is None else record.travel
 
 
-def _factor(opening: Opening, well: float | None) -> float:
+def _factor(opening: OpeningRule, well: float | None) -> float:
     if opening.rule is not Rule.STROKE:
         return opening.amount
     if well is None:
@@ -357,7 +362,7 @@ def _unsampled_points(found: BistableFit) -> Iterator[str]:
         yield _unseen_well(found, well)
     if np.isnan(top):
         return
-    height = float(law(at_rest.top, found.fit.values, Quantity.ENERGY))
+    height = float(law(at_rest.top, found.fit.values, CurveQuantity.ENERGY))
     barrier = f"the barrier of the fitted law, {height:.4g} mJ at {top:.4g} mm, is an extrapolation"
     for start, end in found.gaps:
         if start < top < end:

@@ -25,7 +25,7 @@ class Loss(StrEnum):
     CAUCHY = "cauchy"
 
 
-class Quantity(StrEnum):
+class CurveQuantity(StrEnum):
     """The measured quantity that a bistable law is fitted to."""
 
     ENERGY = "energy"

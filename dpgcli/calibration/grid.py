@@ -28,7 +28,7 @@ CONSTANT = "ln(value at reference)"
 
 
 @dataclass(frozen=True)
-class Points:
+class GridPoints:
     """Geometries (point, key), each key of `over` a column, and quantities (point,) by key."""
 
     over: tuple[str, ...]
@@ -49,10 +49,10 @@ class Points:
         away = (away - away.mean(axis=0)) / np.where(size > 0.0, size, 1.0)
         return np.asarray(self.geometry[np.argmin((away**2).sum(axis=1))])
 
-    def without(self, place: int) -> "Points":
+    def without(self, place: int) -> "GridPoints":
         """All points but one."""
         rest = {key: np.delete(values, place) for key, values in self.quantities.items()}
-        return Points(self.over, np.delete(self.geometry, place, axis=0), rest)
+        return GridPoints(self.over, np.delete(self.geometry, place, axis=0), rest)
 
     def are_inside(self, geometry: Array) -> Flags:
         """Whether geometries (design, key) lie in the convex hull of the points, edges included."""
@@ -89,11 +89,11 @@ class Points:
 
 
 @dataclass(frozen=True)
-class GridLaw:
+class FittedGridLaw:
     """A way between points, for all their quantities."""
 
     method: GridMethod
-    points: Points
+    points: GridPoints
 
     def at(self, key: str, geometry: Array) -> Estimate:
         """A quantity at geometries (design, key), in the order of `points.over`.
@@ -103,8 +103,8 @@ class GridLaw:
         where there are too few points to know.
 
         >>> heights = np.array([[1.0], [2.0], [4.0]])
-        >>> points = Points(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})
-        >>> found = GridLaw(GridMethod.SCALING, points).at("area", np.array([[3.0], [8.0]]))
+        >>> points = GridPoints(("dome_height_mm",), heights, {"area": 3.0 * heights[:, 0] ** 2})
+        >>> found = FittedGridLaw(GridMethod.SCALING, points).at("area", np.array([[3.0], [8.0]]))
         >>> found.value.round(9).tolist(), found.is_inside.tolist()
         ([27.0, 192.0], [True, False])
         """
@@ -149,7 +149,7 @@ class GridLaw:
         known, geometry = self.points.quantities, self.points.geometry
         errors = {key: np.full(len(geometry), np.nan) for key in known}
         for place in range(len(geometry)):
-            rest = GridLaw(self.method, self.points.without(place))
+            rest = FittedGridLaw(self.method, self.points.without(place))
             with suppress(FitError):  # too few to go without one
                 for key, values in known.items():
                     guess = rest._value(key, geometry[place : place + 1])
@@ -181,7 +181,7 @@ class GridLaw:
         return np.concatenate((np.ones((len(logs), 1)), logs), axis=1)
 
 
-def _interpolant(points: Points, logs: Array) -> Multilinear | ThinPlates:
+def _interpolant(points: GridPoints, logs: Array) -> Multilinear | ThinPlates:
     """A function of ln geometry (design, key) through the points."""
     axes = [np.unique(column) for column in points.geometry.T]
     if np.prod([len(axis) for axis in axes]) == len(logs) and min(map(len, axes)) > 1:

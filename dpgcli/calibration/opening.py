@@ -24,7 +24,7 @@ def parse_number(text: str) -> float | None:
 
 
 @dataclass(frozen=True)
-class Opening:
+class OpeningRule:
     """x = factor u: `amount` is the factor, or the opening (mm) of the inverted well."""
 
     rule: Rule
@@ -36,7 +36,7 @@ class Opening:
 
         Raises UsageError for anything else.
 
-        >>> Opening.of("stroke:3.5").amount
+        >>> OpeningRule.of("stroke:3.5").amount
         3.5
         """
         rule, _, amount = text.partition(":")

@@ -25,7 +25,7 @@ from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
-    from dpgcli.benchmark.bench import Row
+    from dpgcli.benchmark.bench import BenchRow
 
 GROUPS = {
     "ladder": "Methods, with a batch of states as large as a sweep's",
@@ -139,7 +139,7 @@ def _tell(printed_as: Format, line: str) -> None:
         say(line)
 
 
-def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
+def _print(printed_as: Format, rows: "Sequence[BenchRow]") -> None:
     from dpgcli.benchmark.bench import COLUMNS, as_columns
 
     if printed_as is Format.TABLE:
@@ -148,7 +148,7 @@ def _print(printed_as: Format, rows: "Sequence[Row]") -> None:
     print_rows(COLUMNS, as_columns(rows), printed_as)
 
 
-def _print_tables(rows: "Sequence[Row]") -> None:
+def _print_tables(rows: "Sequence[BenchRow]") -> None:
     from dpgcli.reports.precision import text_figure
 
     for group, title in GROUPS.items():
@@ -165,7 +165,7 @@ def _print_tables(rows: "Sequence[Row]") -> None:
     put("\n".join(text_figure(rows)))
 
 
-def _cell(row: "Row", name: str) -> str:
+def _cell(row: "BenchRow", name: str) -> str:
     if name == "µs_per_state":
         return f"{row['seconds_per_state'] * 1e6:.3g}"
     if name == "cpu_µs_per_state":

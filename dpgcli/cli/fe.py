@@ -15,7 +15,7 @@ from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.hinge import HingeChambers
     from dpgcli.calibration.fe.models import Model
     from dpgcli.calibration.fe.pushed import Push
     from dpgcli.studies.finite_elements import Limits
@@ -117,13 +117,13 @@ def hinge(
     quiet: Quiet = False,
 ) -> None:
     """Open the hinge between two chambers by a moment: moment against rotation."""
-    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.hinge import HingeChambers
     from dpgcli.calibration.fe.models import hinge_model
 
     _check_positive({"--moment": moment})
     _check_poisson(poisson)
     length, width, lid, gap, layer, modulus = _dimensions(spec, settings, HINGE_KEYS, quiet)
-    chambers = Chambers(length, width, lid, gap, layer, modulus, poisson)
+    chambers = HingeChambers(length, width, lid, gap, layer, modulus, poisson)
     model = hinge_model(chambers, mesh.value, moment)
     _carry_out(model, spec, out, _limits(run, time_limit, threads), quiet)
 
@@ -177,9 +177,9 @@ def finger(
 
 def _pushed(
     spec: Path, settings: list[str] | None, poisson: float, stiffness: float, quiet: bool
-) -> "tuple[Chambers, Push]":
+) -> "tuple[HingeChambers, Push]":
     """The chambers of a spec, and the spring in the place of its domes."""
-    from dpgcli.calibration.fe.hinge import Chambers
+    from dpgcli.calibration.fe.hinge import HingeChambers
     from dpgcli.calibration.fe.pushed import Push
     from dpgcli.design.geometry import stroke
     from dpgcli.errors import UsageError
@@ -191,7 +191,9 @@ def _pushed(
             f"the dome does not reach its neighbor: dome_height_mm {height:g} is not above "
             f"unit_separation_mm {gap:g}"
         )
-    return Chambers(length, width, lid, gap, layer, modulus, poisson), Push(stiffness, push, height)
+    return HingeChambers(length, width, lid, gap, layer, modulus, poisson), Push(
+        stiffness, push, height
+    )
 
 
 def _chosen(

@@ -46,7 +46,7 @@ class Footing:
 
 
 @dataclass(frozen=True)
-class Case:
+class DesignCase:
     """One design, the `place`-th of a batch: its law and its values.
 
     `answers` are those of its domes to pressure, none where it has no pressure.

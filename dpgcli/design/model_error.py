@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from dpgcli.design.calibrations import Calibration, KnownError
 from dpgcli.design.dimensions import WALL_COMPLIANCE
-from dpgcli.design.footing import ELSEWHERE, MOVED, Case
+from dpgcli.design.footing import ELSEWHERE, MOVED, DesignCase
 from dpgcli.design.outputs import Basis
 from dpgcli.design.problems import of_design
 from dpgcli.design.rules import HINGE_STIFFNESS, SEGMENT_HEIGHT, Value
@@ -33,7 +33,7 @@ OTHER_WALLS = (
 )
 
 
-def model_error_of(case: Case) -> ModelError:
+def model_error_of(case: DesignCase) -> ModelError:
     """What is known: what the spec says, else a calibration, else of such fingers."""
     said = case.design.model_error
     if isinstance(said, float):
@@ -63,7 +63,7 @@ def shapes_in(error: ModelError) -> str:
     return text
 
 
-def _of_walls(case: Case) -> ModelError:
+def _of_walls(case: DesignCase) -> ModelError:
     if case.pulls:
         return UNKNOWN
     if case.has_fitted_walls:
@@ -73,7 +73,7 @@ def _of_walls(case: Case) -> ModelError:
     return ModelError(OTHER_WALLS)
 
 
-def _of_height(case: Case) -> ModelError:
+def _of_height(case: DesignCase) -> ModelError:
     """The finding about the geometric segment height was made at the study's."""
     height = case.footings[SEGMENT_HEIGHT.key]
     if case.pulls and case.domes.calibration is not None:

@@ -23,7 +23,7 @@ from dpgcli.design.dimensions import (
 )
 from dpgcli.design.domes import Domes, domes_of
 from dpgcli.design.fitted import from_file
-from dpgcli.design.footing import Case, kinds
+from dpgcli.design.footing import DesignCase, kinds
 from dpgcli.design.lines import history_of, line_issues, line_of, units_by_line
 from dpgcli.design.loads import check_across, load_issues
 from dpgcli.design.model_error import model_error_of
@@ -157,8 +157,8 @@ class Resolution:
         found = [pair for part in parts if len(part) for pair in kinds(values, part)]
         return [(trusts_of(self._case(place)), count) for place, count in found]
 
-    def _case(self, place: int) -> Case:
-        return Case(self.design, self.domes, _each(self.values), place, _each(self.answers))
+    def _case(self, place: int) -> DesignCase:
+        return DesignCase(self.design, self.domes, _each(self.values), place, _each(self.answers))
 
     def batch(self, designs: Indices) -> Scene:
         """The scene of some of the designs, none of them wrong, with arrays by design.

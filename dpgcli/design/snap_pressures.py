@@ -26,13 +26,13 @@ SNAP_PRESSURE = Derivation(
     geometry.dome_origin,
 )
 ASSUMED = "that of finite elements (none is given, nor an area)"
-Pairs = list[tuple[UnitGroup, Value]]
+GroupValues = list[tuple[UnitGroup, Value]]
 Part = tuple[UnitGroup, Sizes]
 
 
 def answers_to_pressure(
     given: GivenPressure, domes: Domes, groups: Sequence[UnitGroup], problems: Problems
-) -> Mapping[str, Pairs]:
+) -> Mapping[str, GroupValues]:
     """Effective areas (mm²) of all units, or their snap pressures (MPa), by key.
 
     Empty where `problems` now say why there is neither.

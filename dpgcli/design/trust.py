@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, WALL_COMPLIANCE
-from dpgcli.design.footing import MOVED, Case, Footing
+from dpgcli.design.footing import MOVED, DesignCase, Footing
 from dpgcli.design.model_error import model_error_of, shapes_in
 from dpgcli.design.outputs import Basis, Output, Trust
 from dpgcli.design.rules import (
@@ -42,7 +42,7 @@ WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are 
 DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
 
 
-def trusts_of(case: Case) -> tuple[Trust, ...]:
+def trusts_of(case: DesignCase) -> tuple[Trust, ...]:
     """What each output of a design rests on, in the order of `Output`."""
     return (
         _under_load(case) if case.is_loaded else _shapes(case),
@@ -56,7 +56,7 @@ def trusts_of(case: Case) -> tuple[Trust, ...]:
     )
 
 
-def warnings_of(case: Case) -> tuple[str, ...]:
+def warnings_of(case: DesignCase) -> tuple[str, ...]:
     """The warnings of fits whose values, or curve, are in use, each with its file's name."""
     used = {value.file for each in case.values.values() for value in each}
     return tuple(
@@ -67,7 +67,7 @@ def warnings_of(case: Case) -> tuple[str, ...]:
     )
 
 
-def _shapes(case: Case) -> Trust:
+def _shapes(case: DesignCase) -> Trust:
     """Decided by walls, else by the segment height, unless something else is extrapolated."""
     lead = case.footings[WALL_COMPLIANCE if case.has_walls else SEGMENT_HEIGHT.key]
     gravest = case.gravest(*(key for key in case.footings if key != LINEAR_STIFFNESS))
@@ -76,7 +76,7 @@ def _shapes(case: Case) -> Trust:
     return _checked(Trust(Output.SHAPES, lead.basis, error, str(lead)), lead)
 
 
-def _under_load(case: Case) -> Trust:
+def _under_load(case: DesignCase) -> Trust:
     """Shapes under dead loads: as good as the stiffness of the units that bear them."""
     free, stiffness = _shapes(case), [_ground(case), _inverted(case)]
     error = f"{free.known_error}; under loads as the stiffness of units"
@@ -87,7 +87,7 @@ def _under_load(case: Case) -> Trust:
     return replace(free, known_error=error, doubt=doubt, instead=doubted.instead)
 
 
-def _energies(case: Case) -> Trust:
+def _energies(case: DesignCase) -> Trust:
     lead, curve = case.gravest(*DOMES), case.domes.calibration
     source = str(lead) if curve is None else f"curve of {curve.file}, {lead}"
     if case.has_published_domes:
@@ -102,7 +102,7 @@ def _energies(case: Case) -> Trust:
     return _checked(Trust(Output.ENERGIES, lead.basis, error, source), lead)
 
 
-def _barriers(case: Case) -> Trust:
+def _barriers(case: DesignCase) -> Trust:
     energies = replace(_energies(case), output=Output.BARRIERS)
     known, gaps = case.known_error(Output.BARRIERS, *DOMES), [*_gaps(case)]
     if known or not gaps:
@@ -121,7 +121,7 @@ def _barriers(case: Case) -> Trust:
     )
 
 
-def _gaps(case: Case) -> Iterator[tuple[str | None, Sequence[float]]]:
+def _gaps(case: DesignCase) -> Iterator[tuple[str | None, Sequence[float]]]:
     """Stretches before the inverted well in which the dome's curve was not sampled."""
     file = case.domes.calibration or case.footings[BISTABLE_STIFFNESS.key].calibration
     if file is None or file.curve is None:
@@ -134,7 +134,7 @@ def _gaps(case: Case) -> Iterator[tuple[str | None, Sequence[float]]]:
             yield file.file, gap
 
 
-def _ground(case: Case) -> Trust:
+def _ground(case: DesignCase) -> Trust:
     if case.pulls:
         is_published = case.has_published_domes
         basis = case.footings[BISTABLE_STIFFNESS.key].basis if is_published else Basis.ASSUMED
@@ -148,7 +148,7 @@ def _ground(case: Case) -> Trust:
     return _checked(Trust(Output.GROUND, hinge.basis, known or UNKNOWN, str(hinge)), hinge)
 
 
-def _inverted(case: Case) -> Trust:
+def _inverted(case: DesignCase) -> Trust:
     if case.has_walls:
         return _of_walls(case, Output.INVERTED, WITH_WALLS)
     times = "6" if case.has_published_domes else "hundreds of" if case.pulls else "40–90"
@@ -156,21 +156,21 @@ def _inverted(case: Case) -> Trust:
     return _of_rigid_walls(case, Output.INVERTED, error)
 
 
-def _forces(case: Case) -> Trust:
+def _forces(case: DesignCase) -> Trust:
     if case.has_walls:
         return _of_walls(case, Output.FORCES, "pushes within about 10 % of finite elements")
     error = "pushes 13–43 % off finite elements; loads meet units that are too stiff"
     return _of_rigid_walls(case, Output.FORCES, error)
 
 
-def _of_rigid_walls(case: Case, output: Output, error: str) -> Trust:
+def _of_rigid_walls(case: DesignCase, output: Output, error: str) -> Trust:
     spring = case.footings[BISTABLE_STIFFNESS.key]
     basis = spring.basis if case.has_published_domes else Basis.ASSUMED
     source = f"rigid walls, {spring}"
     return Trust(output, basis, error, source, doubt=RIGID_WALLS, instead=GIVE_WALLS)
 
 
-def _of_walls(case: Case, output: Output, error: str) -> Trust:
+def _of_walls(case: DesignCase, output: Output, error: str) -> Trust:
     keys = (WALL_COMPLIANCE, BISTABLE_STIFFNESS.key, HINGE_STIFFNESS.key)
     lead, known = case.gravest(*keys), case.known_error(output, *keys)
     if not known and case.has_fitted_walls:
@@ -181,7 +181,7 @@ def _of_walls(case: Case, output: Output, error: str) -> Trust:
     return _checked(Trust(output, lead.basis, known or UNKNOWN, str(lead)), lead)
 
 
-def _axial(case: Case) -> Trust:
+def _axial(case: DesignCase) -> Trust:
     bars = case.footings[LINEAR_STIFFNESS]
     error = case.known_error(Output.AXIAL, LINEAR_STIFFNESS) or UNKNOWN
     found = Trust(Output.AXIAL, bars.basis, error, str(bars))
@@ -190,7 +190,7 @@ def _axial(case: Case) -> Trust:
     return replace(found, doubt=ASSUMED_BARS, instead=f"say finger.{LINEAR_STIFFNESS}")
 
 
-def _pressures(case: Case) -> Trust:
+def _pressures(case: DesignCase) -> Trust:
     answer = case.answer
     if answer is None:
         return _unasked_pressures(case)
@@ -204,7 +204,7 @@ def _pressures(case: Case) -> Trust:
     return _checked(Trust(Output.PRESSURES, answer.basis, known, source), answer)
 
 
-def _unasked_pressures(case: Case) -> Trust:
+def _unasked_pressures(case: DesignCase) -> Trust:
     """What pressures would rest on if the spec had any."""
     spring, curve = case.footings[BISTABLE_STIFFNESS.key], case.domes.calibration
     if curve is None:

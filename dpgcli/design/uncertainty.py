@@ -24,7 +24,7 @@ from dpgcli.mechanics.finger import KEYS
 LAYER = "limiting_layer_thickness_mm"
 SPACING = "base_spacing_mm"
 ANGLE = "mounting_angle_deg"
-Lattice = Mapping[str, Array]
+LatticeArrays = Mapping[str, Array]
 
 
 class Share(NamedTuple):
@@ -105,7 +105,7 @@ def given(design: Design, key: str) -> list[Array]:
 
 
 def tolerance_steps(
-    design: Design, lattice: Lattice, lattice_of: Callable[[Design], Lattice]
+    design: Design, lattice: LatticeArrays, lattice_of: Callable[[Design], LatticeArrays]
 ) -> Iterator[Step]:
     """The steps of a single design's tolerances; `lattice_of` resolves a design.
 

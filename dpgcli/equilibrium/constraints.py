@@ -15,7 +15,7 @@ So constraints are terms beside others, a measure under a law, and paths know no
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, Self, TypeVar, cast
+from typing import Generic, Self, cast
 
 import numpy as np
 
@@ -27,13 +27,12 @@ from dpgcli.equilibrium.contracts import (
     OwnCoordinate,
     Response,
     Row,
+    System,
     Term,
     WideMeasure,
     WideMeasured,
     take_lanes,
 )
-
-System = TypeVar("System", bound=Coordinates, covariant=True)
 
 
 @dataclass(frozen=True)

@@ -184,6 +184,9 @@ class Coordinates(Protocol):
         """The coordinates after a step: their sum, or a curved update that strains bars less."""
 
 
+System = TypeVar("System", bound=Coordinates, covariant=True)
+
+
 def take_lanes(values: LaneArray, index: Indices) -> LaneArray:
     """The lanes of an array (…, batch) at `index`; an array with one lane for all stays.
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import (
-    Coordinates,
     Measure,
     Measured,
     Response,
     Row,
     ScalarLaw,
+    System,
     Term,
     WideMeasure,
     WideMeasured,
@@ -25,7 +25,6 @@ from dpgcli.equilibrium.contracts import (
 )
 from dpgcli.equilibrium.potential import Potential, add, assemble, widely
 
-System = TypeVar("System", bound=Coordinates, covariant=True)
 Law = TypeVar("Law", bound="LoadedLaw", covariant=True)
 
 
@@ -99,7 +98,7 @@ class Unchanged:
 
 
 @dataclass(frozen=True)
-class Share:
+class ShareOfLaw:
     """A share, (batch,), of a law."""
 
     law: ScalarLaw
@@ -180,7 +179,7 @@ class LoadedPotential(Generic[System, Law]):
         return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load), *others))
 
     def _grown(self, load: Array) -> tuple[Term, ...]:
-        return tuple(replace(term, law=Share(term.law, load)) for term in self.growing)
+        return tuple(replace(term, law=ShareOfLaw(term.law, load)) for term in self.growing)
 
     @property
     def column_depths(self) -> tuple[int, ...]:

@@ -2,22 +2,21 @@
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Generic, TypeVar
+from typing import Generic
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import (
-    Coordinates,
     Measured,
     Response,
     Row,
+    System,
     Term,
     WideMeasured,
 )
 
-Cells = tuple[tuple[tuple[Row, ...], int], ...]  # rows and number of cells of each measure
-System = TypeVar("System", bound=Coordinates, covariant=True)
+RowsOfCells = tuple[tuple[tuple[Row, ...], int], ...]  # rows and number of cells of each measure
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ class Potential(Generic[System]):
         >>> chain.is_separable(slice(3, 4)), chain.is_separable(slice(2, 3))
         (True, False)
 
-        Cells share their struts (row 3 is s_1), but not their corners (row 2 is b_1).
+        RowsOfCells share their struts (row 3 is s_1), but not their corners (row 2 is b_1).
         """
         return not any(
             min(rows) < shared.start and max(rows) >= shared.stop
@@ -197,7 +196,7 @@ def _rows_by_cell(rows: tuple[Row, ...], n_cells: int) -> list[list[int]]:
 
 
 @cache  # the same few for every batch
-def _column_depths(size: int, cells: Cells) -> tuple[int, ...]:
+def _column_depths(size: int, cells: RowsOfCells) -> tuple[int, ...]:
     """Depths of the Hessian's columns: the maximum over terms, and the fill-in of elimination."""
     depths = [0] * size
     for rows, n_cells in cells:

@@ -15,10 +15,12 @@ from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.columns import Column
 from dpgcli.states.rows import as_text
 
-Rows = tuple[tuple[Column, ...], Columns]
+ColumnsAndRows = tuple[tuple[Column, ...], Columns]
 
 
-def write_path(path: Path, scene: Scene, spec_json: str, points: Rows, events: Rows) -> None:
+def write_path(
+    path: Path, scene: Scene, spec_json: str, points: ColumnsAndRows, events: ColumnsAndRows
+) -> None:
     """Write a row for each point to a Parquet file; the events are in its metadata, as JSON."""
     columns, rows = points
     metadata = {
@@ -32,7 +34,7 @@ def write_path(path: Path, scene: Scene, spec_json: str, points: Rows, events: R
     write_table(path, described, [record_batch(columns, rows)], metadata)
 
 
-def _records(table: Rows) -> Sequence[dict[str, object]]:
+def _records(table: ColumnsAndRows) -> Sequence[dict[str, object]]:
     """Rows as objects by name."""
     columns, rows = table
     texts = [np.asarray(as_text(column, rows[column.name])).tolist() for column in columns]

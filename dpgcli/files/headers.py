@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dpgcli.files.layout import Row, header_in, is_number, is_of_units
+from dpgcli.files.layout import SheetRow, header_in, is_number, is_of_units
 from dpgcli.files.units import bare, name_and_unit
 
 
@@ -18,7 +18,7 @@ class Head:
     """
 
     names: tuple[str, ...]
-    rows: list[Row]
+    rows: list[SheetRow]
     line: int
     units: Mapping[str, str]
     titles: Mapping[str, str]
@@ -27,7 +27,7 @@ class Head:
 
 
 def headed(
-    rows: Sequence[Row],
+    rows: Sequence[SheetRow],
     wanted: Container[str],
     columns: Mapping[str, str],
     *,
@@ -66,7 +66,7 @@ def headed(
     )
 
 
-def _are_numbers(titles: Sequence[str], below: Sequence[Row], sources: Sequence[str]) -> bool:
+def _are_numbers(titles: Sequence[str], below: Sequence[SheetRow], sources: Sequence[str]) -> bool:
     """Whether a row is no header: all its cells are numbers, or those of a place that is chosen."""
     places = (place for source in sources if (place := _place(titles, source)) is not None)
     is_chosen = any(is_number(titles[place]) for place in places)
@@ -75,10 +75,10 @@ def _are_numbers(titles: Sequence[str], below: Sequence[Row], sources: Sequence[
     )
 
 
-def may_be_titles(rows: Sequence[Row]) -> bool:
+def may_be_titles(rows: Sequence[SheetRow]) -> bool:
     """Whether the first of some rows looks like titles: it counts on, or has words above numbers.
 
-    >>> may_be_titles([Row(["0", "1"], 1), Row(["0.5", "9"], 2)])
+    >>> may_be_titles([SheetRow(["0", "1"], 1), SheetRow(["0.5", "9"], 2)])
     True
     """
     first, *below = rows
@@ -88,7 +88,7 @@ def may_be_titles(rows: Sequence[Row]) -> bool:
     return counts_on or _has_words_above_numbers(first.cells, below)
 
 
-def _has_words_above_numbers(cells: Sequence[str], below: Sequence[Row]) -> bool:
+def _has_words_above_numbers(cells: Sequence[str], below: Sequence[SheetRow]) -> bool:
     words = [place for place, cell in enumerate(cells) if cell and not is_number(cell)]
     columns = ([row.cells[place] for row in below if len(row.cells) > place] for place in words)
     return any(2 * sum(map(is_number, column)) > len(column) for column in columns)
@@ -153,7 +153,7 @@ def _units(titles: Sequence[str], row: Sequence[str]) -> list[str]:
     return [" and ".join(dict.fromkeys(filter(None, pair))) for pair in both]
 
 
-def _width(names: Sequence[str], rows: Sequence[Row], needed: Container[str]) -> int:
+def _width(names: Sequence[str], rows: Sequence[SheetRow], needed: Container[str]) -> int:
     """The number of columns: those at the end without a title, or without any cell, are none."""
     width = len(names)
     while width > 1 and not names[width - 1] and not any(any(r.cells[width - 1 :]) for r in rows):
@@ -164,10 +164,10 @@ def _width(names: Sequence[str], rows: Sequence[Row], needed: Container[str]) ->
     return width
 
 
-def _cut(rows: list[Row], width: int, n_titles: int) -> list[Row]:
+def _cut(rows: list[SheetRow], width: int, n_titles: int) -> list[SheetRow]:
     """The rows without the separator that ends each of them: one more is a decimal comma's."""
     lengths = {len(row.cells) for row in rows}
     is_habit = len(lengths) == 1 and (len(rows) > 1 or lengths == {n_titles})
     if not is_habit or any(any(row.cells[width:]) for row in rows):
         return rows
-    return [Row(row.cells[:width], row.line) for row in rows]
+    return [SheetRow(row.cells[:width], row.line) for row in rows]

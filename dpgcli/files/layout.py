@@ -33,7 +33,7 @@ ANY_MARK = re.compile(
 
 
 @dataclass(frozen=True)
-class Row:
+class SheetRow:
     """The cells of a row, and the line it begins in."""
 
     cells: list[str]
@@ -101,7 +101,7 @@ def _parted(text: str, separator: str) -> str:
 
 def rows_in(
     lines: Sequence[str], separator: str, file: str = "", *, has_comments: bool = True
-) -> tuple[list[Row], list[Problem]]:
+) -> tuple[list[SheetRow], list[Problem]]:
     """The rows of a text without those that are empty, and what is not the row of any table.
 
     Without comments, as a data frame is, rows of empty cells count.
@@ -109,7 +109,7 @@ def rows_in(
     source = _Lines(lines, separator, has_comments)
     mark = separator if separator.strip(" ") else PARTED
     reader = csv.reader(source, delimiter=mark, skipinitialspace=True, strict=True)
-    rows: list[Row] = []
+    rows: list[SheetRow] = []
     problems: list[Problem] = []
     while True:
         before, source.is_inside = source.number, False
@@ -123,7 +123,7 @@ def rows_in(
             problems.append(located(place, "row", "cells of a CSV", str(error)))
             continue
         if cells and (any(cells) or not has_comments):
-            rows.append(Row([_in_one_line(cell) for cell in cells], before + 1))
+            rows.append(SheetRow([_in_one_line(cell) for cell in cells], before + 1))
             source.has_rows = True
 
 
@@ -161,7 +161,7 @@ def _has_tab_between_cells(line: str) -> bool:
     return any(a[-1] not in ",;|" and b[0] not in ",;|" for a, b in pairwise(parts))
 
 
-def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str]) -> int:
+def header_in(rows: Sequence[SheetRow], wanted: Container[str], sources: Sequence[str]) -> int:
     """The place of the header: the first row that has all sources, else one that is wanted.
 
     Without either it is the row before the numbers, so that a message can say what there is.
@@ -177,7 +177,7 @@ def header_in(rows: Sequence[Row], wanted: Container[str], sources: Sequence[str
     return _before_numbers(rows)
 
 
-def _before_numbers(rows: Sequence[Row]) -> int:
+def _before_numbers(rows: Sequence[SheetRow]) -> int:
     """The place of the row above the longest run of rows with as many cells, and numbers."""
     lengths = [len(row.cells) if has_numbers(row) else 0 for row in rows]
     begin, longest, start = 0, 0, 0
@@ -197,12 +197,12 @@ def is_number(cell: str) -> bool:
     return ANY_MARK.fullmatch(cell) is not None
 
 
-def has_numbers(row: Row) -> bool:
+def has_numbers(row: SheetRow) -> bool:
     """Whether a cell of a row is a number."""
     return any(map(is_number, row.cells))
 
 
-def is_of_units(row: Row) -> bool:
+def is_of_units(row: SheetRow) -> bool:
     """Whether a row names units, one of them at least, and has no number."""
     return not has_numbers(row) and any(is_unit(cell) for cell in row.cells if cell)
 

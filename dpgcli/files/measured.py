@@ -36,7 +36,7 @@ POSITIVE = f"a number > 0, at least {SMALLEST:g}, since logarithms are fitted"
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredCurve:
     """A curve, the columns that were not used, and the SHA-256 of the file.
 
     `notes` say in which units other than ours its columns were.
@@ -95,7 +95,7 @@ class GridTable:
 
 def read_curve(
     source: Tabular, geometry: Mapping[str, float] | None = None, choice: Choice = AS_IT_IS
-) -> Measured:
+) -> MeasuredCurve:
     """A dome's curve; the geometry tells units that are a thousand times off.
 
     Raises SpecError with every problem at once, UsageError for a choice that is none.
@@ -118,7 +118,7 @@ def read_curve(
     problems = problems or list(other_springs(sheet, own, columns, geometry))
     if problems:
         raise SpecError(in_order(problems))
-    return Measured(Record(**arrays), _unused(sheet, columns), sheet.sha256, own.notes)
+    return MeasuredCurve(Record(**arrays), _unused(sheet, columns), sheet.sha256, own.notes)
 
 
 def read_moments(source: Tabular, where: str | None = None, choice: Choice = AS_IT_IS) -> Moments:

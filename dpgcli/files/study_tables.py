@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.benchmark.bench import COLUMNS, Row, as_columns
+from dpgcli.benchmark.bench import COLUMNS, BenchRow, as_columns
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import spelled
 from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_run, write_table
@@ -19,13 +19,17 @@ from dpgcli.hard_cases.table import STRESS_COLUMNS
 from dpgcli.hard_cases.table import rows as stress_rows
 
 
-def write_bench(path: Path, rows: Sequence[Row], spec_json: str, command: Sequence[str]) -> None:
+def write_bench(
+    path: Path, rows: Sequence[BenchRow], spec_json: str, command: Sequence[str]
+) -> None:
     """Write all rows to a Parquet file; the machine and the command are in its metadata."""
     metadata = {"dpg.bench": json.dumps(_machine(command)), "dpg.spec": spec_json}
     write_table(path, schema(COLUMNS), [record_batch(COLUMNS, as_columns(rows))], metadata)
 
 
-def write_record(path: Path, rows: Sequence[Row], spec_json: str, command: Sequence[str]) -> None:
+def write_record(
+    path: Path, rows: Sequence[BenchRow], spec_json: str, command: Sequence[str]
+) -> None:
     """Write all rows, the machine and the command to a JSON file."""
     plain = [{key: json_value(value) for key, value in row.items()} for row in rows]
     write_run(path, {**_machine(command), "spec": spec_json, "rows": plain})

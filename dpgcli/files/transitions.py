@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
+from dpgcli.files.actuation import ColumnsAndRows
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_metadata import scene_metadata
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     import networkx as nx
 
 Kinds: TypeAlias = tuple[Column, ...]
-Table: TypeAlias = tuple[Kinds, Columns]
 HEAD = "<?xml version='1.0' encoding='utf-8'?>\n<!-- written by dpg -->\n"
 EDGE = ("line", "direction", "pressure_MPa", "unit", "reached_at_pressure", "tie")
 
@@ -40,7 +40,7 @@ def write_transitions(
     write_table(path, described, [record_batch(columns, rows)], metadata)
 
 
-def graph_of(states: Table, transitions: Table) -> "nx.MultiDiGraph[str]":
+def graph_of(states: ColumnsAndRows, transitions: ColumnsAndRows) -> "nx.MultiDiGraph[str]":
     """The graph of states, a node each, and of transitions, an edge for each that ends in a state.
 
     Both are columns and rows; `pattern` names the nodes, and what else they have are attributes.

@@ -26,7 +26,7 @@ Vector = tuple["mpf", "mpf"]
 Rate = dict[int, "mpf"]
 
 
-class Cell(NamedTuple):
+class ExactCell(NamedTuple):
     """The vectors c, t, p and q of a unit."""
 
     chord: Vector
@@ -35,14 +35,14 @@ class Cell(NamedTuple):
     far: Vector
 
 
-ENDS = Cell((-4, 0), (-2, 2), (-4, -2), (0, 2))  # x rows of what they join, from B_i's
+ENDS = ExactCell((-4, 0), (-2, 2), (-4, -2), (0, 2))  # x rows of what they join, from B_i's
 
 
-def cells(base: Sequence["mpf"], nodes: Sequence["mpf"]) -> Iterator[Cell]:
+def cells(base: Sequence["mpf"], nodes: Sequence["mpf"]) -> Iterator[ExactCell]:
     """The vectors of every unit by the nodes of the base station and the others."""
     stations = [base, *(nodes[k : k + 4] for k in range(0, len(nodes), 4))]
     for before, after in pairwise(stations):
-        yield Cell(
+        yield ExactCell(
             (after[0] - before[0], after[1] - before[1]),
             (after[2] - before[2], after[3] - before[3]),
             (before[2] - before[0], before[3] - before[1]),
@@ -81,7 +81,7 @@ def measured(vector: Vector) -> tuple["mpf", Vector]:
     return length, _times(1 / length, vector)
 
 
-def corners(cell: Cell) -> Vector:
+def corners(cell: ExactCell) -> Vector:
     """The angles a and b."""
     from mpmath import atan2
 
@@ -90,7 +90,7 @@ def corners(cell: Cell) -> Vector:
     return a, atan2(_dot(chord, far), cross(chord, far))
 
 
-class Response(NamedTuple):
+class ExactResponse(NamedTuple):
     """A spring's energy, force and stiffness."""
 
     energy: "mpf"
@@ -98,21 +98,21 @@ class Response(NamedTuple):
     stiffness: "mpf"
 
 
-def linear(stiffness: "mpf", x: "mpf") -> Response:
+def linear(stiffness: "mpf", x: "mpf") -> ExactResponse:
     """E = ½ k x²."""
-    return Response(stiffness * x * x / 2, stiffness * x, stiffness)
+    return ExactResponse(stiffness * x * x / 2, stiffness * x, stiffness)
 
 
-def corner_under(unit: Unit, angle: "mpf", moment: "mpf") -> Response:
+def corner_under(unit: Unit, angle: "mpf", moment: "mpf") -> ExactResponse:
     """E = k_θ θ² − M θ of a corner under a moment M."""
     spring = linear(2 * unit.hinge, angle)
     return spring._replace(energy=spring.energy - moment * angle, force=spring.force - moment)
 
 
-def bistable(unit: Unit, x: "mpf") -> Response:
+def bistable(unit: Unit, x: "mpf") -> ExactResponse:
     """E = ½ k_b x² [1 + β(u² − 2u)] − P x with u = x/d, β = 1−α and a constant push P."""
     u, softening, stiffness = x / unit.stroke, 1 - unit.linearity, unit.bistable
-    return Response(
+    return ExactResponse(
         stiffness * x * x * (1 + softening * (u * u - 2 * u)) / 2 - unit.push * x,
         stiffness * x * (1 + softening * (2 * u * u - 3 * u)) - unit.push,
         stiffness * (1 + 6 * softening * (u * u - u)),
@@ -143,7 +143,7 @@ class Expansion:
         unit, rest = divmod(row, self.width)
         return (self.width + 1) * unit + 1 + rest
 
-    def add(self, response: Response, rate: Rate) -> None:
+    def add(self, response: ExactResponse, rate: Rate) -> None:
         """Add E, F r and K r rᵀ of a spring whose coordinate has the gradient r, `rate`.
 
         The rate's own derivatives, F ∇r, are added by `add_square` and `add_bend`.
@@ -254,7 +254,7 @@ class ElasticBars:
         return np.eye(len(unknowns))
 
 
-def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell, wall: "mpf") -> None:
+def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: ExactCell, wall: "mpf") -> None:
     """Bars and dome, each with the Hessian K n nᵀ + (F/ℓ) m mᵀ by its vector ℓ n."""
     behind: Rate = {-1 - i: 1} if unit.wall else {}  # the dome extends as its wall gives way
     still: Rate = {}
@@ -271,7 +271,7 @@ def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: Cell, wall: "mp
         expansion.add_square(spring.force / length, across)
 
 
-def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
+def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: ExactCell) -> None:
     """E = k_θ θ² − M θ, θ = ∠s − ∠c − π/2, s either strut; ∠v bends by −(g hᵀ + h gᵀ).
 
     M turns its sign with θ, at the far strut; g and h are the `_rates`.
@@ -288,7 +288,7 @@ def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: Cell) -> None:
         expansion.add_bend(corner.force, chord, along_chord)
 
 
-def _add_couplings(expansion: Expansion, coupling: "mpf", shape: list[Cell]) -> None:
+def _add_couplings(expansion: Expansion, coupling: "mpf", shape: list[ExactCell]) -> None:
     """−κ θ θ' of neighbors, θ = ∠p − ∠q; a direction bends by −(g hᵀ + h gᵀ), its `_rates`."""
     turns = [sum(corners(cell)) for cell in shape]
     struts = [
@@ -322,7 +322,7 @@ def _combined(one: Rate, other: Rate, sign: int) -> Rate:
     return {row: one.get(row, 0) + sign * other.get(row, 0) for row in {**one, **other}}
 
 
-def _add_swings(expansion: Expansion, shape: list[Cell]) -> None:
+def _add_swings(expansion: Expansion, shape: list[ExactCell]) -> None:
     """Add the second-order term of the curved update `moved`: gradient · ∂²nodes/∂step².
 
     It is zero at an equilibrium. A bar v that turns by ω and stretches by σ moves all beyond it by

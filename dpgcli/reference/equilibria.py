@@ -152,7 +152,7 @@ def digits_lost(finger: Finger) -> int:
     return max(0, ceil(log10(finger.linear_stiffness.max() / finger.bistable_stiffness.min())))
 
 
-class Factorization(NamedTuple):
+class ExactFactorization(NamedTuple):
     """L D Lᵀ of a band: below[i] the entries of L's row i that the band holds, left to right.
 
     `is_positive` says that no pivot is negative or too small for its sign to be known.
@@ -163,7 +163,7 @@ class Factorization(NamedTuple):
     is_positive: bool
 
 
-def factorize(band: list[list["mpf"]], smallest: "mpf") -> Factorization:
+def factorize(band: list[list["mpf"]], smallest: "mpf") -> ExactFactorization:
     """Factorize a symmetric band without pivoting.
 
     Pivots below `smallest` of their diagonal may be what is left of zeros where the search
@@ -184,10 +184,10 @@ def factorize(band: list[list["mpf"]], smallest: "mpf") -> Factorization:
         pivot = diagonal - fdot(scaled, below[row])
         is_positive &= bool(pivot > smallest * abs(diagonal))
         pivots.append(pivot)
-    return Factorization(below, pivots, is_positive)
+    return ExactFactorization(below, pivots, is_positive)
 
 
-def _forward(factorization: Factorization, right_hand_side: list["mpf"]) -> list["mpf"]:
+def _forward(factorization: ExactFactorization, right_hand_side: list["mpf"]) -> list["mpf"]:
     """L⁻¹ b; rows above the first nonzero of b stay zero and are skipped."""
     from mpmath import fdot
 
@@ -200,21 +200,21 @@ def _forward(factorization: Factorization, right_hand_side: list["mpf"]) -> list
     return y
 
 
-def _downhill(factorization: Factorization, gradient: list["mpf"]) -> list["mpf"]:
+def _downhill(factorization: ExactFactorization, gradient: list["mpf"]) -> list["mpf"]:
     """The step −(L|D|Lᵀ)⁻¹ g: Newton's if the Hessian is positive definite, downhill if not."""
     y = _forward(factorization, [-value for value in gradient])
     y = [value / abs(d) for value, d in zip(y, factorization.pivots, strict=True)]
     return _backward(factorization, y)
 
 
-def solved(factorization: Factorization, right_hand_side: list["mpf"]) -> list["mpf"]:
+def solved(factorization: ExactFactorization, right_hand_side: list["mpf"]) -> list["mpf"]:
     """(L D Lᵀ)⁻¹ b."""
     y = _forward(factorization, right_hand_side)
     y = [value / d for value, d in zip(y, factorization.pivots, strict=True)]
     return _backward(factorization, y)
 
 
-def _backward(factorization: Factorization, y: list["mpf"]) -> list["mpf"]:
+def _backward(factorization: ExactFactorization, y: list["mpf"]) -> list["mpf"]:
     """L⁻ᵀ y."""
     x = list(y)
     for row in range(len(x) - 1, 0, -1):
@@ -230,7 +230,7 @@ class Stationary(NamedTuple):
     bars: Energy
     unknowns: list["mpf"]
     expansion: Expansion
-    factorization: Factorization
+    factorization: ExactFactorization
 
 
 def _minimum(

@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.actuation.readings import Readings
 from dpgcli.actuation.tables import numbered
-from dpgcli.actuation.travel import Kind, Travel
+from dpgcli.actuation.travel import EventKind, Travel
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Scene
@@ -24,7 +24,7 @@ from dpgcli.states.patterns import texts
 
 # of Okabe and Ito: told apart by color-blind readers; in gray by marks and dashes
 RISING, FALLING, JUMP, UNSTABLE = "#0072B2", "#D55E00", "0.45", "#009E73"
-MARKS = {Kind.SNAP: "^", Kind.RESET: "v", Kind.CONTACT: "o", Kind.RELEASE: "s"}
+MARKS = {EventKind.SNAP: "^", EventKind.RESET: "v", EventKind.CONTACT: "o", EventKind.RELEASE: "s"}
 MOST_PANELS, IN_ROW = 12, 6
 LETTERS = "abcdefghijkl"
 POINTS = 72.0  # an inch
@@ -162,7 +162,7 @@ class Drawing:
         """What colors and marks mean, above the curves."""
         from matplotlib.lines import Line2D
 
-        kinds = [kind for kind in Kind if any(event.kind is kind for event in self.way.events)]
+        kinds = [kind for kind in EventKind if any(event.kind is kind for event in self.way.events)]
         handles = [
             Line2D([], [], color=RISING, lw=1.6, label="pressure rises"),
             Line2D([], [], color=FALLING, lw=1.6, label="pressure falls"),

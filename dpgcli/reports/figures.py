@@ -20,7 +20,7 @@ from dpgcli.reports.fingers import (
 )
 from dpgcli.reports.outlines import DrawnState, drawn_states, notes
 from dpgcli.reports.overlay import Overlay
-from dpgcli.reports.panels import DIMENSION, LEFT, LENGTHS, NO_WINDOW, Grid, Window
+from dpgcli.reports.panels import DIMENSION, LEFT, LENGTHS, NO_WINDOW, PanelGrid, Window
 from dpgcli.states.predict import Prediction
 
 POINTS = 72.0  # an inch
@@ -46,7 +46,7 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
             over.draw(figure)
         return
     window = Window.around(states) or NO_WINDOW
-    grid = Grid.of(
+    grid = PanelGrid.of(
         len(states), prediction.plan.n_units, window, DIMENSION if scene.gripper else 0.0
     )
     explained = partial(handles, is_gripper=scene.gripper is not None)
@@ -58,7 +58,9 @@ def draw_states(prediction: Prediction, path: Path, *, overlay: bool = False) ->
         foot.draw(figure, window, grid)
 
 
-def _draw_panel(figure: Any, state: DrawnState, window: Window, grid: Grid, place: int) -> None:
+def _draw_panel(
+    figure: Any, state: DrawnState, window: Window, grid: PanelGrid, place: int
+) -> None:
     axes = figure.add_axes(grid.box(place))
     scale = window.size[1] / grid.shape_height  # mm per inch
     set_window(axes, window, window.left + scale * grid.panel_width, 1.0 / scale)
@@ -109,7 +111,7 @@ class Foot:
         n_rows = 1 if self.is_wide else 2
         return AXIS_LABELS + n_rows * LEGEND_ROW + NOTE * len(self.notes) + 0.08
 
-    def draw(self, figure: Any, window: Window, grid: Grid) -> None:
+    def draw(self, figure: Any, window: Window, grid: PanelGrid) -> None:
         """Axis labels around all panels, the legend and notes below."""
         width, height = grid.page
         left, middle = (grid.left - LEFT + 0.06) / width, 0.5 * (1.0 + self.height / height)

@@ -11,7 +11,7 @@ from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions, res
 from dpgcli.calibration.choices import GridMethod, Rule, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.grid import GridLaw
+from dpgcli.calibration.grid import FittedGridLaw
 from dpgcli.calibration.hinge import HingeFit
 from dpgcli.calibration.observations import UNITS as UNITS_OF_TARGETS
 from dpgcli.calibration.observations import residual_unit, rms
@@ -50,7 +50,7 @@ def value_rows(fit: Fit) -> tuple[tuple[Column, ...], Columns]:
     return VALUE_COLUMNS + INTERVAL_COLUMNS, rows
 
 
-def quantity_rows(law: GridLaw) -> tuple[tuple[Column, ...], Columns]:
+def quantity_rows(law: FittedGridLaw) -> tuple[tuple[Column, ...], Columns]:
     """Columns, and a row for each quantity of a grid.
 
     Its law if it has one, and how well others predict a point.
@@ -170,7 +170,7 @@ def _weighted_quality(study: FingerFit, found: Fit) -> Iterator[str]:
             yield f"{target}: rms residual {rms(left):.3g} {unit}, error {error:.3g} {unit} ({how})"
 
 
-def grid_summary(law: GridLaw, table: GridTable) -> Iterator[str]:
+def grid_summary(law: FittedGridLaw, table: GridTable) -> Iterator[str]:
     """The number of points, their keys, and the values that all points share."""
     points = law.points
     reference = ", ".join(

@@ -13,7 +13,7 @@ from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
 from dpgcli.reports.fingers import EDGE, MEASURE, WORD, draw_finger, handles, set_window
 from dpgcli.reports.outlines import FingerShape, Points, Profile, finger_shape, notes
-from dpgcli.reports.panels import Grid, Window
+from dpgcli.reports.panels import PanelGrid, Window
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
 
@@ -31,7 +31,7 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     drawn = [finger.points for own in shapes for finger in own]
     window = Window.of(np.concatenate([circle, *drawn]))
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
-    grid = Grid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
+    grid = PanelGrid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
     said = [*notes(found.scene), _said(largest)]
     foot = Foot(said, _handles, grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)

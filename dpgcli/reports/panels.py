@@ -69,7 +69,7 @@ NO_WINDOW = Window(0.0, 1.0, 0.0, 1.0)  # where there is nothing to see
 
 
 @dataclass(frozen=True)
-class Grid:
+class PanelGrid:
     """Panels in rows on a page, in inches, above a foot; `dimension` is room right of shapes.
 
     A title of many digits has several lines.
@@ -84,16 +84,18 @@ class Grid:
     foot: float = 0.0
 
     @classmethod
-    def of(cls, n_panels: int, n_digits: int, window: Window, dimension: float = 0.0) -> "Grid":
+    def of(
+        cls, n_panels: int, n_digits: int, window: Window, dimension: float = 0.0
+    ) -> "PanelGrid":
         """As many columns as make a page of a good shape with few empty places.
 
         >>> window = Window(0.0, 60.0, 0.0, 50.0)
-        >>> [Grid.of(n, 5, window).n_columns for n in (1, 8, 32, 64)]
+        >>> [PanelGrid.of(n, 5, window).n_columns for n in (1, 8, 32, 64)]
         [1, 4, 8, 8]
         """
         aspect = window.size[1] / window.size[0]
 
-        def grid(n_columns: int) -> Grid:
+        def grid(n_columns: int) -> PanelGrid:
             room = (PAGE[0] - LEFT - RIGHT) / n_columns - BETWEEN - dimension
             highest = min(LARGEST_PANEL, PAGE[1] / ceil(n_panels / n_columns) - TITLE)
             width = min(room, LARGEST_PANEL, highest / aspect)

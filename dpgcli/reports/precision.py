@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dpgcli.benchmark.bench import BenchRow
 from dpgcli.files.study_tables import json_value
 from dpgcli.reports.drawing import drawn_to
-
-Row = dict[str, Any]
 
 WIDTH, HEIGHT = 64, 18
 ZERO_DRAWN_AT = 0.1  # of the smallest error
@@ -20,7 +19,7 @@ MARKERS = {"ladder": "o", "one finger": "s", "peer": "^"}
 LABELS = {"ladder": "dpg, in a batch", "one finger": "dpg, one finger", "peer": "state by state"}
 
 
-def points(rows: Sequence[Row]) -> list[Row]:
+def points(rows: Sequence[BenchRow]) -> list[BenchRow]:
     """The rows that are points of the figure."""
     return [
         row
@@ -29,20 +28,20 @@ def points(rows: Sequence[Row]) -> list[Row]:
     ]
 
 
-def model_error(rows: Sequence[Row]) -> float | None:
+def model_error(rows: Sequence[BenchRow]) -> float | None:
     """Largest error of the lattice against given data (mm), if there are any."""
     found = [row["max_tip_error_mm"] for row in rows if row["group"] == "model"]
     found = [error for error in found if math.isfinite(error)]
     return max(found[0], _least_drawn(rows)) if found else None
 
 
-def _least_drawn(rows: Sequence[Row]) -> float:
+def _least_drawn(rows: Sequence[BenchRow]) -> float:
     """The error (mm) at which zero is drawn on a logarithmic axis."""
     errors = [row["max_tip_error_mm"] for row in points(rows)]
     return ZERO_DRAWN_AT * min((error for error in errors if error > 0.0), default=1.0)
 
 
-def cheapest_way(rows: Sequence[Row], target: float) -> str:
+def cheapest_way(rows: Sequence[BenchRow], target: float) -> str:
     """A sentence that names the cheapest method below an error (mm)."""
     meets = [
         row
@@ -58,7 +57,7 @@ def cheapest_way(rows: Sequence[Row], target: float) -> str:
     )
 
 
-def text_figure(rows: Sequence[Row]) -> list[str]:
+def text_figure(rows: Sequence[BenchRow]) -> list[str]:
     """Largest tip error (mm) over seconds a state, both logarithmic, as lines of text."""
     shown = points(rows)
     if not shown:
@@ -102,7 +101,7 @@ def _cell(value: float, first: float, last: float, size: int) -> int:
     return min(size - 1, max(0, round(share * (size - 1))))
 
 
-def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
+def draw_precision(rows: Sequence[BenchRow], name: str, path: Path) -> None:
     """Draw the figure to an SVG or PNG file."""
     words = {
         "xlabel": "wall time per state (s)",
@@ -123,7 +122,7 @@ def draw_precision(rows: Sequence[Row], name: str, path: Path) -> None:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
 
 
-def _draw_points(axes: Any, shown: Sequence[Row]) -> None:
+def _draw_points(axes: Any, shown: Sequence[BenchRow]) -> None:
     """Numbered marks, named in the legend: names beside them would overlap."""
     least = _least_drawn(shown)
     places = []
@@ -168,17 +167,17 @@ def _near(
     return found
 
 
-def _named(number: int, row: Row) -> str:
+def _named(number: int, row: BenchRow) -> str:
     return f"{number}  {row['method']} ({LABELS[row['group']]})"
 
 
-def _which(row: Row) -> str:
+def _which(row: BenchRow) -> str:
     """The row of a group that varies something."""
     ratio = f"k_L/k_b {row['stiffness_ratio']:.3g}"
     return f"{row['n_units']} units, {row['n_designs']:,} designs, {ratio}"
 
 
-def changes(then: Sequence[Row], now: Sequence[Row]) -> list[str]:
+def changes(then: Sequence[BenchRow], now: Sequence[BenchRow]) -> list[str]:
     """Slowdowns against a record, by times relative to the NumPy kernel's, in words."""
     key = ("group", "method", "n_units", "n_designs", "stiffness_ratio")
     before = {tuple(row.get(name) for name in key): row.get("relative_time") for row in then}

@@ -17,7 +17,7 @@ from dpgcli.states.scan import pulls
 from dpgcli.states.settle import settle, settle_from
 from dpgcli.states.units import UnitSolutions
 
-Value = TypeVar("Value", bound=np.generic)
+Entry = TypeVar("Entry", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Flips:
         """The energy with the dome that flips in touch, or about to be."""
         return self.formulate(self.units.finger.with_domes(self.upper))
 
-    def of_unit(self, values: NDArray[Value]) -> NDArray[Value]:
+    def of_unit(self, values: NDArray[Entry]) -> NDArray[Entry]:
         """Values by unit, (1 or unit, 1 or lane), of the unit that flips, (lane,)."""
         return np.asarray(np.broadcast_to(values, self.lower.shape)[self.unit, self._lanes])
 

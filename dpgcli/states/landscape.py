@@ -61,7 +61,7 @@ class BarrierGraph:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class PathStretch:
     """The energy (mJ) by the travel (mm) of the dome that flips, on the way of one flip."""
 
     travel: Array
@@ -94,7 +94,7 @@ class Landscape:
             ["".join(own) for own in np.where(self.flips.is_flipping, "?", digits).T], str
         )
 
-    def stretches(self) -> tuple[Stretch, ...]:
+    def stretches(self) -> tuple[PathStretch, ...]:
         """The energy on the way of each flip, with the dome that flips held wherever it is."""
         if not len(self.flips.unit):
             return ()
@@ -104,7 +104,7 @@ class Landscape:
         for lane, snap in enumerate(snaps):
             way = slice(None) if snap else slice(None, None, -1)
             moved = np.abs(travel[way, lane] - travel[way, lane][0])
-            found.append(Stretch(moved, energy[way, lane]))
+            found.append(PathStretch(moved, energy[way, lane]))
         return tuple(found)
 
     def _from_ground(self) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask, reason_against
 from dpgcli.sweeps.designs import designs_at_once
 from dpgcli.sweeps.differences import differences
-from dpgcli.sweeps.evaluation import DesignStatus, Evaluation, value_columns
+from dpgcli.sweeps.evaluation import DesignEvaluation, DesignStatus, value_columns
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
 from dpgcli.sweeps.extent import ASKED_AT_ONCE, MOST_ASKED, Extent, size_text
 from dpgcli.sweeps.maker import HERE, check_workers
@@ -81,10 +81,10 @@ class Study:
     target_error: float | None = None
 
     @cached_property
-    def evaluation(self) -> Evaluation:
+    def evaluation(self) -> DesignEvaluation:
         """The function of each chunk."""
         data = self.sweep.base_data
-        return Evaluation(
+        return DesignEvaluation(
             self.sweep.base.design,
             numbers_of(data),
             partial(reason_against, data),

@@ -7,7 +7,7 @@ from time import process_time
 from typing import IO, Any, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
-from dpgcli.sweeps.evaluation import Evaluation, Tables
+from dpgcli.sweeps.evaluation import DesignEvaluation, Tables
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker
 from dpgcli.sweeps.space import DesignValues
@@ -30,7 +30,7 @@ class ChunkResult(NamedTuple):
 class ChunkTask:
     """The task of a chunk; `store` is None where the worker sees no common disk."""
 
-    evaluation: Evaluation
+    evaluation: DesignEvaluation
     store: PartStore | None
 
     def __call__(self, chunk: Chunk, values: DesignValues, maker: Maker) -> ChunkResult:

@@ -26,7 +26,7 @@ KEYS = "DASK_DISTRIBUTED__COMM__TLS__"  # of the environment; files in ~/.config
 
 
 @dataclass
-class Watch:
+class WorkerWatch:
     """Reports missing or silent workers, and gives up after `limit` seconds without any."""
 
     name: str
@@ -93,7 +93,7 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Ba
     name = f"the Dask cluster at {scheduler}"
     _check_reachable(scheduler)
     client = _client(scheduler)
-    watch = Watch(name, lambda: len(_threads(client)), limit, say)
+    watch = WorkerWatch(name, lambda: len(_threads(client)), limit, say)
     with ExitStack() as opened:
         opened.callback(client.close)
         while not _threads(client):

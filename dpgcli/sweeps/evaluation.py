@@ -41,7 +41,7 @@ class Tables(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class DesignEvaluation:
     """Evaluates designs around a base, given the values of its keys that change.
 
     `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with

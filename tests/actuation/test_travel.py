@@ -11,7 +11,7 @@ from dpgcli.actuation.folding import folded
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.readings import Readings, drift
 from dpgcli.actuation.rest import at_rest
-from dpgcli.actuation.travel import Kind, Travel, travel
+from dpgcli.actuation.travel import EventKind, Travel, travel
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.terms import chain_potential
@@ -79,8 +79,8 @@ def test_pressures_are_landed_on_and_go_one_way_between(
 def test_what_an_event_releases_is_what_the_energy_falls_by(finger: Pressed) -> None:
     way = way_of(finger, ROUND)
     readings = Readings(finger, way.points.shapes, ALONE)
-    snaps = [event for event in way.events if event.kind in (Kind.SNAP, Kind.RESET)]
-    assert [event.kind for event in snaps] == [Kind.SNAP] * 3 + [Kind.RESET] * 3
+    snaps = [event for event in way.events if event.kind in (EventKind.SNAP, EventKind.RESET)]
+    assert [event.kind for event in snaps] == [EventKind.SNAP] * 3 + [EventKind.RESET] * 3
     assert {event.units for event in snaps[:3]} == {(0,), (1,), (2,)}
     for event in way.events:
         before, after = (readings.potential_energy[side] for side in (event.before, event.after))
@@ -214,7 +214,7 @@ def test_between_rigid_bars_units_are_independent_hysterons(
     assert len(way.events) > 5
     for event in way.events:
         (unit,) = event.units
-        limit = up if event.kind is Kind.SNAP else down
+        limit = up if event.kind is EventKind.SNAP else down
         pressure = way.points.shapes.pressure[unit, event.before]
         assert pressure == pytest.approx(limit[unit], rel=1e-9)
 

@@ -6,7 +6,7 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.beginning import beginning_warnings, check_sign
 from dpgcli.calibration.bistable import law
-from dpgcli.calibration.choices import Quantity
+from dpgcli.calibration.choices import CurveQuantity
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 
@@ -15,7 +15,7 @@ TRAVEL = np.linspace(0.0, 4.2, 300)
 
 
 def force(travel: Array, noise: float = 0.05) -> Array:
-    exact = law(np.maximum(travel, 0.0), TRUE, Quantity.FORCE)
+    exact = law(np.maximum(travel, 0.0), TRUE, CurveQuantity.FORCE)
     return exact + np.random.default_rng(0).normal(0.0, noise, len(travel))
 
 

@@ -15,7 +15,7 @@ from dpgcli.calibration.bistable import (
     rests,
     slopes,
 )
-from dpgcli.calibration.choices import Branches, Loss, Quantity, Rule
+from dpgcli.calibration.choices import Branches, CurveQuantity, Loss, Rule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 from dpgcli.files.calibration.results import values_of
@@ -25,17 +25,19 @@ DATA = Path(__file__).parents[2] / "configs" / "calibration"
 TRUE = np.array([12.84, 0.043, 3.5])
 TRAVEL = np.linspace(0.0, 4.2, 85)
 EQUAL = Opening(Rule.EQUAL)
-NOISE = {Quantity.ENERGY: 0.1, Quantity.FORCE: 0.3}
+NOISE = {CurveQuantity.ENERGY: 0.1, CurveQuantity.FORCE: 0.3}
 
 
-def curve(quantity: Quantity, seed: int | None = None, travel: Array = TRAVEL) -> Record:
+def curve(quantity: CurveQuantity, seed: int | None = None, travel: Array = TRAVEL) -> Record:
     exact = law(travel, TRUE, quantity)
     if seed is not None:
         exact = exact + np.random.default_rng(seed).normal(0.0, NOISE[quantity], len(travel))
     return Record(travel, **{quantity.value: exact})
 
 
-def fitted(data: Record, quantity: Quantity = Quantity.ENERGY, **options: object) -> BistableFit:
+def fitted(
+    data: Record, quantity: CurveQuantity = CurveQuantity.ENERGY, **options: object
+) -> BistableFit:
     opening = options.pop("opening", EQUAL)
     return fit_bistable(data, BistableOptions(opening, quantity, **options))  # type: ignore[arg-type]
 
@@ -44,8 +46,8 @@ def warned(found: BistableFit, start: str) -> list[str]:
     return [text for text in found.warnings if text.startswith(start)]
 
 
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
-def test_exact_curves_give_the_law_back_without_a_warning(quantity: Quantity) -> None:
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
+def test_exact_curves_give_the_law_back_without_a_warning(quantity: CurveQuantity) -> None:
     found = fitted(curve(quantity), quantity)
     assert found.fit.values == pytest.approx(TRUE, rel=1e-9)
     assert found.warnings == ()
@@ -53,14 +55,14 @@ def test_exact_curves_give_the_law_back_without_a_warning(quantity: Quantity) ->
     assert found.well == pytest.approx(float(rests(TRUE).well), abs=0.01)
 
 
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
-def test_noisy_curves_give_no_warning_either(quantity: Quantity) -> None:
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
+def test_noisy_curves_give_no_warning_either(quantity: CurveQuantity) -> None:
     assert fitted(curve(quantity, 0), quantity).warnings == ()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
-def test_standard_errors_are_the_scatter_over_repeated_noise(quantity: Quantity) -> None:
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
+def test_standard_errors_are_the_scatter_over_repeated_noise(quantity: CurveQuantity) -> None:
     fits = [fitted(curve(quantity, seed), quantity).fit for seed in range(200)]
     scatter = np.std([f.values for f in fits], axis=0, ddof=1)
     stated = np.sqrt(np.mean([f.standard_errors**2 for f in fits], axis=0))
@@ -70,15 +72,15 @@ def test_standard_errors_are_the_scatter_over_repeated_noise(quantity: Quantity)
 
 
 def test_the_bootstrap_agrees_with_the_standard_errors() -> None:
-    found = fitted(curve(Quantity.ENERGY, 1), resamples=200).fit
+    found = fitted(curve(CurveQuantity.ENERGY, 1), resamples=200).fit
     assert found.intervals is not None
     half = np.diff(found.intervals)[:, 0] / (2 * 1.96)
     assert half == pytest.approx(found.standard_errors, rel=0.35)
 
 
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
 @pytest.mark.parametrize("values", [TRUE, np.array([44.0, 0.5, 13.0])])
-def test_slopes_are_central_differences(quantity: Quantity, values: Array) -> None:
+def test_slopes_are_central_differences(quantity: CurveQuantity, values: Array) -> None:
     opening = np.linspace(-0.5, 5.0, 23)
     found = slopes(opening, values, quantity)
     for place, size in enumerate(values):
@@ -93,24 +95,24 @@ def test_slopes_are_central_differences(quantity: Quantity, values: Array) -> No
 
 def test_the_turning_points_carry_no_force() -> None:
     found = np.array(rests(TRUE))
-    assert law(found, TRUE, Quantity.FORCE) == pytest.approx([0, 0], abs=1e-12)
+    assert law(found, TRUE, CurveQuantity.FORCE) == pytest.approx([0, 0], abs=1e-12)
     assert np.isnan(rests(np.array([1.0, 0.112, 1.0]))).all()
     assert np.isfinite(rests(np.array([1.0, 0.111, 1.0]))).all()
 
 
 def test_a_pressure_is_a_force_over_its_area() -> None:
-    pressure = Record(TRAVEL, pressure=law(TRAVEL, TRUE, Quantity.FORCE) / 31.6)
-    assert fitted(pressure, Quantity.PRESSURE, area=31.6).fit.values == pytest.approx(TRUE)
+    pressure = Record(TRAVEL, pressure=law(TRAVEL, TRUE, CurveQuantity.FORCE) / 31.6)
+    assert fitted(pressure, CurveQuantity.PRESSURE, area=31.6).fit.values == pytest.approx(TRUE)
 
 
 def test_work_is_fitted_as_an_energy() -> None:
     fine = np.linspace(0.0, 4.2, 3001)
-    found = fitted(curve(Quantity.FORCE, travel=fine), Quantity.WORK)
+    found = fitted(curve(CurveQuantity.FORCE, travel=fine), CurveQuantity.WORK)
     assert found.fit.values == pytest.approx(TRUE, rel=1e-4)
 
 
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
-def test_the_mapping_stretches_the_law(quantity: Quantity) -> None:
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
+def test_the_mapping_stretches_the_law(quantity: CurveQuantity) -> None:
     """x = f u: the stroke scales by f and the stiffness by f^-2, energies stay."""
     factor, data = 0.25, curve(quantity)
     found = fitted(data, quantity, opening=Opening(Rule.PROPORTIONAL, factor))
@@ -119,37 +121,39 @@ def test_the_mapping_stretches_the_law(quantity: Quantity) -> None:
 
 
 def test_a_stroke_puts_the_inverted_well_there() -> None:
-    found = fitted(curve(Quantity.ENERGY), opening=Opening(Rule.STROKE, 1.75))
+    found = fitted(curve(CurveQuantity.ENERGY), opening=Opening(Rule.STROKE, 1.75))
     assert float(rests(found.fit.values).well) == pytest.approx(1.75, rel=2e-3)
 
 
 def test_fixed_values_stay() -> None:
-    found = fitted(curve(Quantity.ENERGY, 0), fixed={"stroke_mm": 3.5, "force_linearity": 0.043})
+    found = fitted(
+        curve(CurveQuantity.ENERGY, 0), fixed={"stroke_mm": 3.5, "force_linearity": 0.043}
+    )
     assert found.fit.values[1:].tolist() == [0.043, 3.5]
     assert found.fit.values[0] == pytest.approx(12.84, rel=0.01)
     everything = dict(
         zip(("bistable_stiffness_N_per_mm", "force_linearity", "stroke_mm"), TRUE, strict=True)
     )
-    assert fitted(curve(Quantity.ENERGY), fixed=everything).fit.rms < 1e-12
+    assert fitted(curve(CurveQuantity.ENERGY), fixed=everything).fit.rms < 1e-12
 
 
 def test_an_unsampled_middle_makes_the_barrier_an_extrapolation() -> None:
     ends = TRAVEL[(TRAVEL < 0.6) | (TRAVEL > 3.2)]
-    found = fitted(curve(Quantity.ENERGY, travel=ends))
+    found = fitted(curve(CurveQuantity.ENERGY, travel=ends))
     (said,) = found.warnings
     assert said.startswith("nothing is sampled from 0.55 to 3.25 mm: the barrier of the fitted ")
     assert found.gaps == [(pytest.approx(0.55), pytest.approx(3.25))]
 
 
 def test_an_unsampled_well_is_said() -> None:
-    found = fitted(curve(Quantity.ENERGY, travel=TRAVEL[TRAVEL < 2.8]))
+    found = fitted(curve(CurveQuantity.ENERGY, travel=TRAVEL[TRAVEL < 2.8]))
     (said,) = found.warnings
     assert said.startswith("the inverted well is not sampled (travel up to 2.75 mm)")
     assert said.endswith("the fitted one, at 3.325 mm, is an extrapolation")
 
 
 def test_a_curve_before_its_barrier_says_so() -> None:
-    found = fitted(curve(Quantity.ENERGY, travel=TRAVEL[TRAVEL < 1.5]))
+    found = fitted(curve(CurveQuantity.ENERGY, travel=TRAVEL[TRAVEL < 1.5]))
     assert warned(found, "nothing is sampled beyond 1.45 mm: the barrier of the fitted law")
 
 
@@ -157,7 +161,7 @@ def test_a_curve_before_its_barrier_says_so() -> None:
     ("linearity", "said"), [(0.2, "not bistable"), (0.105, "hardly bistable"), (0.09, "")]
 )
 def test_a_law_without_second_well_is_said(linearity: float, said: str) -> None:
-    energies = law(TRAVEL, np.array([12.84, linearity, 3.5]), Quantity.ENERGY)
+    energies = law(TRAVEL, np.array([12.84, linearity, 3.5]), CurveQuantity.ENERGY)
     found = fitted(Record(TRAVEL, energy=energies))
     bistable = [text for text in found.warnings if "bistable" in text]
     assert bool(bistable) == bool(said)
@@ -170,7 +174,7 @@ def test_standard_errors_of_a_work_are_those_of_its_errors_added_up(by: str, los
     """Drawn at random: forces, or pressures, have independent errors, and work has their sums."""
     random, area = np.random.default_rng(1), 30.0
     travel = np.linspace(0.0, 4.2, 101)
-    force = law(travel, TRUE, Quantity.FORCE)
+    force = law(travel, TRUE, CurveQuantity.FORCE)
     deviations = []
     for _ in range(40):
         push = force + random.normal(0.0, 0.005 * force.max(), len(travel))
@@ -179,7 +183,7 @@ def test_standard_errors_of_a_work_are_those_of_its_errors_added_up(by: str, los
             if by == "force"
             else Record(travel, pressure=push / area, volume=area * travel)
         )
-        found = fitted(record, Quantity.WORK, loss=loss)
+        found = fitted(record, CurveQuantity.WORK, loss=loss)
         assert not warned(found, "neighboring residuals"), "noise that is added up is no misfit"
         deviations.append((found.fit.values - TRUE) / found.fit.standard_errors)
     spread = np.sqrt((np.array(deviations) ** 2).mean(axis=0))
@@ -187,15 +191,15 @@ def test_standard_errors_of_a_work_are_those_of_its_errors_added_up(by: str, los
 
 
 def test_another_shape_of_a_work_is_said_and_intervals_are_too_narrow() -> None:
-    force = law(TRAVEL, TRUE, Quantity.FORCE) + 5.0 * np.sin(2.0 * TRAVEL)
-    found = fitted(Record(TRAVEL, force=force), Quantity.WORK, resamples=20)
+    force = law(TRAVEL, TRUE, CurveQuantity.FORCE) + 5.0 * np.sin(2.0 * TRAVEL)
+    found = fitted(Record(TRAVEL, force=force), CurveQuantity.WORK, resamples=20)
     assert warned(found, "neighboring residuals are alike")
     assert warned(found, "bootstrap: errors of a work add up")
-    assert not warned(fitted(curve(Quantity.ENERGY, 0), resamples=20), "bootstrap: errors")
+    assert not warned(fitted(curve(CurveQuantity.ENERGY, 0), resamples=20), "bootstrap: errors")
 
 
 def test_a_value_at_its_bound_is_said() -> None:
-    energies = law(TRAVEL, np.array([12.84, -0.05, 3.5]), Quantity.ENERGY)
+    energies = law(TRAVEL, np.array([12.84, -0.05, 3.5]), CurveQuantity.ENERGY)
     found = fitted(Record(TRAVEL, energy=energies))
     assert warned(found, "force_linearity ended at its bound 0")
     assert found.fit.values[1] == 0.0
@@ -208,32 +212,32 @@ def test_another_shape_is_said() -> None:
 
 
 def test_the_curve_is_kept_for_a_tabulated_law() -> None:
-    found = fitted(curve(Quantity.ENERGY))
+    found = fitted(curve(CurveQuantity.ENERGY))
     assert found.curve is not None
     assert np.array_equal(found.curve[0], TRAVEL)
-    assert np.array_equal(found.curve[1], law(TRAVEL, TRUE, Quantity.ENERGY))
+    assert np.array_equal(found.curve[1], law(TRAVEL, TRUE, CurveQuantity.ENERGY))
 
 
 def test_the_curve_of_a_force_is_its_integral() -> None:
-    found = fitted(curve(Quantity.FORCE), Quantity.FORCE)
+    found = fitted(curve(CurveQuantity.FORCE), CurveQuantity.FORCE)
     assert found.curve is not None
-    assert found.curve[1] == pytest.approx(law(TRAVEL, TRUE, Quantity.ENERGY), abs=0.02)
+    assert found.curve[1] == pytest.approx(law(TRAVEL, TRUE, CurveQuantity.ENERGY), abs=0.02)
 
 
 def test_an_integral_begins_at_rest() -> None:
-    found = fitted(curve(Quantity.FORCE, travel=TRAVEL[2:]), Quantity.FORCE)
+    found = fitted(curve(CurveQuantity.FORCE, travel=TRAVEL[2:]), CurveQuantity.FORCE)
     assert found.curve is not None
-    assert found.curve[1] == pytest.approx(law(TRAVEL[2:], TRUE, Quantity.ENERGY), abs=0.03)
+    assert found.curve[1] == pytest.approx(law(TRAVEL[2:], TRUE, CurveQuantity.ENERGY), abs=0.03)
 
 
 def test_work_from_a_first_point_that_is_not_rest() -> None:
     fine = np.linspace(0.3, 4.2, 3001)
-    found = fitted(curve(Quantity.FORCE, travel=fine), Quantity.WORK)
+    found = fitted(curve(CurveQuantity.FORCE, travel=fine), CurveQuantity.WORK)
     assert found.fit.values == pytest.approx(TRUE, rel=0.02), "½ u F up to the first point"
 
 
 def test_what_is_before_the_first_point_is_not_known() -> None:
-    late = fitted(curve(Quantity.FORCE, travel=np.linspace(2.8, 4.2, 40)), Quantity.FORCE)
+    late = fitted(curve(CurveQuantity.FORCE, travel=np.linspace(2.8, 4.2, 40)), CurveQuantity.FORCE)
     assert late.gaps == [(0.0, 2.8)]
     assert late.curve is None
     assert warned(late, "no curve written: no work across 0 to 2.8 mm")
@@ -241,7 +245,7 @@ def test_what_is_before_the_first_point_is_not_known() -> None:
 
 
 def test_a_curve_of_few_points_is_not_written() -> None:
-    one = curve(Quantity.ENERGY, travel=np.array([3.0]))
+    one = curve(CurveQuantity.ENERGY, travel=np.array([3.0]))
     found = fitted(one, fixed={"stroke_mm": 3.5, "force_linearity": 0.043})
     assert found.fit.values[0] == pytest.approx(12.84)
     assert warned(found, "no curve written: expected 4 points or more, found 1")
@@ -249,7 +253,7 @@ def test_a_curve_of_few_points_is_not_written() -> None:
 
 def test_no_curve_where_the_force_is_not_known() -> None:
     ends = TRAVEL[(TRAVEL < 0.6) | (TRAVEL > 3.2)]
-    found = fitted(curve(Quantity.FORCE, travel=ends), Quantity.FORCE)
+    found = fitted(curve(CurveQuantity.FORCE, travel=ends), CurveQuantity.FORCE)
     assert found.curve is None
     assert warned(found, "no curve written: no work across 0.55 to 3.25 mm")
 
@@ -257,19 +261,21 @@ def test_no_curve_where_the_force_is_not_known() -> None:
 @pytest.mark.parametrize(
     ("data", "quantity", "opening", "said"),
     [
-        (curve(Quantity.ENERGY), Quantity.FORCE, EQUAL, "no force in the curve"),
-        (curve(Quantity.ENERGY), Quantity.WORK, EQUAL, "no work without"),
-        (Record(TRAVEL[:2], energy=TRAVEL[:2]), Quantity.ENERGY, EQUAL, "2 points for 3 free"),
-        (Record(TRAVEL, energy=-TRAVEL), Quantity.ENERGY, EQUAL, "is its sign the other way"),
+        (curve(CurveQuantity.ENERGY), CurveQuantity.FORCE, EQUAL, "no force in the curve"),
+        (curve(CurveQuantity.ENERGY), CurveQuantity.WORK, EQUAL, "no work without"),
+        (Record(TRAVEL[:2], energy=TRAVEL[:2]), CurveQuantity.ENERGY, EQUAL, "2 points for 3 free"),
+        (Record(TRAVEL, energy=-TRAVEL), CurveQuantity.ENERGY, EQUAL, "is its sign the other way"),
         (
-            curve(Quantity.ENERGY, travel=TRAVEL[:20]),
-            Quantity.ENERGY,
+            curve(CurveQuantity.ENERGY, travel=TRAVEL[:20]),
+            CurveQuantity.ENERGY,
             Opening(Rule.STROKE, 3.5),
             "does not show where the inverted dome rests",
         ),
     ],
 )
-def test_fits_that_cannot_be(data: Record, quantity: Quantity, opening: Opening, said: str) -> None:
+def test_fits_that_cannot_be(
+    data: Record, quantity: CurveQuantity, opening: Opening, said: str
+) -> None:
     with pytest.raises(FitError, match=said):
         fitted(data, quantity, opening=opening)
 
@@ -310,9 +316,11 @@ def test_its_quasi_static_pieces_are_near_the_static_dome() -> None:
     assert found.curve is not None
 
 
-@pytest.mark.parametrize("quantity", [Quantity.ENERGY, Quantity.FORCE])
+@pytest.mark.parametrize("quantity", [CurveQuantity.ENERGY, CurveQuantity.FORCE])
 @pytest.mark.parametrize("largest", [3.6, 4.2, 9.0, 12.0])
-def test_a_well_is_found_however_far_the_travel_goes_on(quantity: Quantity, largest: float) -> None:
+def test_a_well_is_found_however_far_the_travel_goes_on(
+    quantity: CurveQuantity, largest: float
+) -> None:
     found = fitted(curve(quantity, 0, np.linspace(0.0, largest, 300)), quantity)
     assert found.well == pytest.approx(3.325, abs=0.05)
     assert not warned(found, "the inverted well")
@@ -320,13 +328,13 @@ def test_a_well_is_found_however_far_the_travel_goes_on(quantity: Quantity, larg
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_on_the_way_to_the_barrier_is_no_well(seed: int) -> None:
-    found = fitted(curve(Quantity.ENERGY, seed, np.linspace(0.0, 2.6, 300)))
+    found = fitted(curve(CurveQuantity.ENERGY, seed, np.linspace(0.0, 2.6, 300)))
     assert found.well is None
     assert warned(found, "the inverted well is not sampled (travel up to 2.6 mm)")
 
 
 def test_a_well_within_the_data_is_no_extrapolation() -> None:
-    found = fitted(curve(Quantity.ENERGY, travel=np.linspace(0.0, 4.2, 10)))
+    found = fitted(curve(CurveQuantity.ENERGY, travel=np.linspace(0.0, 4.2, 10)))
     assert found.well is None, "three points are near it"
     (said,) = found.warnings
     assert said.startswith("the data alone do not show where the inverted dome rests")
@@ -334,7 +342,7 @@ def test_a_well_within_the_data_is_no_extrapolation() -> None:
 
 
 def test_a_well_in_a_gap_is_an_extrapolation() -> None:
-    found = fitted(curve(Quantity.ENERGY, travel=TRAVEL[(TRAVEL < 2.8) | (TRAVEL > 3.9)]))
+    found = fitted(curve(CurveQuantity.ENERGY, travel=TRAVEL[(TRAVEL < 2.8) | (TRAVEL > 3.9)]))
     assert warned(found, "the inverted well is not sampled (nothing from 2.75 to 3.9 mm)")
 
 
@@ -342,8 +350,8 @@ def test_a_linearity_of_zero_that_is_found_to_rounding_is_zero() -> None:
     fits = []
     for n_points in range(6, 40):
         opening = np.linspace(0.0, 4.2, n_points)
-        force = law(opening, np.array([12.84, 0.0, 3.5]), Quantity.FORCE)
-        fits.append(fitted(Record(opening, force=force), Quantity.FORCE).fit)
+        force = law(opening, np.array([12.84, 0.0, 3.5]), CurveQuantity.FORCE)
+        fits.append(fitted(Record(opening, force=force), CurveQuantity.FORCE).fit)
     assert any(0.0 < fit.values[1] < 1e-12 for fit in fits), "no case of the kind"
     for fit in fits:
         linearity = values_of(fit, only_free=False).force_linearity

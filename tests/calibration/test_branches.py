@@ -6,24 +6,24 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import BistableFit, BistableOptions, fit_bistable, law
 from dpgcli.calibration.branches import turns, ways
-from dpgcli.calibration.choices import Branches, Quantity, Rule
-from dpgcli.calibration.opening import Opening
+from dpgcli.calibration.choices import Branches, CurveQuantity, Rule
+from dpgcli.calibration.opening import OpeningRule
 from dpgcli.calibration.record import Record
 from dpgcli.errors import FitError
 
 TRUE = np.array([12.84, 0.043, 3.5])
 UP = np.linspace(0.0, 4.2, 200)
 BOTH = np.concatenate((UP, UP[::-1]))
-EQUAL = Opening(Rule.EQUAL)
+EQUAL = OpeningRule(Rule.EQUAL)
 
 
 def force(travel: Array, size: float = 1.0, seed: int = 0) -> Array:
     noise = np.random.default_rng(seed).normal(0.0, 0.02, len(travel))
-    return size * law(travel, TRUE, Quantity.FORCE) + noise
+    return size * law(travel, TRUE, CurveQuantity.FORCE) + noise
 
 
 def fitted(record: Record, branches: Branches | None = None, **options: object) -> BistableFit:
-    choice = BistableOptions(EQUAL, Quantity.FORCE, branches=branches, **options)  # type: ignore[arg-type]
+    choice = BistableOptions(EQUAL, CurveQuantity.FORCE, branches=branches, **options)  # type: ignore[arg-type]
     return fit_bistable(record, choice)
 
 

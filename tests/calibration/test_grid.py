@@ -7,7 +7,7 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import GridMethod
-from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.errors import FitError
 from dpgcli.files.measured import read_table
 
@@ -22,15 +22,17 @@ def power(geometry: Array) -> Array:
     return np.asarray(3.0 * geometry[:, 0] ** 1.75 * geometry[:, 1] ** 2.8)
 
 
-def points(geometry: Array = GEOMETRY, noise: float = 0.0, seed: int = 0) -> Points:
+def points(geometry: Array = GEOMETRY, noise: float = 0.0, seed: int = 0) -> GridPoints:
     scatter = np.random.default_rng(seed).normal(0.0, noise, len(geometry))
-    return Points(OVER, geometry, {"energy": power(geometry) * np.exp(scatter)})
+    return GridPoints(OVER, geometry, {"energy": power(geometry) * np.exp(scatter)})
 
 
 def test_the_finite_element_domes_scale_as_stated() -> None:
     """Inverted energy as t^2.8 h^1.75, limit pressure as t^2.5 h^1.2, well position as h."""
     table = read_table(DATA)
-    law = GridLaw(GridMethod.SCALING, Points(table.over, table.geometry, table.quantities))
+    law = FittedGridLaw(
+        GridMethod.SCALING, GridPoints(table.over, table.geometry, table.quantities)
+    )
     assert table.over == OVER
     energy, pressure = law.scaling("inverted_energy_mJ"), law.scaling("limit_pressure_MPa")
     assert energy.values[1:] == pytest.approx([1.75, 2.8], abs=0.02)
@@ -45,7 +47,7 @@ def test_the_finite_element_domes_scale_as_stated() -> None:
 @pytest.mark.parametrize("method", list(GridMethod))
 @pytest.mark.parametrize("kept", [slice(None), slice(1, None)], ids=["grid", "scattered"])
 def test_products_of_powers_are_exact(method: GridMethod, kept: slice) -> None:
-    law = GridLaw(method, points(GEOMETRY[kept]))
+    law = FittedGridLaw(method, points(GEOMETRY[kept]))
     found = law.at("energy", BETWEEN)
     assert found.value == pytest.approx(power(BETWEEN), rel=1e-9)
     assert found.is_inside.tolist() == [True, True]
@@ -55,16 +57,18 @@ def test_products_of_powers_are_exact(method: GridMethod, kept: slice) -> None:
 @pytest.mark.parametrize("kept", [slice(None), slice(1, None)], ids=["grid", "scattered"])
 def test_an_interpolation_meets_its_points(kept: slice) -> None:
     known = points(GEOMETRY[kept], noise=0.2)
-    found = GridLaw(GridMethod.INTERPOLATION, known).at("energy", known.geometry)
+    found = FittedGridLaw(GridMethod.INTERPOLATION, known).at("energy", known.geometry)
     assert found.value == pytest.approx(known.quantities["energy"], rel=1e-9)
     assert found.is_inside.all(), "corners and edges are inside"
 
 
 def test_the_order_of_the_points_does_not_matter() -> None:
     known, shuffled = points(noise=0.2), np.random.default_rng(1).permutation(12)
-    mixed = Points(OVER, GEOMETRY[shuffled], {"energy": known.quantities["energy"][shuffled]})
+    mixed = GridPoints(OVER, GEOMETRY[shuffled], {"energy": known.quantities["energy"][shuffled]})
     for method in GridMethod:
-        first, second = (GridLaw(method, p).at("energy", BETWEEN).value for p in (known, mixed))
+        first, second = (
+            FittedGridLaw(method, p).at("energy", BETWEEN).value for p in (known, mixed)
+        )
         assert first == pytest.approx(second, rel=1e-9)
 
 
@@ -74,7 +78,7 @@ def test_stated_errors_are_the_scatter_of_one_more_point() -> None:
     truth, noise = np.log(power(BETWEEN)), 0.05
     more = np.random.default_rng(99).normal(0.0, noise, (300, 2))
     found = [
-        GridLaw(GridMethod.SCALING, points(noise=noise, seed=s)).at("energy", BETWEEN)
+        FittedGridLaw(GridMethod.SCALING, points(noise=noise, seed=s)).at("energy", BETWEEN)
         for s in range(300)
     ]
     errors = np.array([np.log(f.value) for f in found]) - truth - more
@@ -84,7 +88,7 @@ def test_stated_errors_are_the_scatter_of_one_more_point() -> None:
 
 def test_leaving_one_out_predicts_it_from_the_others() -> None:
     known = points(noise=0.1)
-    law = GridLaw(GridMethod.SCALING, known)
+    law = FittedGridLaw(GridMethod.SCALING, known)
     design = np.concatenate((np.ones((12, 1)), np.log(GEOMETRY)), axis=1)
     hat = design @ np.linalg.solve(design.T @ design, design.T)
     residual = -law.scaling("energy").residuals / (1.0 - np.diag(hat))  # known less predicted
@@ -116,7 +120,9 @@ def test_the_hull_is_not_the_box() -> None:
 
 
 def test_one_key_has_a_range() -> None:
-    line = Points(("dome_height_mm",), np.array([[4.0], [5.0], [7.0]]), {"stroke_mm": np.ones(3)})
+    line = GridPoints(
+        ("dome_height_mm",), np.array([[4.0], [5.0], [7.0]]), {"stroke_mm": np.ones(3)}
+    )
     assert line.are_inside(np.array([[4.0], [6.0], [7.5]])).tolist() == [True, True, False]
 
 
@@ -125,11 +131,11 @@ def test_points_on_a_line_cannot_tell_two_keys_apart(method: GridMethod) -> None
     heights = np.array([4.0, 5.0, 6.0, 7.0])
     line = np.stack((heights, 0.1 * heights), axis=1)
     with pytest.raises(FitError, match="dome_thickness_mm"):
-        GridLaw(method, points(line)).at("energy", BETWEEN)
+        FittedGridLaw(method, points(line)).at("energy", BETWEEN)
 
 
 def test_too_few_points_for_errors() -> None:
-    few = GridLaw(GridMethod.SCALING, points(GEOMETRY[[0, 1, 4]]))
+    few = FittedGridLaw(GridMethod.SCALING, points(GEOMETRY[[0, 1, 4]]))
     found = few.at("energy", BETWEEN)
     assert found.value == pytest.approx(power(BETWEEN))
     assert np.isnan(found.relative_error).all()
@@ -138,4 +144,4 @@ def test_too_few_points_for_errors() -> None:
 
 def test_only_positive_points() -> None:
     with pytest.raises(ValueError, match="positive"):
-        Points(OVER, GEOMETRY, {"energy": -power(GEOMETRY)})
+        GridPoints(OVER, GEOMETRY, {"energy": -power(GEOMETRY)})

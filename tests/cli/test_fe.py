@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
+from dpgcli.calibration.fe.hinge import HingeChambers, chamber_bricks
 from dpgcli.cli.exits import ExitCode
 
 needs_solver = pytest.mark.skipif(shutil.which("ccx") is None, reason="needs calculix-ccx")
@@ -43,7 +43,7 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
 
 def prepared(folder: Path, n_rows: int | None = None) -> None:
     """What a good solver would print about chambers that turn by 0.1 rad at the whole moment."""
-    nodes = chamber_bricks(Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0), 1).nodes
+    nodes = chamber_bricks(HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0), 1).nodes
     cos, sin = np.cos(0.1), np.sin(0.1)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     moved = np.where(nodes[:, :1] > 12.25, nodes @ turn - nodes, 0.0)
@@ -160,7 +160,7 @@ def test_states_of_a_finger_are_data_to_compare_with(call: Any, folder: Path, fa
     from dpgcli.calibration.fe.models import PUSHED_CELLS
     from dpgcli.calibration.fe.pushed import pushed_bricks
 
-    chambers = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+    chambers = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
     nodes = pushed_bricks(chambers, PUSHED_CELLS["coarse"], 4).nodes
     moved = np.where(nodes[:, :1] > 39.0, [3.45, -0.5, 0.0], 0.0)
     write_displacements(folder / "prepared.dat", moved)

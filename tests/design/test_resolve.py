@@ -8,7 +8,7 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.choices import GridMethod
-from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.design.calibrations import PUBLISHED, Calibration, DomeCurve, Fitted, Grid
 from dpgcli.design.dimensions import Design, GivenValues, are_possible
 from dpgcli.design.resolve import Resolution, resolve
@@ -40,7 +40,7 @@ def grid(method: GridMethod, *, is_regular: bool) -> Calibration:
     if not is_regular:
         geometry = geometry + np.random.default_rng(3).uniform(-0.04, 0.04, geometry.shape)
     stiffness = 12.0 * geometry[:, 1] ** 2 * (1.0 + 0.1 * np.sin(geometry[:, 0]))
-    law = GridLaw(method, Points(OVER, geometry, {STIFFNESS: stiffness}))
+    law = FittedGridLaw(method, GridPoints(OVER, geometry, {STIFFNESS: stiffness}))
     known = Grid(OVER, frozenset({STIFFNESS}), method is GridMethod.SCALING, law)
     return Calibration("grid.yaml", {}, {"elastic_modulus_MPa": 26.0}, grid=known)
 

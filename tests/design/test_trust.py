@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dpgcli.calibration.choices import GridMethod
-from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.design.calibrations import (
     PUBLISHED,
     Calibration,
@@ -331,7 +331,7 @@ def grid(method: GridMethod) -> Calibration:
     geometry = np.stack((heights, thicknesses), axis=1)
     values = 20.0 * thicknesses**2.8 * (1.0 + 0.01 * np.sin(heights))
     over, key = ("dome_height_mm", "dome_thickness_mm"), "bistable_stiffness_N_per_mm"
-    law = GridLaw(method, Points(over, geometry, {key: values}))
+    law = FittedGridLaw(method, GridPoints(over, geometry, {key: values}))
     found = Grid(over, frozenset({key}), method is GridMethod.SCALING, law)
     return Calibration("grid.yaml", {}, {"elastic_modulus_MPa": 26.0}, grid=found)
 

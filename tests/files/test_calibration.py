@@ -10,7 +10,7 @@ import pytest
 
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.fits import Parameter, fit_linear
-from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.design.outputs import Output
 from dpgcli.errors import OutputError, SpecError
 from dpgcli.files.calibration import (
@@ -394,7 +394,9 @@ def test_a_fit_is_written_and_read_back(path: Path) -> None:
 def test_a_grid_is_written_and_read_back(path: Path, method: GridMethod) -> None:
     geometry = np.array([[4.0, 0.5], [5.0, 0.5], [4.0, 1.0], [6.0, 1.0], [5.0, 0.8]])
     quantities = {"bistable_stiffness_N_per_mm": np.array([5.0, 4.8, 35.0, 31.0, 18.0])}
-    law = GridLaw(method, Points(("dome_height_mm", "dome_thickness_mm"), geometry, quantities))
+    law = FittedGridLaw(
+        method, GridPoints(("dome_height_mm", "dome_thickness_mm"), geometry, quantities)
+    )
     head = {"calibration_version": 1, "made_by": made_by(), "method": "test"}
     write_calibration(path, Calibration.model_validate({**head, "grid": grid_of(law)}))
     grid = read_calibration(path).grid

@@ -12,7 +12,7 @@ from dpgcli.cli.options import millimeters
 from dpgcli.errors import SpecError, UsageError
 from dpgcli.files.csv_file import Choice, read_sheet
 from dpgcli.files.layout import NUMBER, doubtful_point, is_number, marks_in, rows_in, separator_of
-from dpgcli.files.measured import CURVE, Measured, read_curve
+from dpgcli.files.measured import CURVE, MeasuredCurve, read_curve
 from dpgcli.files.units import FACTORS, OWN, factor_of
 
 NAMED = Choice({"travel_mm": "Ext", "force_N": "Load"})
@@ -21,14 +21,14 @@ ROWS = list(zip(TRAVEL, FORCE, strict=True))
 LONG = 40_000
 MANY = "9" * LONG
 UNITS = {"travel": "um", "force": "N"}
-Read = Callable[..., Measured]
+Read = Callable[..., MeasuredCurve]
 
 
 @pytest.fixture
 def read(tmp_path: Path) -> Read:
     """Read a curve from a text, or from bytes."""
 
-    def reading(content: str | bytes, choice: Choice = NAMED) -> Measured:
+    def reading(content: str | bytes, choice: Choice = NAMED) -> MeasuredCurve:
         path = tmp_path / "c.csv"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return read_curve(path, None, choice)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from dpgcli.reports.labels import spread
-from dpgcli.reports.panels import DIMENSION, PAGE, Grid, Window
+from dpgcli.reports.panels import DIMENSION, PAGE, PanelGrid, Window
 
 ASPECTS = some.floats(1.0 / 6.0, 6.0)
 
@@ -15,7 +15,7 @@ ASPECTS = some.floats(1.0 / 6.0, 6.0)
 def test_panels_lie_on_the_page_side_by_side(
     n_panels: int, n_digits: int, aspect: float, dimension: float
 ) -> None:
-    grid = Grid.of(n_panels, n_digits, Window(0.0, 60.0, 0.0, 60.0 * aspect), dimension)
+    grid = PanelGrid.of(n_panels, n_digits, Window(0.0, 60.0, 0.0, 60.0 * aspect), dimension)
     assert grid.page[0] <= PAGE[0] + 1e-9
     boxes = np.array([grid.box(place) for place in range(n_panels)])
     low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
@@ -29,20 +29,20 @@ def test_shapes_are_drawn_at_one_scale_in_both_directions(
     n_panels: int, aspect: float, dimension: float
 ) -> None:
     window = Window(-5.0, 55.0, -30.0, 60.0 * aspect - 30.0)
-    grid = Grid.of(n_panels, 5, window, dimension)
+    grid = PanelGrid.of(n_panels, 5, window, dimension)
     assert grid.shape_width / grid.shape_height == pytest.approx(1.0 / aspect)
     assert grid.shape_width > 0.15
 
 
 def test_titles_of_several_lines_have_room_above_their_panels() -> None:
-    grid = Grid.of(64, 64, Window(0.0, 600.0, 0.0, 100.0))
+    grid = PanelGrid.of(64, 64, Window(0.0, 600.0, 0.0, 100.0))
     assert grid.n_title_lines > 2
     above = grid.box(0)[1] - (grid.box(grid.n_columns)[1] + grid.box(grid.n_columns)[3])
     assert above * grid.page[1] > 0.11 * grid.n_title_lines
 
 
 def test_outer_panels_are_those_without_a_neighbor() -> None:
-    grid = Grid(n_panels=5, n_digits=3, n_columns=3, shape_width=1.0, shape_height=1.0)
+    grid = PanelGrid(n_panels=5, n_digits=3, n_columns=3, shape_width=1.0, shape_height=1.0)
     assert [grid.is_outer(place) for place in range(5)] == [
         (True, False),
         (False, False),

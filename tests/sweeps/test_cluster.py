@@ -7,7 +7,7 @@ import pytest
 from dpgcli.api.sweep import Place
 from dpgcli.errors import NoWorkerError, UsageError
 from dpgcli.sweeps import cluster
-from dpgcli.sweeps.cluster import Watch, check_address, dask_cluster
+from dpgcli.sweeps.cluster import WorkerWatch, check_address, dask_cluster
 
 
 class Scene:
@@ -17,7 +17,7 @@ class Scene:
         self.now, self.n_workers = 1000.0, 2
         self.said: list[str] = []
         monkeypatch.setattr(cluster, "monotonic", lambda: self.now)
-        self.watch = Watch("Dask", lambda: self.n_workers, limit, self.said.append, self.now)
+        self.watch = WorkerWatch("Dask", lambda: self.n_workers, limit, self.said.append, self.now)
 
     def wait(self, seconds: int) -> None:
         """Look once a second while nothing comes back."""

@@ -28,15 +28,15 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.calibration import bistable
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
-from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, Loss, Quantity
-from dpgcli.calibration.opening import Opening
+from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, CurveQuantity, Loss
+from dpgcli.calibration.opening import OpeningRule
 from dpgcli.calibration.record import Record
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import bistable_method, curve_of, fitted
 from dpgcli.files.csv_file import Tabular, name_of
-from dpgcli.files.measured import Measured, read_curve
+from dpgcli.files.measured import MeasuredCurve, read_curve
 from dpgcli.files.sections import Geometry
 from dpgcli.reports.fit_figures import bistable_figure, draw_fit
 from dpgcli.reports.fits import bistable_summary, value_rows
@@ -46,7 +46,7 @@ from dpgcli.text import quoted
 def fit_bistable(
     curve: Tabular,
     *,
-    travel_to_opening: str | Opening,
+    travel_to_opening: str | OpeningRule,
     quantity: str | None = None,
     area: float | None = None,
     branches: str | None = None,
@@ -107,7 +107,7 @@ def _result(
     found: BistableFit,
     choice: BistableOptions,
     where: Geometry | None,
-    measured: Measured,
+    measured: MeasuredCurve,
     name: str,
     files: tuple[Path, ...],
 ) -> FitResult[BistableFit]:
@@ -128,10 +128,10 @@ def _result(
     )
 
 
-def _opening(said: str | Opening) -> Opening:
-    if isinstance(said, Opening):
+def _opening(said: str | OpeningRule) -> OpeningRule:
+    if isinstance(said, OpeningRule):
         return said
-    return Opening.of(said if isinstance(said, str) else quoted(said))
+    return OpeningRule.of(said if isinstance(said, str) else quoted(said))
 
 
 def limits_of(key: str) -> tuple[float, float]:
@@ -165,22 +165,22 @@ def _held(fix: Mapping[str, float] | None, free: Sequence[str] | None) -> dict[s
     return {key: float(value) for key, value in fix.items()}
 
 
-def _quantity(record: Record, asked: str | None) -> Quantity:
+def _quantity(record: Record, asked: str | None) -> CurveQuantity:
     """The quantity to fit: the one asked for, or the first that the curve has."""
-    has = [q for q in Quantity if getattr(record, q.value, None) is not None]
+    has = [q for q in CurveQuantity if getattr(record, q.value, None) is not None]
     if asked is None:
         return has[0]
-    quantity = chosen(Quantity, "quantity", asked)
-    if quantity is not Quantity.WORK and quantity not in has:
+    quantity = chosen(CurveQuantity, "quantity", asked)
+    if quantity is not CurveQuantity.WORK and quantity not in has:
         raise UsageError(Field("quantity"), f" {quantity}: the curve has {', '.join(has)}")
     return quantity
 
 
-def _area(quantity: Quantity, area: float | None) -> float:
-    if quantity is Quantity.PRESSURE and area is None:
+def _area(quantity: CurveQuantity, area: float | None) -> float:
+    if quantity is CurveQuantity.PRESSURE and area is None:
         what = " MM2, the effective area A in F = p A"
         raise UsageError("pressure needs ", Field("area"), what)
-    if quantity is not Quantity.PRESSURE and area is not None:
+    if quantity is not CurveQuantity.PRESSURE and area is not None:
         raise UsageError(Field("area"), f" is for pressure; the fit is to the {quantity}")
     check_positive("area", area)
     return float("nan") if area is None else area

@@ -15,7 +15,7 @@ from dpgcli.api.fits.result import (
 )
 from dpgcli.api.inputs import chosen, files_of
 from dpgcli.calibration.choices import GridMethod
-from dpgcli.calibration.grid import GridLaw, Points
+from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import grid_doubts, grid_of
@@ -30,7 +30,7 @@ def fit_grid(
     method: str = "scaling",
     geometry: GeometryInput = None,
     spec: str | Path | Mapping[str, Any] | None = None,
-) -> FitResult[GridLaw]:
+) -> FitResult[FittedGridLaw]:
     """Fit quantities over geometries, by products of powers or an "interpolation".
 
     `table` has columns that are keys of the geometry, and positive quantities. Its result's
@@ -48,7 +48,7 @@ def fit_grid(
     _check_apart(texts, (*read.over, *read.constant))
     shared = sizes(geometry_from(texts, spec))
     way = chosen(GridMethod, "method", method)
-    law = GridLaw(way, Points(read.over, read.geometry, read.quantities))
+    law = FittedGridLaw(way, GridPoints(read.over, read.geometry, read.quantities))
     for key in read.quantities:
         law.at(key, law.points.reference[None])  # a spec will ask for no less
     elsewhere = {key: value for key, value in shared.items() if key not in read.over}

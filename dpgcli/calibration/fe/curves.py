@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.fe.bricks import Bricks
-from dpgcli.calibration.fe.decks import Pulse
+from dpgcli.calibration.fe.decks import PressurePulse
 from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import strain_energy, swept_volume
-from dpgcli.calibration.fe.hinge import Chambers, chamber_turn, couple, moment
+from dpgcli.calibration.fe.hinge import HingeChambers, chamber_turn, couple, moment
 from dpgcli.calibration.fe.pushed import Push, floor_angle, lever, opening
-from dpgcli.calibration.fe.pushed_deck import Step
+from dpgcli.calibration.fe.pushed_deck import DeckStep
 from dpgcli.errors import SolverError
 
 
-class DomeCurve(NamedTuple):
+class PressedDomeCurve(NamedTuple):
     """The way of a dome's pole towards inversion; the first row is the dome at rest."""
 
     pole_travel_mm: Array
@@ -49,16 +49,16 @@ class UnitCurve(NamedTuple):
     push_N: Array
 
 
-Curve = DomeCurve | HingeCurve | UnitCurve | Columns
+Curve = PressedDomeCurve | HingeCurve | UnitCurve | Columns
 
 
 def dome_curve(
-    dome: DomeShape, mesh: DomeMesh, loading: Pulse, time: Array, displacements: Array
-) -> DomeCurve:
+    dome: DomeShape, mesh: DomeMesh, loading: PressurePulse, time: Array, displacements: Array
+) -> PressedDomeCurve:
     """The curve of a dynamic run: times (k,) in s, displacements (k, n, 3) in mm."""
     time = np.concatenate([[0.0], time])
     moved = _from_rest(displacements)[..., :2]
-    return DomeCurve(
+    return PressedDomeCurve(
         pole_travel_mm=-moved[:, mesh.pole, 1] + 0.0,
         energy_mJ=strain_energy(dome, mesh, moved),
         pressure_MPa=loading.pressure(time),
@@ -68,7 +68,7 @@ def dome_curve(
 
 
 def hinge_curve(
-    chambers: Chambers, mesh: Bricks, largest_moment: float, time: Array, displacements: Array
+    chambers: HingeChambers, mesh: Bricks, largest_moment: float, time: Array, displacements: Array
 ) -> HingeCurve:
     """The curve of a static run: shares (k,) of the load, displacements (k, n, 3) in mm."""
     share = np.concatenate([[0.0], time])
@@ -81,7 +81,11 @@ def hinge_curve(
 
 
 def unit_curve(
-    chambers: Chambers, mesh: Bricks, push: Push, steps: Sequence[Step], displacements: Array
+    chambers: HingeChambers,
+    mesh: Bricks,
+    push: Push,
+    steps: Sequence[DeckStep],
+    displacements: Array,
 ) -> UnitCurve:
     """The curve of a unit from displacements (k, n, 3) in mm at the end of each step.
 
@@ -143,7 +147,7 @@ def unit_stiffness(curve: UnitCurve, lever: float) -> UnitStiffness:
     )
 
 
-def unit_finding(chambers: Chambers, curve: UnitCurve) -> str:
+def unit_finding(chambers: HingeChambers, curve: UnitCurve) -> str:
     """Opening, push, rotation and what follows from them; doubts, if any; in one line."""
     found = unit_stiffness(curve, lever(chambers))
     closes = curve.opening_mm.min() <= -chambers.separation
@@ -160,7 +164,7 @@ def unit_finding(chambers: Chambers, curve: UnitCurve) -> str:
     )
 
 
-def dome_finding(dome: DomeShape, curve: DomeCurve) -> str:
+def dome_finding(dome: DomeShape, curve: PressedDomeCurve) -> str:
     """A sentence on the dome's snap, if any, and its rest at the end."""
     inverted = curve.pole_travel_mm > dome.height  # the pole beyond the plane of the base
     if not inverted.any():

@@ -17,7 +17,7 @@ from dpgcli.calibration.fe.cards import (
 )
 from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import moduli
-from dpgcli.calibration.fe.hinge import Chambers, couple, layer_end, on_plane
+from dpgcli.calibration.fe.hinge import HingeChambers, couple, layer_end, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS
 
 DENSITY = 1.2e-9
@@ -31,7 +31,7 @@ MOMENT_STEPS = 5
 
 
 @dataclass(frozen=True)
-class Pulse:
+class PressurePulse:
     """Pressure over time: up to the peak (MPa), a while there, down to zero; a period is in s."""
 
     peak: float
@@ -46,20 +46,20 @@ class Pulse:
     def pressure(self, time: Array) -> Array:
         """Pressure in MPa at times in s.
 
-        >>> Pulse(peak=2.0, period=1.0).pressure(np.array([95.0, 200.0, 310.0])).tolist()
+        >>> PressurePulse(peak=2.0, period=1.0).pressure(np.array([95.0, 200.0, 310.0])).tolist()
         [1.0, 2.0, 0.0]
         """
         return np.interp(time, (0.0, *self.corners), (0.0, self.peak, self.peak, 0.0))
 
 
-def pulse(dome: DomeShape, peak: float) -> Pulse:
+def pulse(dome: DomeShape, peak: float) -> PressurePulse:
     """A pulse slow beside the dome's vibrations, whose periods go as a^2/t sqrt(rho/E)."""
     radius = dome.base_diameter / 2
     speed = np.sqrt(dome.elastic_modulus / DENSITY)
-    return Pulse(peak, float(radius**2 / (dome.thickness * speed)))
+    return PressurePulse(peak, float(radius**2 / (dome.thickness * speed)))
 
 
-def dome_deck(dome: DomeShape, mesh: DomeMesh, loading: Pulse, words: Sequence[str]) -> str:
+def dome_deck(dome: DomeShape, mesh: DomeMesh, loading: PressurePulse, words: Sequence[str]) -> str:
     """The deck of a dome that pressure on its convex side inverts: implicit dynamics.
 
     `words` become its comments.
@@ -101,7 +101,7 @@ def dome_words(dome: DomeShape) -> tuple[str, ...]:
     )
 
 
-def pulse_words(loading: Pulse) -> tuple[str, ...]:
+def pulse_words(loading: PressurePulse) -> tuple[str, ...]:
     """A description of a dome's loading in words."""
     ramp, hold, release = np.diff((0.0, *loading.corners))
     return (
@@ -113,7 +113,7 @@ def pulse_words(loading: Pulse) -> tuple[str, ...]:
 
 
 def hinge_deck(
-    chambers: Chambers, mesh: Bricks, largest_moment: float, words: Sequence[str]
+    chambers: HingeChambers, mesh: Bricks, largest_moment: float, words: Sequence[str]
 ) -> str:
     """The deck of two chambers that a moment turns against each other: statics.
 
@@ -138,7 +138,7 @@ def hinge_deck(
     return "\n".join(lines) + "\n"
 
 
-def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
+def hinge_words(chambers: HingeChambers, largest_moment: float) -> tuple[str, ...]:
     """A description of a hinge's model in words."""
     return (
         "2 hollow chambers on a limiting layer, half of them (z = 0 is a plane of "
@@ -153,7 +153,7 @@ def hinge_words(chambers: Chambers, largest_moment: float) -> tuple[str, ...]:
     )
 
 
-def _pulse_lines(loading: Pulse) -> Iterator[str]:
+def _pulse_lines(loading: PressurePulse) -> Iterator[str]:
     times = (0.0, *loading.corners)
     for time, pressure in zip(times, loading.pressure(np.array(times)), strict=True):
         yield f"{digits(time)}, {digits(pressure)}"

@@ -6,9 +6,9 @@ import numpy as np
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.fe.bricks import Bricks
-from dpgcli.calibration.fe.hinge import Chambers, on_plane
+from dpgcli.calibration.fe.hinge import HingeChambers, on_plane
 from dpgcli.calibration.fe.pushed import Push, floor_angle, opening
-from dpgcli.calibration.fe.pushed_deck import Step
+from dpgcli.calibration.fe.pushed_deck import DeckStep
 from dpgcli.states.patterns import texts
 
 
@@ -22,7 +22,11 @@ def in_gray_order(patterns: Sequence[tuple[bool, ...]]) -> list[tuple[bool, ...]
 
 
 def finger_states(
-    chambers: Chambers, mesh: Bricks, push: Push, steps: Sequence[Step], displacements: Array
+    chambers: HingeChambers,
+    mesh: Bricks,
+    push: Push,
+    steps: Sequence[DeckStep],
+    displacements: Array,
 ) -> Columns:
     """States by pattern, first the gap nearest the clamp, from displacements (k, n, 3) in mm.
 
@@ -58,7 +62,7 @@ def with_seconds(states: Columns, seconds: float) -> Columns:
     return states | {"seconds": np.full(count, seconds / count)}
 
 
-def frame_words(chambers: Chambers) -> tuple[str, ...]:
+def frame_words(chambers: HingeChambers) -> tuple[str, ...]:
     """Where the lattice's stations lie in these states: at mid-chamber, on the layer's middle."""
     along, up = chambers.outer_length / 2, chambers.layer_thickness / 2
     return (f"first_station_mm: {along:g}, {up:g}", f"tip_offset_mm: {along:g}, {-up:g}")

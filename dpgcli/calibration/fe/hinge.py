@@ -11,7 +11,7 @@ from dpgcli.design.geometry import WALL_THICKNESS
 
 
 @dataclass(frozen=True)
-class Chambers:
+class HingeChambers:
     """Two chambers on a limiting layer, halved by the plane of symmetry z = 0; mm, MPa.
 
     Along x a chamber is a wall, its inner length and a lid as thick as the dome that it stands
@@ -41,14 +41,14 @@ class Chambers:
         return number * self.pitch + self.outer_length / 2
 
 
-def chamber_bricks(chambers: Chambers, density: int) -> Bricks:
+def chamber_bricks(chambers: HingeChambers, density: int) -> Bricks:
     """The mesh: one brick through walls, lid and layer, `density` along a gap or half a chamber."""
     lines = _lines(chambers, density)
     x, y, z = np.meshgrid(*((line[1:] + line[:-1]) / 2 for line in lines), indexing="ij")
     return bricks(lines, is_solid(chambers, x, y, z))
 
 
-def _lines(chambers: Chambers, density: int) -> tuple[Array, Array, Array]:
+def _lines(chambers: HingeChambers, density: int) -> tuple[Array, Array, Array]:
     """Lines of the grid along x, y and z: every face of the chambers, and their middles."""
     wall, inner, outer = WALL_THICKNESS, chambers.length, chambers.outer_length
     starts = np.array([0.0, chambers.pitch])
@@ -62,7 +62,7 @@ def _lines(chambers: Chambers, density: int) -> tuple[Array, Array, Array]:
     )
 
 
-def is_solid(chambers: Chambers, x: Array, y: Array, z: Array) -> Flags:
+def is_solid(chambers: HingeChambers, x: Array, y: Array, z: Array) -> Flags:
     """Flags of the points within walls, lids and layer, of chambers however many."""
     within = x % chambers.pitch
     top = chambers.layer_thickness + chambers.width
@@ -83,13 +83,13 @@ def on_plane(mesh: Bricks, axis: int, place: float) -> Flags:
     return np.abs(mesh.nodes[:, axis] - place) < 1e-9 * span
 
 
-def layer_end(chambers: Chambers, mesh: Bricks, place: float) -> Flags:
+def layer_end(chambers: HingeChambers, mesh: Bricks, place: float) -> Flags:
     """Flags of the nodes on a face across the limiting layer."""
     is_layer = mesh.nodes[:, 1] < (1 + 1e-9) * chambers.layer_thickness
     return on_plane(mesh, 0, place) & is_layer
 
 
-def couple(chambers: Chambers, mesh: Bricks) -> Array:
+def couple(chambers: HingeChambers, mesh: Bricks) -> Array:
     """Forces along x (n,) in N on the free end of the layer that make a moment of 1 N mm."""
     return end_couple(mesh, layer_end(chambers, mesh, mesh.nodes[:, 0].max()))
 
@@ -123,7 +123,7 @@ def moment(mesh: Bricks, forces: Array, displacements: Array) -> Array:
     return np.asarray(2 * (height * forces).sum(axis=-1))
 
 
-def chamber_turn(chambers: Chambers, mesh: Bricks, displacements: Array, number: int) -> Array:
+def chamber_turn(chambers: HingeChambers, mesh: Bricks, displacements: Array, number: int) -> Array:
     """Rotation in rad, as gaps open, of the section through the middle of a chamber.
 
     The plane rotation that fits the displacements (..., n, 3) of its nodes best, by least squares.

@@ -33,9 +33,9 @@ from dpgcli.calibration.fe.finger import (
     frame_words,
     in_gray_order,
 )
-from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
-from dpgcli.calibration.fe.pushed import Cells, Push, pushed_bricks
-from dpgcli.calibration.fe.pushed_deck import Step, pushed_deck, pushed_words
+from dpgcli.calibration.fe.hinge import HingeChambers, chamber_bricks
+from dpgcli.calibration.fe.pushed import MeshCells, Push, pushed_bricks
+from dpgcli.calibration.fe.pushed_deck import DeckStep, pushed_deck, pushed_words
 from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import SolverError
 
@@ -46,9 +46,9 @@ CHAMBER_CELLS = {"coarse": 1, "medium": 2, "fine": 4}
 """Cells along a gap and half a chamber; twice as many across."""
 
 PUSHED_CELLS = {
-    "coarse": Cells(chamber=2, gap=1, up=(1, 1, 1, 1), across=(1, 2)),
-    "medium": Cells(chamber=4, gap=2, up=(2, 1, 1, 2), across=(1, 3)),
-    "fine": Cells(chamber=8, gap=4, up=(4, 2, 2, 4), across=(2, 6)),
+    "coarse": MeshCells(chamber=2, gap=1, up=(1, 1, 1, 1), across=(1, 2)),
+    "medium": MeshCells(chamber=4, gap=2, up=(2, 1, 1, 2), across=(1, 3)),
+    "fine": MeshCells(chamber=8, gap=4, up=(4, 2, 2, 4), across=(2, 6)),
 }
 """Cells of chambers under pushes; the medium ones are those of unit_moment.csv."""
 
@@ -112,7 +112,7 @@ def dome_model(dome: DomeShape, fineness: str, peak: float) -> Model:
     return Model("dome", deck, words, len(mesh.nodes), loading.corners[-1], outcome)
 
 
-def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Model:
+def hinge_model(chambers: HingeChambers, fineness: str, largest_moment: float) -> Model:
     """Two chambers under a moment (N mm) on a mesh of CHAMBER_CELLS."""
     mesh = chamber_bricks(chambers, CHAMBER_CELLS[fineness])
     size = _size(fineness, len(mesh.elements), "C3D20R", len(mesh.nodes))
@@ -127,7 +127,7 @@ def hinge_model(chambers: Chambers, fineness: str, largest_moment: float) -> Mod
 
 
 def unit_model(
-    chambers: Chambers,
+    chambers: HingeChambers,
     push: Push,
     fineness: str,
     largest_moment: float,
@@ -137,8 +137,8 @@ def unit_model(
     mesh = pushed_bricks(chambers, PUSHED_CELLS[fineness], 2)
     moments = [share * largest_moment for share in shares]
     steps = (
-        *(Step((False,), moment) for moment in moments),
-        *(Step((True,), moment) for moment in (0.0, *moments)),
+        *(DeckStep((False,), moment) for moment in moments),
+        *(DeckStep((True,), moment) for moment in (0.0, *moments)),
     )
     size = _size(fineness, len(mesh.elements), "C3D20R", len(mesh.nodes))
     words = (
@@ -160,7 +160,7 @@ def unit_model(
 
 
 def finger_model(
-    chambers: Chambers, push: Push, fineness: str, patterns: Sequence[tuple[bool, ...]]
+    chambers: HingeChambers, push: Push, fineness: str, patterns: Sequence[tuple[bool, ...]]
 ) -> Model:
     """Chambers on their layer in states, each a pattern of gaps that are pushed open.
 
@@ -168,7 +168,7 @@ def finger_model(
     """
     n_chambers = len(patterns[0]) + 1
     mesh = pushed_bricks(chambers, PUSHED_CELLS[fineness], n_chambers)
-    steps = [Step(pattern) for pattern in in_gray_order(patterns)]
+    steps = [DeckStep(pattern) for pattern in in_gray_order(patterns)]
     at_rest = [step for step in steps if not any(step.pattern)]
     pushed = [step for step in steps if any(step.pattern)]
     size = _size(fineness, len(mesh.elements), "C3D20R", len(mesh.nodes))

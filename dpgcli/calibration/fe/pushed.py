@@ -12,7 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
-from dpgcli.calibration.fe.hinge import Chambers, is_solid, on_plane
+from dpgcli.calibration.fe.hinge import HingeChambers, is_solid, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS, segment_height
 
 PATCH_RADIUS = 0.21
@@ -32,7 +32,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Cells:
+class MeshCells:
     """Cells of a mesh: along a chamber and a gap, up from the layer to the roof, across."""
 
     chamber: int
@@ -41,14 +41,16 @@ class Cells:
     across: tuple[int, int]
 
 
-def pushed_bricks(chambers: Chambers, cells: Cells, n_chambers: int) -> Bricks:
+def pushed_bricks(chambers: HingeChambers, cells: MeshCells, n_chambers: int) -> Bricks:
     """Chambers on their layer, one brick through walls, lids and layer, with lines at the patch."""
     lines = _lines(chambers, cells, n_chambers)
     x, y, z = np.meshgrid(*((line[1:] + line[:-1]) / 2 for line in lines), indexing="ij")
     return bricks(lines, is_solid(chambers, x, y, z))
 
 
-def _lines(chambers: Chambers, cells: Cells, n_chambers: int) -> tuple[Array, Array, Array]:
+def _lines(
+    chambers: HingeChambers, cells: MeshCells, n_chambers: int
+) -> tuple[Array, Array, Array]:
     wall, outer, width = WALL_THICKNESS, chambers.outer_length, chambers.width
     starts = chambers.pitch * np.arange(n_chambers)
     along = starts[:, None] + np.array([0.0, wall, wall + chambers.length, outer])
@@ -63,10 +65,10 @@ def _lines(chambers: Chambers, cells: Cells, n_chambers: int) -> tuple[Array, Ar
     )
 
 
-def lever(chambers: Chambers) -> float:
+def lever(chambers: HingeChambers) -> float:
     """Height H in mm of the domes' axis over the middle of the layer.
 
-    >>> lever(Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0))
+    >>> lever(HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0))
     10.75
     """
     return segment_height(chambers.width, chambers.layer_thickness)
@@ -97,7 +99,7 @@ class End:
         return np.stack([across, up], axis=-1)
 
 
-def apex(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> End:
+def apex(chambers: HingeChambers, mesh: Bricks, push: Push, gap: int) -> End:
     """The apex of the dome before a gap, counted from 0.
 
     It shifts with the lid within W_c/2 of the dome's axis, as far as the dome's annulus reaches,
@@ -114,7 +116,7 @@ def apex(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> End:
     )
 
 
-def patch(chambers: Chambers, mesh: Bricks, gap: int) -> End:
+def patch(chambers: HingeChambers, mesh: Bricks, gap: int) -> End:
     """The middle of the patch of the wall behind a gap, counted from 0."""
     wall = (gap + 1) * chambers.pitch
     nodes = _disc(chambers, mesh, wall, PATCH_RADIUS)
@@ -122,14 +124,16 @@ def patch(chambers: Chambers, mesh: Bricks, gap: int) -> End:
     return End(place, nodes, _equal(nodes), np.zeros(len(nodes)))
 
 
-def opening(chambers: Chambers, mesh: Bricks, push: Push, displacements: Array, gap: int) -> Array:
+def opening(
+    chambers: HingeChambers, mesh: Bricks, push: Push, displacements: Array, gap: int
+) -> Array:
     """How much farther apart in mm apex and patch are than at rest; displacements (..., n, 3)."""
     start, end = apex(chambers, mesh, push, gap), patch(chambers, mesh, gap)
     length = np.linalg.norm(end.moved(displacements) - start.moved(displacements), axis=-1)
     return np.asarray(length - (chambers.separation + push.dome_height))
 
 
-def floor_angle(chambers: Chambers, mesh: Bricks, displacements: Array, number: int) -> Array:
+def floor_angle(chambers: HingeChambers, mesh: Bricks, displacements: Array, number: int) -> Array:
     """Angle in rad, counterclockwise, of the chord of a chamber's floor, counted from 0.
 
     Along the lower edge of the layer in the plane of symmetry, from wall to lid.
@@ -156,18 +160,18 @@ def loaded(mesh: Bricks) -> Flags:
     return on_plane(mesh, 0, mesh.nodes[:, 0].max())
 
 
-def _axis(chambers: Chambers) -> float:
+def _axis(chambers: HingeChambers) -> float:
     """Height in mm of the domes' axis over the lower face of the layer."""
     return chambers.layer_thickness / 2 + lever(chambers)
 
 
-def _disc(chambers: Chambers, mesh: Bricks, place: float, radius: float) -> Indices:
+def _disc(chambers: HingeChambers, mesh: Bricks, place: float, radius: float) -> Indices:
     """Nodes on a plane across the domes' axis, about it; the radius over the chamber's width."""
     away = np.hypot(mesh.nodes[:, 1] - _axis(chambers), mesh.nodes[:, 2])
     return np.flatnonzero(on_plane(mesh, 0, place) & (away < (radius + 1e-9) * chambers.width))
 
 
-def _side_edges(chambers: Chambers, mesh: Bricks, number: int) -> Indices:
+def _side_edges(chambers: HingeChambers, mesh: Bricks, number: int) -> Indices:
     """Nodes of a chamber's outer side on a level with its inner roof and with its floor."""
     start, end = number * chambers.pitch, number * chambers.pitch + chambers.outer_length
     slack = 1e-9 * end

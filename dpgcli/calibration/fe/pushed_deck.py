@@ -16,7 +16,7 @@ from dpgcli.calibration.fe.cards import (
     mesh_lines,
     set_lines,
 )
-from dpgcli.calibration.fe.hinge import Chambers, end_couple, on_plane
+from dpgcli.calibration.fe.hinge import HingeChambers, end_couple, on_plane
 from dpgcli.calibration.fe.pushed import End, Push, apex, clamped, loaded, patch
 from dpgcli.design.geometry import WALL_THICKNESS
 
@@ -30,7 +30,7 @@ LONGEST = 10.0
 
 
 @dataclass(frozen=True)
-class Step:
+class DeckStep:
     """A state to go to: which gaps are pushed, and the end couple in N mm."""
 
     pattern: tuple[bool, ...]
@@ -38,7 +38,11 @@ class Step:
 
 
 def pushed_deck(
-    chambers: Chambers, mesh: Bricks, push: Push, steps: Sequence[Step], words: Sequence[str]
+    chambers: HingeChambers,
+    mesh: Bricks,
+    push: Push,
+    steps: Sequence[DeckStep],
+    words: Sequence[str],
 ) -> str:
     """The deck of chambers that go from state to state, one second each: statics.
 
@@ -63,12 +67,12 @@ def pushed_deck(
         f"ALL, {digits(OFF)}",
         f"ENDS, {digits(OFF)}",
     ]
-    for before, step in pairwise((Step((False,) * len(gaps)), *steps)):
+    for before, step in pairwise((DeckStep((False,) * len(gaps)), *steps)):
         lines += _step_lines(step, forces, is_snap=step.pattern != before.pattern)
     return "\n".join(lines) + "\n"
 
 
-def pushed_words(chambers: Chambers, push: Push, n_chambers: int) -> tuple[str, ...]:
+def pushed_words(chambers: HingeChambers, push: Push, n_chambers: int) -> tuple[str, ...]:
     """A description of pushed chambers in words."""
     length = chambers.separation + push.dome_height
     return (
@@ -87,7 +91,7 @@ def pushed_words(chambers: Chambers, push: Push, n_chambers: int) -> tuple[str, 
     )
 
 
-def _spring_lines(chambers: Chambers, mesh: Bricks, push: Push, gap: int) -> Iterator[str]:
+def _spring_lines(chambers: HingeChambers, mesh: Bricks, push: Push, gap: int) -> Iterator[str]:
     """Apex, patch and the spring between them."""
     first = len(mesh.nodes) + 1 + 2 * gap
     ends = {first: apex(chambers, mesh, push, gap), first + 1: patch(chambers, mesh, gap)}
@@ -118,7 +122,7 @@ def _equation_lines(node: int, axis: int, end: End, turns: Array) -> Iterator[st
         yield f"{other}, {along}, {digits(weight)}"
 
 
-def _law_lines(chambers: Chambers, push: Push) -> Iterator[str]:
+def _law_lines(chambers: HingeChambers, push: Push) -> Iterator[str]:
     """Tables of force over elongation by temperature, linear between them; for half a spring."""
     length = chambers.separation + push.dome_height
     yield "*SPRING, ELSET=PUSHES, NONLINEAR"
@@ -133,7 +137,7 @@ def _law_lines(chambers: Chambers, push: Push) -> Iterator[str]:
             yield f"{force:.9f}, {elongation:.9f}, {temperature:.2f}"
 
 
-def _step_lines(step: Step, forces: Array, *, is_snap: bool) -> Iterator[str]:
+def _step_lines(step: DeckStep, forces: Array, *, is_snap: bool) -> Iterator[str]:
     yield "*STEP, NLGEOM, INC=1000"
     yield "*STATIC"
     yield f"{0.25 if is_snap else 1}, 1, 1e-6, 1"

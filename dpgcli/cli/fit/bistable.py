@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from dpgcli.calibration.choices import LAW_KEYS, Branches, Loss, Quantity
+from dpgcli.calibration.choices import LAW_KEYS, Branches, CurveQuantity, Loss
 from dpgcli.cli.exits import say_problems
 from dpgcli.cli.fit.options import (
     Bootstrap,
@@ -50,7 +50,7 @@ OpeningRule = Annotated[
     ),
 ]
 QuantityName = Annotated[
-    Quantity | None,
+    CurveQuantity | None,
     typer.Option("--quantity", help="What to fit  [default: energy, else force, else pressure]"),
 ]
 Area = Annotated[
@@ -97,11 +97,11 @@ def bistable(
     """Fit k_b, alpha and d of the bistable law to a dome's curve."""
     from dpgcli.api.fits.bistable import fit_bistable
     from dpgcli.api.inputs import table_choice
-    from dpgcli.calibration.opening import Opening
+    from dpgcli.calibration.opening import OpeningRule
 
     if travel_to_opening is None:
         _ask(curve, geometry, spec, table_choice(column or (), skip, units or ()))
-    opening, fixed = Opening.of(travel_to_opening), _fixed(fix or [])
+    opening, fixed = OpeningRule.of(travel_to_opening), _fixed(fix or [])
     check_files((curve, spec), output, plot)
     with resampling(bootstrap, quiet=quiet):
         fit = fit_bistable(

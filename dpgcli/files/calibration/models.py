@@ -20,7 +20,7 @@ from dpgcli.files.sections import (
 )
 
 if TYPE_CHECKING:
-    from dpgcli.calibration.grid import GridLaw
+    from dpgcli.calibration.grid import FittedGridLaw
 
 T = TypeVar("T")
 Samples = Annotated[list[float], Field(min_length=1)]
@@ -153,16 +153,18 @@ class Grid(Section):
     )
 
     @cached_property
-    def law(self) -> "GridLaw":
+    def law(self) -> "FittedGridLaw":
         """The way between the points; made once for all designs that share the grid."""
         import numpy as np
 
         from dpgcli.calibration.choices import GridMethod
-        from dpgcli.calibration.grid import GridLaw, Points
+        from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 
         geometry = np.array([self.points[key] for key in self.over]).T
         quantities = {k: np.array(v) for k, v in self.points.items() if k not in self.over}
-        return GridLaw(GridMethod(self.method), Points(tuple(self.over), geometry, quantities))
+        return FittedGridLaw(
+            GridMethod(self.method), GridPoints(tuple(self.over), geometry, quantities)
+        )
 
     @property
     def known(self) -> calibrations.Grid:

@@ -9,10 +9,10 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import BistableFit, BistableOptions
-from dpgcli.calibration.choices import Branches, GridMethod, Quantity
+from dpgcli.calibration.choices import Branches, CurveQuantity, GridMethod
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
-from dpgcli.calibration.grid import GridLaw
+from dpgcli.calibration.grid import FittedGridLaw
 from dpgcli.calibration.observations import UNITS, residual_unit
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import FitError
@@ -69,7 +69,7 @@ def method_of(what: str, fit: Fit, resamples: int, seed: int) -> str:
 def bistable_method(found: BistableFit, choice: BistableOptions) -> str:
     """The method of a fit of the bistable law, with what of the curve it was made to."""
     text = method_of(choice.quantity, found.fit, choice.resamples, choice.seed)
-    if choice.quantity is Quantity.PRESSURE:
+    if choice.quantity is CurveQuantity.PRESSURE:
         text += f", area {choice.area:g} mm2"
     if choice.branches in (Branches.LOADING, Branches.UNLOADING):
         text += f", {choice.branches} only"
@@ -159,7 +159,7 @@ def _listed(values: Array | None) -> list[float | None] | None:
     return None if values is None else [*values.tolist()]
 
 
-def grid_of(law: GridLaw) -> Grid:
+def grid_of(law: FittedGridLaw) -> Grid:
     """The points of a grid, its scaling laws if it has them, and its leave-one-out errors."""
     points = law.points
     columns = dict(zip(points.over, points.geometry.T.tolist(), strict=True))
@@ -176,7 +176,7 @@ def grid_of(law: GridLaw) -> Grid:
     )
 
 
-def grid_doubts(law: GridLaw, table: GridTable) -> Iterator[str]:
+def grid_doubts(law: FittedGridLaw, table: GridTable) -> Iterator[str]:
     """Warnings about a table of points."""
     yield from table.doubts
     if table.ignored:
@@ -194,7 +194,7 @@ def grid_doubts(law: GridLaw, table: GridTable) -> Iterator[str]:
         yield "too few points to leave one out: nothing is known about the error between them"
 
 
-def _scaling_of(law: GridLaw, key: str) -> ScalingLaw:
+def _scaling_of(law: FittedGridLaw, key: str) -> ScalingLaw:
     fit, over = law.scaling(key), law.points.over
     errors = fit.standard_errors.tolist()
     is_known = bool(np.isfinite(fit.standard_errors).all())

@@ -18,7 +18,7 @@ EXPECTED = {
     MASS: "a mass >= 0 in g, or a list of one for each unit",
     DIRECTION: '"-x", "x", "-y", "y", or two numbers that are not both zero, such as [0.6, -0.8]',
 }
-Pair = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
+TwoNumbers = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
 NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 MASS_SCHEMA = {"type": "number", "minimum": 0, "maximum": LARGEST}
 NOTHING = {"type": "null"}
@@ -50,7 +50,7 @@ Masses = Annotated[
     AfterValidator(_masses),
     WithJsonSchema({"anyOf": [MASS_SCHEMA, {"type": "array", "items": MASS_SCHEMA}, NOTHING]}),
 ]
-Direction = Annotated[
+GravityDirection = Annotated[
     Any,
     AfterValidator(_direction),
     WithJsonSchema(
@@ -68,7 +68,7 @@ Direction = Annotated[
 class LoadsSpec(Section):
     """Dead loads, which keep their size and direction."""
 
-    tip_force_N: Pair | None = Field(
+    tip_force_N: TwoNumbers | None = Field(
         default=None,
         description="Force on the tip, along x and along y of the finger's frame, in N.",
     )
@@ -86,7 +86,7 @@ class LoadsSpec(Section):
         description="Mass of each unit in g, or a list of one for each: its weight acts on the "
         "middle of the unit's chamber.",
     )
-    gravity_direction: Direction = Field(
+    gravity_direction: GravityDirection = Field(
         default=None,
         description="Where gravity acts to, in the finger's frame or in the gripper's: -x unless "
         "given, x, y, -y, or a vector of any length.",

@@ -7,13 +7,13 @@ import pytest
 
 from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.finger import finger_states, frame_words, in_gray_order, with_seconds
-from dpgcli.calibration.fe.hinge import Chambers
+from dpgcli.calibration.fe.hinge import HingeChambers
 from dpgcli.calibration.fe.models import PUSHED_CELLS, finger_model
 from dpgcli.calibration.fe.pushed import Push, opening, pushed_bricks
-from dpgcli.calibration.fe.pushed_deck import Step
+from dpgcli.calibration.fe.pushed_deck import DeckStep
 from dpgcli.errors import SolverError
 
-CHAMBERS = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+CHAMBERS = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 PUSH = Push(stiffness=50.0, stroke=3.5, dome_height=6.5)
 ALL = list(product((False, True), repeat=3))
 
@@ -33,7 +33,7 @@ def test_states_are_in_order_of_patterns_whatever_came_first() -> None:
     moved[1, mesh.nodes[:, 0] > 12.0, 0] = 3.4  # gap 1
     moved[2] = moved[0]
     moved[2, mesh.nodes[:, 0] > 12.0, :2] += [3.3, -1.0]
-    steps = [Step((False, True)), Step((True, False)), Step((True, True))]
+    steps = [DeckStep((False, True)), DeckStep((True, False)), DeckStep((True, True))]
     states = finger_states(CHAMBERS, mesh, PUSH, [steps[1], steps[0], steps[2]], moved[[1, 0, 2]])
     assert list(states) == [
         "pattern", "tip_x_mm", "tip_y_mm", "chamber2_angle_rad", "chamber3_angle_rad",

@@ -10,7 +10,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.elements import BRICK
 from dpgcli.calibration.fe.hinge import (
-    Chambers,
+    HingeChambers,
     chamber_bricks,
     chamber_turn,
     couple,
@@ -18,7 +18,7 @@ from dpgcli.calibration.fe.hinge import (
     on_plane,
 )
 
-REFERENCE = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+REFERENCE = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 FACES = ([0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7])
 
 
@@ -44,7 +44,7 @@ def turned(mesh: Bricks, angle: float, place: float) -> Array:
 
 @pytest.mark.parametrize("density", [1, 2, 4])
 @pytest.mark.parametrize("chambers", [REFERENCE, replace(REFERENCE, separation=0.1)])
-def test_bricks_are_upright_and_fill_the_chambers(chambers: Chambers, density: int) -> None:
+def test_bricks_are_upright_and_fill_the_chambers(chambers: HingeChambers, density: int) -> None:
     mesh = chamber_bricks(chambers, density)
     sizes = edges(mesh)
     assert sizes.min() > 0
@@ -72,7 +72,7 @@ def test_bricks_share_their_faces(mesh: Bricks) -> None:
     assert set(mesh.elements.ravel()) == set(range(len(mesh.nodes)))
 
 
-def _surface(c: Chambers) -> float:
+def _surface(c: HingeChambers) -> float:
     """Area of one half of two chambers and their layer, cut and cavities included."""
     depth, total = c.width / 2 + 1, 2 * c.pitch - c.separation
     layer = total * (2 * depth + c.layer_thickness) + 2 * c.layer_thickness * depth

@@ -9,7 +9,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.fe.curves import csv_text
 from dpgcli.calibration.fe.decks import pulse
 from dpgcli.calibration.fe.dome import DomeShape, dome_mesh
-from dpgcli.calibration.fe.hinge import Chambers, chamber_bricks
+from dpgcli.calibration.fe.hinge import HingeChambers, chamber_bricks
 from dpgcli.calibration.fe.models import (
     CHAMBER_CELLS,
     DOME_CELLS,
@@ -23,7 +23,7 @@ from dpgcli.calibration.fe.pushed import Push
 from dpgcli.errors import SolverError
 
 DOME = DomeShape(height=6.5, thickness=0.75, elastic_modulus=26.0)
-CHAMBERS = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+CHAMBERS = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 
 
 PUSH = Push(stiffness=50.0, stroke=3.5, dome_height=6.5)

@@ -9,7 +9,7 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.calibration.fe.bricks import Bricks
 from dpgcli.calibration.fe.curves import UnitCurve, unit_curve, unit_finding, unit_stiffness
-from dpgcli.calibration.fe.hinge import Chambers, end_couple, moment
+from dpgcli.calibration.fe.hinge import HingeChambers, end_couple, moment
 from dpgcli.calibration.fe.models import PUSHED_CELLS, Model, unit_model
 from dpgcli.calibration.fe.pushed import (
     End,
@@ -22,10 +22,10 @@ from dpgcli.calibration.fe.pushed import (
     patch,
     pushed_bricks,
 )
-from dpgcli.calibration.fe.pushed_deck import Step
+from dpgcli.calibration.fe.pushed_deck import DeckStep
 from dpgcli.errors import SolverError
 
-REFERENCE = Chambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
+REFERENCE = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
 PUSH = Push(stiffness=50.0, stroke=3.5, dome_height=6.5)
 OTHERS = [
     replace(REFERENCE, width=16.0, layer_thickness=1.0),
@@ -65,7 +65,7 @@ def cards(deck: str) -> list[tuple[str, list[str]]]:
 @pytest.mark.parametrize("n_chambers", [2, 4])
 @pytest.mark.parametrize("chambers", [REFERENCE, *OTHERS])
 @pytest.mark.parametrize("fineness", ["coarse", "medium"])
-def test_bricks_fill_the_chambers(chambers: Chambers, fineness: str, n_chambers: int) -> None:
+def test_bricks_fill_the_chambers(chambers: HingeChambers, fineness: str, n_chambers: int) -> None:
     mesh = pushed_bricks(chambers, PUSHED_CELLS[fineness], n_chambers)
     corners = mesh.nodes[mesh.elements]
     sizes = np.ptp(corners, axis=1)
@@ -95,7 +95,7 @@ def test_the_patch_is_what_lies_within_4_2_mm_of_the_axis(mesh: Bricks) -> None:
 
 
 @pytest.mark.parametrize("chambers", [REFERENCE, *OTHERS])
-def test_patch_and_lid_grow_with_the_chamber(chambers: Chambers) -> None:
+def test_patch_and_lid_grow_with_the_chamber(chambers: HingeChambers) -> None:
     for fineness, cells in PUSHED_CELLS.items():
         mesh = pushed_bricks(chambers, cells, 3)
         reference = pushed_bricks(REFERENCE, cells, 3)
@@ -256,7 +256,7 @@ def test_what_the_model_says_of_itself(model: Model) -> None:
 
 
 def test_the_curve_of_a_unit_that_moves_as_told(mesh: Bricks) -> None:
-    steps = (Step((False,), 2.5), Step((True,), 0.0), Step((True,), -2.5))
+    steps = (DeckStep((False,), 2.5), DeckStep((True,), 0.0), DeckStep((True,), -2.5))
     angles = (0.1, 0.3, 0.25)
     moved = np.stack([turned(mesh, angle, (12.25, 0.75)) for angle in angles])
     curve = unit_curve(REFERENCE, mesh, PUSH, steps, moved)
