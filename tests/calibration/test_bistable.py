@@ -9,7 +9,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.bistable import (
     BistableFit,
     BistableOptions,
-    Opening,
+    OpeningRule,
     fit_bistable,
     law,
     rests,
@@ -24,7 +24,7 @@ from dpgcli.files.measured import read_curve
 DATA = Path(__file__).parents[2] / "configs" / "calibration"
 TRUE = np.array([12.84, 0.043, 3.5])
 TRAVEL = np.linspace(0.0, 4.2, 85)
-EQUAL = Opening(Rule.EQUAL)
+EQUAL = OpeningRule(Rule.EQUAL)
 NOISE = {CurveQuantity.ENERGY: 0.1, CurveQuantity.FORCE: 0.3}
 
 
@@ -115,13 +115,13 @@ def test_work_is_fitted_as_an_energy() -> None:
 def test_the_mapping_stretches_the_law(quantity: CurveQuantity) -> None:
     """x = f u: the stroke scales by f and the stiffness by f^-2, energies stay."""
     factor, data = 0.25, curve(quantity)
-    found = fitted(data, quantity, opening=Opening(Rule.PROPORTIONAL, factor))
+    found = fitted(data, quantity, opening=OpeningRule(Rule.PROPORTIONAL, factor))
     assert found.fit.values == pytest.approx(TRUE * [factor**-2, 1.0, factor], rel=1e-8)
     assert found.factor == factor
 
 
 def test_a_stroke_puts_the_inverted_well_there() -> None:
-    found = fitted(curve(CurveQuantity.ENERGY), opening=Opening(Rule.STROKE, 1.75))
+    found = fitted(curve(CurveQuantity.ENERGY), opening=OpeningRule(Rule.STROKE, 1.75))
     assert float(rests(found.fit.values).well) == pytest.approx(1.75, rel=2e-3)
 
 
@@ -268,13 +268,13 @@ def test_no_curve_where_the_force_is_not_known() -> None:
         (
             curve(CurveQuantity.ENERGY, travel=TRAVEL[:20]),
             CurveQuantity.ENERGY,
-            Opening(Rule.STROKE, 3.5),
+            OpeningRule(Rule.STROKE, 3.5),
             "does not show where the inverted dome rests",
         ),
     ],
 )
 def test_fits_that_cannot_be(
-    data: Record, quantity: CurveQuantity, opening: Opening, said: str
+    data: Record, quantity: CurveQuantity, opening: OpeningRule, said: str
 ) -> None:
     with pytest.raises(FitError, match=said):
         fitted(data, quantity, opening=opening)
