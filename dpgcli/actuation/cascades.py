@@ -19,6 +19,7 @@ from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
 
 FURTHEST = 10.0  # strokes: no unit goes as far
+SHORTER = 0.1  # of a step, where curves bend often: no well of theirs is stepped over
 MOST_TURNS = 16  # for each unit: how often one goes on
 
 
@@ -114,7 +115,8 @@ class _Cascade:
         pull = law.margin(own.coordinates.dome(start), load)[unit, each]
         sign = np.where(np.abs(pull) > LARGEST_RESIDUAL, np.sign(pull), 0.0)
         end = sign * FURTHEST * np.broadcast_to(own.finger.stroke, law.place.shape)[unit, each]
-        ends = follow(own.loaded(replace(law, sign=sign)), start, load, end, LARGEST_STEP)
+        step = LARGEST_STEP * (1.0 if own.finger.law.curve is None else SHORTER)
+        ends = follow(own.loaded(replace(law, sign=sign)), start, load, end, step)
         self._go_on(own, unit, ends, sign == 0.0)
         return True
 
