@@ -210,7 +210,7 @@ def _shown(column: Column, values: list[Any]) -> list[str]:
     if column.kind is not Kind.NUMBER:
         return list(map(str, values))
     rounded = _rounded(column, values)
-    return ["-" if math.isnan(value) else format(value, rounded) for value in values]
+    return ["-" if math.isnan(value) else format(value, f"z{rounded}") for value in values]
 
 
 def _rounded(column: Column, values: list[float]) -> str:

@@ -127,7 +127,7 @@ def test_the_fold_is_that_of_the_users_weakest_unit() -> None:
 def test_a_rigid_finger_gets_no_lattice_but_with_bars_of_the_gauntlets_own() -> None:
     cases = list(cases_of(rigid(study_finger())))
     elastic = {case.family for case in cases if case.formulation == "lattice"}
-    assert elastic == {"stiffness", "guess", "fold", "crossed"}
+    assert elastic == {"stiffness", "guess", "fold", "crossed", "loads"}
     assert len(set(keys(cases))) == len(cases)
 
 

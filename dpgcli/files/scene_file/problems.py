@@ -147,7 +147,8 @@ def _problem(document: Document, error: Any) -> Problem:
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
     is_whole = path[:1] in WHOLE or path[:2] == (*OBJECT, objects.PLACE)
-    if is_whole and error["type"] != "extra_forbidden" and len(path) > 1:
+    is_said = error["type"] not in ("extra_forbidden", "missing")
+    if is_whole and is_said and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
         error = {**error, "type": "", "input": _at(document.data, path)}
     if error["type"] == "extra_forbidden":
