@@ -140,7 +140,7 @@ def test_a_soft_dome_is_one_where_its_unit_is_said(fit: Any) -> None:
 
 def test_energies_in_joules_are_asked_for_as_well(fit: Any) -> None:
     time, travel, _ = exports.measured()
-    energy = exports.law(travel, exports.TRUE, exports.Quantity.ENERGY)
+    energy = exports.law(travel, exports.TRUE, exports.CurveQuantity.ENERGY)
     columns = (*NAMED[:2], "--column", "energy_mJ=Load")
     assert "joules?" in asked(fit(table(time, travel, 1e-3 * energy), *columns))
     found = values(fit(table(time, travel, 1e-3 * energy), *columns, "--units", "energy=J"))
