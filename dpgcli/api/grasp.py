@@ -105,12 +105,14 @@ class GraspResult:
 
         Raises OutputError, and UsageError for a file that was read or a name of another format.
         """
-        from dpgcli.files.grasp import write_grasps
         from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_rows import write_scene_rows
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
-        write_grasps(table_path(table), self.grasps.scene, self.given.json, self.columns, self.rows)
+        write_scene_rows(
+            table_path(table), self.grasps.scene, self.given.json, self.columns, self.rows
+        )
 
     def draw(self, path: str | Path) -> None:
         """Draw the fingers on the body, with forces and inverted units, to a .svg or .png file."""

@@ -109,12 +109,12 @@ class LandscapeResult:
 
         Raises OutputError, and UsageError for a file that was read or a name of another format.
         """
-        from dpgcli.files.landscape import write_landscape
         from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_rows import write_scene_rows
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
-        write_landscape(
+        write_scene_rows(
             table_path(table), self.given.scene, self.given.json, self.columns, self.rows
         )
 

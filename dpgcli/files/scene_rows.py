@@ -1,4 +1,4 @@
-"""Grasps in Parquet files."""
+"""Rows about one scene, such as its landscape or its grasps, in Parquet files."""
 
 from pathlib import Path
 
@@ -11,10 +11,10 @@ from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.columns import Column
 
 
-def write_grasps(
+def write_scene_rows(
     path: Path, scene: Scene, spec_json: str, columns: tuple[Column, ...], rows: Columns
 ) -> None:
-    """Write a row for each state, or pair of states, against a body."""
+    """Write rows with the scene, its spec and what its outputs rest on beside them."""
     metadata = {
         "dpg.schema_version": str(SCHEMA_VERSION),
         **scene_metadata(scene, spec_json),
