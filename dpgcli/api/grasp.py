@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_ROWS, MOST_LANES = 2**20, 2**14
+MOST_DRAWN = 64
 SMALLEST_DISC, LARGEST_DISC = 1e-3, 1e4  # mm
 
 
@@ -125,9 +126,6 @@ class GraspResult:
 def _worst(values: Any) -> float:
     known = values[~np.isnan(values)]
     return float(known.max()) if len(known) else 0.0
-
-
-MOST_DRAWN = 64
 
 
 def check_drawable(n_rows: int, field: str = "plot") -> None:

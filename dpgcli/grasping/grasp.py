@@ -161,10 +161,13 @@ def _described(
 
 
 def _margins(own: Obstructed, grown: Approach, is_stable: Flags) -> Array:
-    """What more of the load fingers bear before a unit resets; infinite beyond `MARGIN_TO`."""
-    margin = np.where(is_stable, np.inf, np.nan)
+    """What more of the load fingers bear before a unit resets; infinite beyond `MARGIN_TO`.
+
+    NaN where there is no state, or none is found on the way on.
+    """
     shapes = replace(grown.shapes, is_there=grown.shapes.is_there & is_stable)
     onwards = approach(own, shapes, grown.load, 0.0 * grown.load + MARGIN_TO, to_reset=True)
+    margin = np.where(onwards.shapes.is_there, np.inf, np.nan)
     for reset in onwards.resets:
         margin[reset.lanes] = reset.load - 1.0
     return margin

@@ -144,7 +144,7 @@ def test_the_force_is_along_the_line_from_the_finger_to_the_center(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bars", [np.inf, pytest.param(1e4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("bars", [np.inf, 1e4])
 def test_margins(bars: float, reference_finger: Fingers, grown: Callable[..., Any]) -> None:
     """A disc larger by slightly less than the margin keeps the state, by slightly more not."""
     finger, radius = reference_finger(2, bars), 13.0
@@ -169,3 +169,21 @@ def test_a_scene_without_a_thickness_is_refused(reference_finger: Fingers) -> No
     codes = np.array([0], np.uint64)
     with pytest.raises(ValueError, match="thickness"):
         held(scene, chain_potential, Disc(np.zeros(2), 1.0), ALONE, codes)
+
+
+def test_a_margin_that_was_not_found_is_not_infinite(
+    reference_finger: Fingers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No reset on a way that could not be followed says nothing."""
+    whole = grasp.approach
+
+    def lost(*args: Any, to_reset: bool = False) -> Any:
+        found = whole(*args, to_reset=to_reset)
+        if to_reset:
+            found.shapes.is_there[0] = False
+        return found
+
+    monkeypatch.setattr(grasp, "approach", lost)
+    found = on_disc(reference_finger(2), (200.0, -16.0), 5.0, ["00", "01"])
+    assert found.status.tolist() == [Status.STABLE] * 2
+    assert np.isnan(found.margin[0]) and found.margin[1] == np.inf
