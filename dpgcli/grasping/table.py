@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Disc, Scene
-from dpgcli.grasping.grasp import FingerFrame, Grasped, frames, held
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import Grasped, described, placed
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -66,18 +67,19 @@ def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes
 
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
     """
-    placed = frames(scene.gripper)
-    is_alike = body.center[1] == 0.0 and len(placed) > 1
+    seen_from = frames(scene.gripper)
+    is_alike = body.center[1] == 0.0 and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
     fingers: list[Grasped] = []
-    for frame, codes in zip(placed, needed, strict=True):
+    for frame, codes in zip(seen_from, needed, strict=True):
         if fingers and is_alike:
             fingers.append(fingers[0])
         else:
-            fingers.append(held(scene, formulate, body, frame, codes))
+            fixed = placed(scene, formulate, body, frame, codes)
+            fingers += described(fixed.own, [codes], fixed.grown, fixed.status)
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
-    return Grasps(scene, body, placed, tuple(fingers), np.array(lanes))
+    return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes))
 
 
 def columns_of(scene: Scene) -> tuple[Column, ...]:

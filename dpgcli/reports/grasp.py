@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
-from dpgcli.grasping.grasp import FingerFrame, Grasped
+from dpgcli.grasping.frames import FingerFrame
+from dpgcli.grasping.grasp import Grasped
 from dpgcli.grasping.table import TOUCHES, Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
