@@ -24,6 +24,7 @@ from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.laws import PushOnly
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.units import UnitSolutions
 
@@ -64,16 +65,14 @@ class ContactShapes:
 class Obstructed:
     """Fingers with bodies in their way: one design and body, or one for each lane.
 
-    `thickness` (1, 1 or batch) is that of the layer, `centers` (2, body, 1 or batch) and `radii`
-    (body, 1 or batch) are in the finger's own frame, mm. Bodies may stand in the way by less than
+    `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm.
     """
 
     units: UnitSolutions
     formulate: Formulate
     thickness: Array
-    centers: Array
-    radii: Array
+    obstacle: Obstacle
     depth: Array
 
     @property
@@ -90,9 +89,9 @@ class Obstructed:
 
     def take_lanes(self, index: Indices) -> "Obstructed":
         """Some of the fingers."""
-        arrays = (self.thickness, self.centers, self.radii, self.depth)
-        taken = (take_lanes(part, index) for part in arrays)
-        return Obstructed(self.units.take_lanes(index), self.formulate, *taken)
+        thickness, depth = take_lanes(self.thickness, index), take_lanes(self.depth, index)
+        units, obstacle = self.units.take_lanes(index), self.obstacle.take_lanes(index)
+        return Obstructed(units, self.formulate, thickness, obstacle, depth)
 
     @cached_property
     def face(self) -> Face:
@@ -101,7 +100,7 @@ class Obstructed:
 
     def gaps(self, first: Flags | None = None) -> FaceGaps:
         """Gaps to the bodies in full; at each place only one, if it is said which come first."""
-        return FaceGaps(self.face, self.centers, self.radii, first)
+        return FaceGaps(self.face, self.obstacle, first)
 
     def bound(self, load: Array) -> Array:
         """b = (λ − 1) D, mm."""

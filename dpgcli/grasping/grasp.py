@@ -13,6 +13,7 @@ from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.gaps import nearest
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -107,8 +108,8 @@ def held(
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
     center = frame.inside(disc.center)[:, None, None]
     thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
-    radius = np.full((1, 1), disc.radius)
-    bare = Obstructed(units, formulate, thickness, center, radius, np.zeros(1))
+    body = Obstacle(center, np.full((1, 1), disc.radius))
+    bare = Obstructed(units, formulate, thickness, body, np.zeros(1))
     x = free.equilibrium.coordinates
     depth = np.maximum(disc.radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
@@ -140,7 +141,7 @@ def _described(
     """What there is to say of fingers that have come to rest."""
     shapes, coordinates = own.relabeled(grown.shapes), settled.potential.coordinates
     face = own.face.shape(shapes.coordinates)
-    near = nearest(face, own.centers)
+    near = nearest(face, own.obstacle.points)
     push = shapes.push
     at_tip = tip(settled, with_compliance=False)
     return Grasped(

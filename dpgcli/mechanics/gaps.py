@@ -21,6 +21,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
+from dpgcli.mechanics.obstacle import Obstacle
 
 FAR = 1e9  # mm: of a gap that is another one's
 
@@ -44,22 +45,20 @@ class Nearest(NamedTuple):
 
 @dataclass(frozen=True)
 class FaceGaps:
-    """Gaps of bodies, cell by cell: all sides of the face for the first body, then the next.
+    """Gaps of a body, cell by cell: all sides of the face for its first point, then the next.
 
-    `centers` (2, body, 1 or batch) and `radii` (body, 1 or batch) in mm, in the finger's own frame.
     With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
     one of the first, or else that of the side itself.
     """
 
     face: Face
-    centers: Array
-    radii: Array
+    obstacle: Obstacle
     first: Flags | None = None
 
     @property
     def n_cells(self) -> int:
-        """One for each side and body."""
-        return self.face.n_units * len(self.radii)
+        """One for each side and point."""
+        return self.face.n_units * len(self.obstacle.radii)
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
@@ -69,11 +68,11 @@ class FaceGaps:
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − r with its derivatives, (cell, batch)."""
         shape = self.face.shape(coordinates)
-        near = nearest(shape, self.centers)
-        n_bodies, n, batch = near.place.shape
-        place = (near.place + n * np.arange(n_bodies)[:, None, None]).reshape(-1, batch)
-        cells = n_bodies * n
-        own = (near.distance - self.radii[:, None]).reshape(cells, batch)
+        near = nearest(shape, self.obstacle.points)
+        n_points, n, batch = near.place.shape
+        place = (near.place + n * np.arange(n_points)[:, None, None]).reshape(-1, batch)
+        cells = n_points * n
+        own = (near.distance - self.obstacle.radii[:, None]).reshape(cells, batch)
         value = np.take_along_axis(own, place, axis=0)
         moves = _moves(shape, near)
         gradient = np.take_along_axis(moves.slope, place[None], axis=1)
@@ -89,9 +88,8 @@ class FaceGaps:
 
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
-        centers, radii = take_lanes(self.centers, index), take_lanes(self.radii, index)
         first = None if self.first is None else take_lanes(self.first, index)
-        return type(self)(self.face.take_lanes(index), centers, radii, first)
+        return type(self)(self.face.take_lanes(index), self.obstacle.take_lanes(index), first)
 
 
 def _one_at(place: Indices, first: Flags) -> Flags:
