@@ -21,7 +21,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
-from dpgcli.mechanics.outline import Outline
+from dpgcli.mechanics.obstacle import Obstacle
 
 FAR = 1e9  # mm: of a gap that is another one's
 
@@ -52,13 +52,13 @@ class FaceGaps:
     """
 
     face: Face
-    body: Outline
+    obstacle: Obstacle
     first: Flags | None = None
 
     @property
     def n_cells(self) -> int:
         """One for each side and point."""
-        return self.face.n_units * len(self.body.radii)
+        return self.face.n_units * len(self.obstacle.radii)
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
@@ -68,11 +68,11 @@ class FaceGaps:
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − r with its derivatives, (cell, batch)."""
         shape = self.face.shape(coordinates)
-        near = nearest(shape, self.body.points)
+        near = nearest(shape, self.obstacle.points)
         n_points, n, batch = near.place.shape
         place = (near.place + n * np.arange(n_points)[:, None, None]).reshape(-1, batch)
         cells = n_points * n
-        own = (near.distance - self.body.radii[:, None]).reshape(cells, batch)
+        own = (near.distance - self.obstacle.radii[:, None]).reshape(cells, batch)
         value = np.take_along_axis(own, place, axis=0)
         moves = _moves(shape, near)
         gradient = np.take_along_axis(moves.slope, place[None], axis=1)
@@ -89,7 +89,7 @@ class FaceGaps:
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
         first = None if self.first is None else take_lanes(self.first, index)
-        return type(self)(self.face.take_lanes(index), self.body.take_lanes(index), first)
+        return type(self)(self.face.take_lanes(index), self.obstacle.take_lanes(index), first)
 
 
 def _one_at(place: Indices, first: Flags) -> Flags:
