@@ -35,7 +35,7 @@ from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.laws import PushOnly
-from dpgcli.mechanics.outline import Outline
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
@@ -117,7 +117,7 @@ class Obstructed:
     units: UnitSolutions
     formulate: Formulate
     thickness: Array
-    bodies: tuple[Outline, ...]
+    bodies: tuple[Obstacle, ...]
     depth: Array
     motion: Motion | None = None
 

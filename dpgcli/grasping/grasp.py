@@ -15,7 +15,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.gaps import nearest
-from dpgcli.mechanics.outline import Outline
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -80,7 +80,7 @@ def placed(
     n = scene.finger.n_units
     pattern = inverted_units(codes, n)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
-    body = Outline(frame.inside(disc.center)[:, None, None], np.full((1, 1), disc.radius))
+    body = Obstacle(frame.inside(disc.center)[:, None, None], np.full((1, 1), disc.radius))
     thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
     bare = Obstructed(units, formulate, thickness, (body,), np.zeros(1))
     x = free.equilibrium.coordinates
