@@ -14,6 +14,7 @@ from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
+from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import nearest
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import Formulate
@@ -25,6 +26,7 @@ from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
 
 MARGIN_TO = 2.0  # of the load: margins are looked for so far
+TOUCHES = 1e-12  # N: a smaller push is rounding
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,7 @@ class Grasped:
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
     (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
     smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node,
-    batch), in mm, as the body sees them. `residual` N and `error` mm are those of the tip. `resets`
-    say what happened.
+    batch), in mm. `residual` N and `error` mm are those of the tip. `resets` say what happened.
     """
 
     code: Codes
@@ -55,6 +56,24 @@ class Grasped:
         *("code", "after", "status", "push", "force", "gap", "margin"),
         *("residual", "error"),
     )
+
+    @classmethod
+    def joined(cls, parts: Sequence["Grasped"]) -> "Grasped":
+        """Those of several batches as one."""
+        arrays = {
+            name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
+            for name in (*cls.BY_LANE, "normal", "face")
+        }
+        nodes = (
+            np.concatenate(values, axis=-1)
+            for values in zip(*(p.nodes for p in parts), strict=True)
+        )
+        resets: list[Reset] = []
+        before = 0
+        for part in parts:
+            resets += [replace(reset, lanes=reset.lanes + before) for reset in part.resets]
+            before += len(part.code)
+        return cls(**arrays, nodes=Stations(*nodes), resets=tuple(resets))
 
 
 @dataclass(frozen=True)
@@ -129,7 +148,7 @@ def described(
                 residual=there.residual,
                 error=tip(state, with_compliance=False, whole=there, rows=rows).error,
                 nodes=state.potential.coordinates.stations(mine),
-                face=shape.nodes,
+                face=Face.of(state.potential.coordinates, own.thickness).shape(mine).nodes,
                 resets=_of_finger(grown.resets, own, finger),
             )
         )
