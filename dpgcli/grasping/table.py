@@ -89,7 +89,9 @@ def grasps(
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
     if scene.held is Held.FIXED:
-        fingers = [described(part.own, [part.codes], part.grown, part.status)[0] for part in parts]
+        different = parts[:1] if is_alike else parts
+        told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
+        fingers = [finger for (finger,) in told] * (len(parts) // len(told))
         return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
     found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
