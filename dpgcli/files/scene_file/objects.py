@@ -12,7 +12,7 @@ from dpgcli.files.sections import Positive, Section
 PLACE = "at_mm"
 EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
-    "held": '"fixed": it does not move',
+    "held": '"fixed", "guided" (moves along x) or "free"',
 }
 
 
@@ -30,7 +30,10 @@ class ObjectSpec(Section):
         description="Where its center is in the gripper's frame, in mm: between the bases, x along "
         "the fingers; of a finger alone in its own frame."
     )
-    held: Literal["fixed"] = Field(default="fixed", description="How it is held: it does not move.")
+    held: Literal["fixed", "guided", "free"] = Field(
+        default="fixed",
+        description="How it is held: fixed, guided (it moves along x only), or free.",
+    )
 
     @property
     def known(self) -> Disc:
