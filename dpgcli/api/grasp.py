@@ -209,7 +209,7 @@ def grasp_of(
 
 def check_body(scene: Scene, body: Disc) -> None:
     """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
-    from dpgcli.grasping.grasp import frames
+    from dpgcli.grasping.frames import frames
 
     if scene.layer_thickness is None:
         raise UsageError(

@@ -126,6 +126,14 @@ class Gripper:
     mounting_angle: float | Array
 
 
+class Held(StrEnum):
+    """How a body is held while fingers meet it."""
+
+    FIXED = "fixed"
+    GUIDED = "guided"  # along x
+    FREE = "free"
+
+
 @dataclass(frozen=True)
 class Disc:
     """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
@@ -155,7 +163,7 @@ class Scene:
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
     is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
     its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
-    `pressure` and `body` are None where the spec says nothing of them.
+    `pressure` and `body` are None where the spec says nothing of them; the body is `held` so.
     """
 
     finger: Finger
@@ -169,6 +177,7 @@ class Scene:
     warnings: tuple[str, ...] = ()
     pressure: Pressure | None = None
     body: Disc | None = None
+    held: Held = Held.FIXED
 
     def take_lanes(self, index: Indices) -> "Scene":
         """Some designs of a batch, without what is said of a single one."""

@@ -49,7 +49,7 @@ def approach(
     shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
     resets: list[Reset] = []
     lanes = np.flatnonzero(shapes.is_there & (here < end))
-    for _ in range(MOST_HALTS * obstructed.units.finger.n_units):
+    for _ in range(MOST_HALTS * len(start.inverted)):
         if not len(lanes):
             break
         own = obstructed.take_lanes(lanes)
@@ -77,7 +77,8 @@ def _gone_on(
     active, n = before.active.copy(), len(ends.load)
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
-    push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
+    push = y * own.stiffness
+    push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
     moved = ContactShapes(
         coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)
     )

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Scene
-from dpgcli.grasping.grasp import FingerFrame, Grasped, frames, held
+from dpgcli.design.scene import Disc, Held, Scene
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
+from dpgcli.grasping.release import WAYS, let_go, motion_of
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -18,7 +20,6 @@ from dpgcli.states.gripper import place_in_gripper
 from dpgcli.states.patterns import inverted_units, texts
 
 FORCES, SHAPES = (Output.FORCES,), (Output.SHAPES,)
-TOUCHES = 1e-12  # N: a smaller push is rounding
 
 COLUMNS = (
     Column("pattern", "", "state before the body was there; upper/lower of a pair", kind=Kind.TEXT),
@@ -47,7 +48,8 @@ OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
 class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
-    `pairs` (finger, row) are lanes of the fingers' tables.
+    `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
+    is, mm.
     """
 
     scene: Scene
@@ -55,6 +57,7 @@ class Grasps:
     frames: tuple[FingerFrame, ...]
     fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
+    centers: Array
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
@@ -66,18 +69,26 @@ def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes
 
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
     """
-    placed = frames(scene.gripper)
-    is_alike = body.center[1] == 0.0 and len(placed) > 1
+    seen_from = frames(scene.gripper)
+    is_alike = body.center[1] == 0.0 and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
-    fingers: list[Grasped] = []
-    for frame, codes in zip(placed, needed, strict=True):
-        if fingers and is_alike:
-            fingers.append(fingers[0])
+    parts: list[Placed] = []
+    for frame, codes in zip(seen_from, needed, strict=True):
+        if parts and is_alike:
+            parts.append(parts[0])
         else:
-            fingers.append(held(scene, formulate, body, frame, codes))
+            parts.append(placed(scene, formulate, body, frame, codes))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
-    return Grasps(scene, body, placed, tuple(fingers), np.array(lanes))
+    centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
+    if scene.held is Held.FIXED:
+        fingers = [described(part.own, [part.codes], part.grown, part.status)[0] for part in parts]
+        return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
+    found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
+    rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
+    is_there = found[0].status == Status.STABLE
+    centers = np.where(is_there, centers + WAYS[scene.held] @ moved + 0.0, np.nan)
+    return Grasps(scene, body, seen_from, found, rows, centers)
 
 
 def columns_of(scene: Scene) -> tuple[Column, ...]:
@@ -103,7 +114,6 @@ def grasp_rows(found: Grasps) -> Columns:
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
 
-    n = len(status)
     rows: Columns = {
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
@@ -118,8 +128,8 @@ def grasp_rows(found: Grasps) -> Columns:
         "finger_force_y_N": known(forces[0][1]),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
         "max_contact_N": known(np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)),
-        "object_x_mm": np.full(n, found.body.center[0]),
-        "object_y_mm": np.full(n, found.body.center[1]),
+        "object_x_mm": found.centers[0],
+        "object_y_mm": found.centers[1],
         "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
         "margin": known(np.min([own["margin"] for own in of_fingers], axis=0)),
         "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
-from dpgcli.grasping.grasp import FingerFrame, Grasped
-from dpgcli.grasping.table import TOUCHES, Grasps
+from dpgcli.grasping.frames import FingerFrame
+from dpgcli.grasping.grasp import TOUCHES, Grasped
+from dpgcli.grasping.table import Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
 from dpgcli.reports.fingers import EDGE, MEASURE, WORD, draw_finger, handles, set_window
@@ -27,9 +28,9 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     n = len(rows["pattern"])
     profile = Profile.of(found.scene)
     shapes = [_fingers(found, profile, row, rows) for row in range(n)]
-    circle = _circle(found)
+    circles = [_circle(found, row) for row in range(n)]
     drawn = [finger.points for own in shapes for finger in own]
-    window = Window.of(np.concatenate([circle, *drawn]))
+    window = Window.of(np.concatenate([*circles, *drawn]))
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
     grid = PanelGrid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
     said = [*notes(found.scene), _said(largest)]
@@ -45,6 +46,7 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
             axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)
             axes.set_title(_title(rows, row), fontsize=TITLE_SIZE, pad=3.0)
+            circle = circles[row]
             axes.fill(circle.real, circle.imag, facecolor=BODY, edgecolor=EDGE, lw=0.7, zorder=0)
             for finger in fingers:
                 draw_finger(axes, finger, POINTS / scale)
@@ -57,9 +59,15 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
         foot.draw(figure, window, grid)
 
 
-def _circle(found: Grasps) -> Points:
+def _center(found: Grasps, row: int) -> Array:
+    """Where the body is; where it was placed, if there is no answer."""
+    center = found.centers[:, row]
+    return found.body.center if np.isnan(center).any() else center
+
+
+def _circle(found: Grasps, row: int) -> Points:
     turn = np.linspace(0.0, 2.0 * np.pi, 121)
-    points: Points = complex(*found.body.center) + found.body.radius * np.exp(1j * turn)
+    points: Points = complex(*_center(found, row)) + found.body.radius * np.exp(1j * turn)
     return points
 
 
@@ -101,7 +109,7 @@ def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
         own, lane = found.take(place, row)
         for side in np.flatnonzero(own.push[:, lane] > TOUCHES):
             way = frame.outside(own.normal[:, side, lane])
-            start = found.body.center - found.body.radius * way
+            start = _center(found, row) - found.body.radius * way
             end = start + scale * own.push[side, lane] * way
             arrow = {"arrowstyle": "-|>", "color": MEASURE, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
             arrow["mutation_scale"] = SHORTEST * 2.0

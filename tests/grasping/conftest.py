@@ -166,7 +166,7 @@ def begun() -> Callable[..., tuple[Obstructed, ContactShapes]]:
         assert (free.status == 0).all(), "free states that these tests start from are stable"
         x, n = free.equilibrium.coordinates, len(patterns)
         body = Obstacle(np.array(center)[:, None, None], np.array([[radius]]))
-        bare = Obstructed(units, chain_potential, np.array([[thickness]]), body, np.zeros(1))
+        bare = Obstructed(units, chain_potential, np.array([[thickness]]), (body,), np.zeros(1))
         depth = np.maximum(radius, -bare.gaps()(x).value.min(axis=0))
         obstructed = replace(bare, depth=depth)
         nothing = np.zeros((finger.n_units, n))

@@ -1,0 +1,52 @@
+"""The frames of a gripper's fingers, in which bodies meet them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.design.scene import Gripper
+
+
+class FingerFrame(NamedTuple):
+    """A finger's frame in the gripper's: angle (rad), base (mm) and side, 1 or −1 if mirrored.
+
+    >>> upper, lower = frames(Gripper(base_spacing=60.0, mounting_angle=0.0))
+    >>> lower.inside(np.array([40.0, -5.0])).tolist()  # 25 mm above the lower base
+    [40.0, -25.0]
+    """
+
+    angle: float
+    offset: float
+    side: int
+
+    def inside(self, point: Array) -> Array:
+        """A point of the gripper's frame, (2, …), in the finger's."""
+        shifted = np.stack((point[0], point[1] - self.side * self.offset))
+        return self.along(shifted)
+
+    def along(self, vector: Array) -> Array:
+        """A direction of the gripper's frame, (2, …), in the finger's."""
+        x, y = vector[0], self.side * vector[1]
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        return np.stack((cos * x + sin * y, cos * y - sin * x))
+
+    def outside(self, vector: Array) -> Array:
+        """A direction in the finger's frame, (2, …), in the gripper's."""
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        x, y = cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]
+        return np.stack((x, self.side * y))
+
+    def placed(self, point: Array) -> Array:
+        """A point of the finger's frame, (2, …), in the gripper's."""
+        shift = np.zeros((2,) + (1,) * (point.ndim - 1))
+        shift[1] = self.side * self.offset
+        return self.outside(point) + shift
+
+
+def frames(gripper: Gripper | None) -> tuple[FingerFrame, ...]:
+    """The frames of the upper and the lower finger; of one alone its own."""
+    if gripper is None:
+        return (FingerFrame(0.0, 0.0, 1),)
+    angle, half = float(gripper.mounting_angle), 0.5 * float(gripper.base_spacing)
+    return FingerFrame(angle, half, 1), FingerFrame(angle, half, -1)
