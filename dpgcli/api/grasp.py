@@ -23,8 +23,9 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.design.bodies import Disc
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Scene
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential

@@ -5,7 +5,7 @@ unit resets (or snaps), exactly at the fold, and the finger goes downhill with t
 it is there; then the body goes on growing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def approach(
         own = obstructed.take_lanes(lanes)
         few = own.relabeled(shapes.take_lanes(lanes))
         family = own.family(few.inverted, few.active)
-        ends = follow(family, own.stacked(few), here[lanes], end[lanes])
+        ends = _told(own, few, follow(family, own.stacked(few), here[lanes], end[lanes]))
         moved, flipped = _gone_on(own, few, ends, end[lanes])
         here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
@@ -66,6 +66,15 @@ def approach(
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     return Approach(shapes, here, tuple(resets))
+
+
+def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
+    """The ends of paths: where a gap closes that is another one's it has jumped, as at a kink."""
+    place = own.gaps()(ends.coordinates[: len(before.coordinates)]).place
+    cell, lanes = np.maximum(ends.cell, 0), np.arange(len(ends.cell))
+    is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
+    is_jump &= ends.outcome == PathEnd.EVENT
+    return replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
 
 
 def _gone_on(

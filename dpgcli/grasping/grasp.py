@@ -7,16 +7,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Codes, Flags, total
-from dpgcli.design.scene import Disc, Scene
+from dpgcli.arrays import Array, Codes, Flags, Indices, total
+from dpgcli.design.bodies import Body
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
-from dpgcli.mechanics.gaps import nearest
-from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.gaps import FaceGaps, Touches
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -34,16 +34,18 @@ class Grasped:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
-    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
-    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node,
-    batch), in mm. `residual` N and `error` mm are those of the tip. `resets` say what happened.
+    (cell, batch) N is that at each of the places that `touches` are, on `phalanges` (cell,),
+    `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin` what more of the load the next
+    unit bears. `nodes`, and `face` (2, node, batch), in mm. `residual` N and `error` mm are those
+    of the tip. `resets` say what happened.
     """
 
     code: Codes
     after: Codes
     status: NDArray[np.uint8]
     push: Array
-    normal: Array
+    touches: Touches
+    phalanges: Indices
     force: Array
     gap: Array
     margin: Array
@@ -62,18 +64,24 @@ class Grasped:
         """Those of several batches as one."""
         arrays = {
             name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
-            for name in (*cls.BY_LANE, "normal", "face")
+            for name in (*cls.BY_LANE, "face")
         }
-        nodes = (
-            np.concatenate(values, axis=-1)
-            for values in zip(*(p.nodes for p in parts), strict=True)
+        nodes, touches = (
+            [np.concatenate(v, axis=-1) for v in zip(*values, strict=True)]
+            for values in ([p.nodes for p in parts], [p.touches for p in parts])
         )
         resets: list[Reset] = []
         before = 0
         for part in parts:
             resets += [replace(reset, lanes=reset.lanes + before) for reset in part.resets]
             before += len(part.code)
-        return cls(**arrays, nodes=Stations(*nodes), resets=tuple(resets))
+        return cls(
+            **arrays,
+            touches=Touches(*touches),
+            phalanges=parts[0].phalanges,
+            nodes=Stations(*nodes),
+            resets=tuple(resets),
+        )
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class Placed:
 
 
 def placed(
-    scene: Scene, formulate: Formulate, disc: Disc, frame: FingerFrame, codes: Codes
+    scene: Scene, formulate: Formulate, body: Body, frame: FingerFrame, codes: Codes
 ) -> Placed:
     """Let a body grow at its place about fingers in these states.
 
@@ -99,13 +107,12 @@ def placed(
     n = scene.finger.n_units
     pattern = inverted_units(codes, n)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
-    body = Obstacle(frame.inside(disc.center)[:, None, None], np.full((1, 1), disc.radius))
     thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
-    bare = Obstructed(units, formulate, thickness, (body,), np.zeros(1))
+    bare = Obstructed(units, formulate, thickness, (frame.obstacle(body),), np.zeros(1))
     x = free.equilibrium.coordinates
-    depth = np.maximum(disc.radius, -bare.gaps()(x).value.min(axis=0))
+    depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
-    nothing, begin = np.zeros((n, len(codes))), np.zeros(len(codes))
+    nothing, begin = np.zeros((bare.n_gaps, len(codes))), np.zeros(len(codes))
     start = own.finished(x, pattern, nothing, begin)
     is_stable = free.status == Status.STABLE
     start = replace(start, is_there=start.is_there & is_stable)
@@ -129,9 +136,9 @@ def described(
     gaps = own.gaps()(shapes.coordinates).value
     n_before, found = 0, []
     for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):
-        shape = face.shape(shapes.coordinates)
-        normal = nearest(shape, body.points).normal[:, 0]
-        cells = slice(n_before, n_before + normal.shape[1])
+        bare = FaceGaps(face, body)
+        touches = bare.touches(shapes.coordinates)
+        cells = slice(n_before, n_before + bare.n_cells)
         push, n_before = shapes.push[cells], cells.stop
         rows = slice(finger, own.n_own, own.n_fingers)
         mine = own.of_finger(shapes.coordinates, finger)
@@ -141,8 +148,9 @@ def described(
                 after=codes_of(state.reached),
                 status=status,
                 push=push,
-                normal=normal,
-                force=total(np.moveaxis(normal * push, 1, 0)),
+                touches=touches,
+                phalanges=bare.phalanges,
+                force=total(np.moveaxis(touches.directions * push, 1, 0)),
                 gap=gaps[cells].min(axis=0),
                 margin=margin,
                 residual=there.residual,

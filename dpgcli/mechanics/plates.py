@@ -2,8 +2,9 @@
 
 With n the outward normal of a plate through P the gap to a node F is n · (F − P): linear in F. It
 is that of the plate as long as the node is over it; beyond the ends of the plate it is the gap of
-the corner there. In the body a node is behind many plates: it is measured to the one that is
-nearest of those that face the finger.
+the corner there. In the body a node is behind many plates: it is measured to the nearest of those
+that fingers come to from their own side, or around its far end. Nothing of this depends on how the
+finger is bent, so that gaps do not jump where it turns.
 """
 
 from typing import NamedTuple
@@ -15,6 +16,8 @@ from dpgcli.mechanics.face import FaceShape
 from dpgcli.mechanics.obstacle import Obstacle
 
 SLIGHT = 1e-6  # mm: a node so far behind a plate, or beyond its end in a notch, is on it
+
+SIDEWAYS = -0.25  # of n_x + n_y: a plate with more faces up, or away from the base
 
 
 class PlateGaps(NamedTuple):
@@ -47,7 +50,7 @@ def plate_gaps(shape: FaceShape, body: Obstacle) -> PlateGaps:
     is_over = is_beside & (distance >= -SLIGHT)
     is_on = (is_over & (distance <= SLIGHT)).any(axis=0)
     is_inside = _is_inside(shape.nodes, start, end) & ~is_on
-    nearest = _nearest_facing(shape, share, distance, length, normal)
+    nearest = _nearest_facing(share, distance, length, normal)
     is_over = np.where(is_inside, nearest, is_over)
     first, last = body.plates[:, 0, None, None], body.plates[:, 1, None, None]
     return PlateGaps(distance, is_over, np.where(share < 0.5, first, last), normal)
@@ -62,22 +65,11 @@ def _is_inside(nodes: Array, start: Array, end: Array) -> Flags:
     return np.asarray((spans & (x < x0 + (y - y0) * (x1 - x0) / rise)).sum(axis=0) % 2 == 1)
 
 
-def _nearest_facing(
-    shape: FaceShape, share: Array, distance: Array, length: Array, normal: Array
-) -> Flags:
-    """The nearest plate that a node is behind: one that faces the finger, if any does."""
+def _nearest_facing(share: Array, distance: Array, length: Array, normal: Array) -> Flags:
+    """The nearest plate that a node is behind: one that faces fingers, if any does."""
     beyond = (share - np.clip(share, 0.0, 1.0)) * length[:, None]
     away = np.hypot(distance, beyond)
-    is_facing = total(normal[:, :, None] * _inwards(shape.nodes)[:, None]) < 0.0
+    is_facing = (normal[0] + normal[1] > SIDEWAYS)[:, None]
     rank = np.where(is_facing, away, away + away.max())
     rank = np.where(distance < 0.0, rank, np.inf)
     return np.asarray(np.arange(len(rank))[:, None, None] == rank.argmin(axis=0))
-
-
-def _inwards(nodes: Array) -> Array:
-    """The middle of the directions that each node of a face points to, (2, node, batch)."""
-    side = np.diff(nodes, axis=1)
-    along = side / np.sqrt(total(side * side))
-    inwards = np.stack((along[1], -along[0]))
-    before = np.concatenate((-along[:, :1], inwards), axis=1)
-    return np.asarray(before + np.concatenate((inwards, along[:, -1:]), axis=1))
