@@ -24,8 +24,9 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Scene
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
@@ -178,7 +179,7 @@ def grasp(
 def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
     """The body of these arguments, or of the scene. Raises UsageError for what is none."""
     check_texts(object=body)
-    known = scene.body
+    known = scene.body if isinstance(scene.body, Disc) else None
     if body is None and known is None:
         raise UsageError(
             Field("object"), ": expected a body such as disc:40, here or as object in the spec"
@@ -222,7 +223,7 @@ def grasp_of(
     return GraspResult(given, found)
 
 
-def check_body(scene: Scene, body: Disc) -> None:
+def check_body(scene: Scene, body: Body) -> None:
     """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
     from dpgcli.grasping.frames import frames
 
@@ -231,6 +232,8 @@ def check_body(scene: Scene, body: Disc) -> None:
             "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
             "half of it inside the lattice"
         )
+    if not isinstance(body, Disc):
+        return
     height = float(np.max(scene.finger.segment_height))
     for frame in frames(scene.gripper):
         x, y = frame.inside(body.center)

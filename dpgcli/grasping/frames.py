@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.scene import Gripper
+from dpgcli.mechanics.obstacle import Obstacle
 
 
 class FingerFrame(NamedTuple):
@@ -42,6 +44,12 @@ class FingerFrame(NamedTuple):
         shift = np.zeros((2,) + (1,) * (point.ndim - 1))
         shift[1] = self.side * self.offset
         return self.outside(point) + shift
+
+    def obstacle(self, body: Body) -> Obstacle:
+        """What a body is to the finger."""
+        if isinstance(body, Disc):
+            return Obstacle.disc(self.inside(body.center), body.radius)
+        return Obstacle.polygon(self.inside(body.corners))
 
 
 def frames(gripper: Gripper | None) -> tuple[FingerFrame, ...]:

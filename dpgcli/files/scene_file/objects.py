@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from dpgcli.design.scene import Disc
+from dpgcli.design.bodies import Disc
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import Positive, Section
 
