@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Disc, Held, Scene
+from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
 from dpgcli.grasping.release import WAYS, let_go, motion_of
@@ -64,7 +65,13 @@ class Grasps:
         return self.fingers[finger], int(self.pairs[finger, row])
 
 
-def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes]) -> Grasps:
+def grasps(
+    scene: Scene,
+    formulate: Formulate,
+    body: Disc,
+    pairs: Sequence[Codes],
+    way: Way = Way.PLACE,
+) -> Grasps:
     """Pairs of states, (row,) each for the upper and the lower finger, against a body.
 
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
@@ -78,11 +85,13 @@ def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes
         if parts and is_alike:
             parts.append(parts[0])
         else:
-            parts.append(placed(scene, formulate, body, frame, codes))
+            parts.append(placed(scene, formulate, body, frame, codes, way))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
     if scene.held is Held.FIXED:
-        fingers = [described(part.own, [part.codes], part.grown, part.status)[0] for part in parts]
+        different = parts[:1] if is_alike else parts
+        told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
+        fingers = [finger for (finger,) in told] * (len(parts) // len(told))
         return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
     found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
