@@ -156,19 +156,19 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     assert thickness is not None, "the face is known"
     poses = [place_in_gripper(found.scene.gripper, thickness, f.nodes) for f in found.fingers]
     halves = [pose.aperture[lanes] for pose, lanes in zip(poses, found.pairs, strict=True)]
-    upper, lower = (_outlines(found, finger)[lanes] for finger, lanes in enumerate(found.pairs))
-    return {
-        "aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan),
-        "overlaps": shapely.intersects(upper, lower) & is_there,
-    }
+    overlaps = np.zeros(len(is_there), bool)
+    upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
+    overlaps[is_there] = shapely.intersects(upper, lower)
+    return {"aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan), "overlaps": overlaps}
 
 
-def _outlines(found: Grasps, finger: int) -> NDArray[np.object_]:
-    """Polygons of a finger in the gripper, (lane,): its face, and its tops back."""
+def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> NDArray[np.object_]:
+    """Polygons of a finger of some rows in the gripper: its face, and its tops back."""
     own, height = found.fingers[finger], found.scene.finger.segment_height
     base = np.stack((0.0 * own.face[0, :1], own.face[1, :1] * 0.0 + height))
     tops = np.stack((own.nodes.top_x, own.nodes.top_y))
     around = np.concatenate((own.face, tops[:, ::-1], base), axis=1)
+    around = around[:, :, found.pairs[finger, rows]]
     return np.asarray(shapely.polygons(found.frames[finger].placed(around).transpose(2, 1, 0)))
 
 
