@@ -126,6 +126,9 @@ class Gripper:
     mounting_angle: float | Array
 
 
+DIAMETER, PLACES = "disc.diameter_mm", ("at_x_mm", "at_y_mm")  # keys of a spec's object
+
+
 class Held(StrEnum):
     """How a body is held while fingers meet it."""
 
@@ -136,10 +139,36 @@ class Held(StrEnum):
 
 @dataclass(frozen=True)
 class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm.
+
+    Of a batch (2, design) and (design,).
+    """
 
     center: Array
-    radius: float
+    radius: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Disc":
+        """With values of designs, (design,), at a key of a spec's object.
+
+        >>> disc = Disc(np.array([40.0, 0.0]), 20.0).with_value("at_x_mm", np.array([30.0, 50.0]))
+        >>> disc.center.tolist(), disc.radius
+        ([[30.0, 50.0], [0.0, 0.0]], 20.0)
+        """
+        if key == DIAMETER:
+            return Disc(self.center, 0.5 * column)
+        x, y = (column if key == own else at for own, at in zip(PLACES, self.center, strict=True))
+        return Disc(np.stack(np.broadcast_arrays(x, y)), self.radius)
+
+    def take_lanes(self, index: Indices) -> "Disc":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        center, radius = np.reshape(self.center, (2, -1)), np.reshape(self.radius, -1)
+        return Disc(*(_taken(values, index) for values in (center, radius)))
+
+
+def _taken(values: Array, index: Indices) -> Array:
+    """Values of some lanes; of an array with one lane for all as many times."""
+    one_for_all = values.shape[-1] == 1
+    return np.take(values, 0 * index if one_for_all else index, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -186,4 +215,13 @@ class Scene:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
         layer = None if thickness is None else np.take(thickness, index)
         pressure = self.pressure and self.pressure.take_lanes(index)
-        return Scene(self.finger.take_lanes(index), (), gripper, layer, pressure=pressure)
+        body = self.body and self.body.take_lanes(index)
+        return Scene(
+            self.finger.take_lanes(index),
+            (),
+            gripper,
+            layer,
+            pressure=pressure,
+            body=body,
+            held=self.held,
+        )

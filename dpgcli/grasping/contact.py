@@ -372,7 +372,7 @@ class Obstructed:
         here, push, lanes = start.copy(), push.copy(), np.arange(start.shape[1])
         found = ContactShapes(here.copy(), push.copy(), push > 0.0, inverted.copy(), lanes < 0)
         n_stuck = np.zeros(len(lanes), int)
-        for _ in range(MOST_UPDATES):
+        for count in range(MOST_UPDATES):
             own = self.take_lanes(lanes)
             potential = own.pressed(inverted[:, lanes], push[:, lanes], load[lanes])
             there = minimize(
@@ -385,9 +385,9 @@ class Obstructed:
             near = own.finished(there.coordinates, inverted[:, lanes], pushed, load[lanes])
             away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
             is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
-            found.put(lanes[is_near], near.take_lanes(np.flatnonzero(is_near)))
             n_stuck = np.where(there.relative_residual > STUCK, n_stuck + 1, 0)
-            goes_on = ~is_near & (n_stuck < MOST_STUCK)
+            goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
+            found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
             lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
             if not len(lanes):
                 break
