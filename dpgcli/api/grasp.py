@@ -15,6 +15,7 @@ from dpgcli.api.inputs import (
     as_texts,
     check_flags,
     check_texts,
+    chosen,
     figure_path,
     path_of,
     point,
@@ -26,6 +27,7 @@ from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Disc, Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.grasping.approach import Way
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
@@ -79,7 +81,10 @@ class GraspResult:
             f"the way; worst penetration {_worst(rows['penetration_mm']):.2g} mm, worst residual "
             f"{_worst(rows['residual_N']):.2g} N"
         )
-        if n_other := int(n - is_there.sum()):
+        is_let_go = rows["status"] == Status.NOT_HELD
+        if n_let_go := int(is_let_go.sum()):
+            yield f"{counted(n_let_go, 'state')} from which the body gets away: not_held"
+        if n_other := int(n - (is_there | is_let_go).sum()):
             yield f"{counted(n_other, 'state')} without an answer: see the column status"
         if "overlaps" in rows and rows["overlaps"].any():
             yield (
@@ -142,15 +147,18 @@ def grasp(
     at: Sequence[float] | None = None,
     patterns: str | Sequence[str] = "*",
     both: bool = False,
+    approach: str = "place",
     settings: Settings = (),
 ) -> GraspResult:
-    """What the fingers of a spec do with a body that does not move.
+    """What the fingers of a spec do with a body in their way.
 
     `object` is such as "disc:40", a disc of 40 mm, and `at` its place (mm) in the gripper's frame;
     those of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
     for the upper and the lower finger, "111*/11100"; with `both` every pattern meets every other.
-    The body grows from nothing at its place. Raises SpecError for a wrong spec, UsageError for
-    what is no body or pattern, a body that begins in a base, and for too many states.
+    With the `approach` "place" the body grows from nothing at its place, with "insert" it comes in
+    along −x from beyond the fingers; then it is let go of, if the spec says that it is not fixed.
+    Raises SpecError for a wrong spec, UsageError for what is no body, pattern or approach, a body
+    that begins in a base, and for too many states.
 
     >>> from dpgcli.design.scene import Gripper, Scene
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -162,7 +170,9 @@ def grasp(
     """
     check_flags(both=both)
     given = scene_input(spec, settings)
-    return grasp_of(given, disc_of(given.scene, object, at), as_texts("patterns", patterns), both)
+    way = chosen(Way, "approach", approach)
+    body = disc_of(given.scene, object, at)
+    return grasp_of(given, body, as_texts("patterns", patterns), both, way)
 
 
 def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
@@ -197,14 +207,19 @@ def _diameter(text: str) -> float:
 
 
 def grasp_of(
-    given: SceneInput, body: Disc, patterns: Sequence[str], both: bool = False
+    given: SceneInput,
+    body: Disc,
+    patterns: Sequence[str],
+    both: bool = False,
+    way: Way = Way.PLACE,
 ) -> GraspResult:
     """The same, of what was read before."""
     scene = given.scene
     check_body(scene, body)
     pairs = pairs_of(patterns, scene, both)
     keep_freed_memory()
-    return GraspResult(given, grasps(replace(scene, body=body), chain_potential, body, pairs))
+    found = grasps(replace(scene, body=body), chain_potential, body, pairs, way)
+    return GraspResult(given, found)
 
 
 def check_body(scene: Scene, body: Disc) -> None:

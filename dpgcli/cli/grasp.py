@@ -1,6 +1,7 @@
 """`dpg grasp`: what the fingers of a gripper do with a body between them."""
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,22 @@ Place = Annotated[
 Both = Annotated[
     bool, typer.Option("--both", help="All pairs of states, of the upper and the lower finger")
 ]
+
+
+class ApproachName(StrEnum):
+    """How a body comes to where it is grasped."""
+
+    PLACE = "place"
+    INSERT = "insert"
+
+
+Coming = Annotated[
+    ApproachName,
+    typer.Option(
+        "--approach",
+        help="How the body comes: it grows at its place, or is moved in along -x from beyond",
+    ),
+]
 Plot = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Draw each grasp: a .svg or .png file"),
@@ -43,6 +60,7 @@ def grasp(
     at: Place = None,
     patterns: Patterns = None,
     both: Both = False,
+    approach: Coming = ApproachName.PLACE,
     settings: Settings = None,
     printed_as: Annotated[
         Format | None, typer.Option("--format", help="How to print the grasps")
@@ -55,6 +73,7 @@ def grasp(
     from dpgcli.api.grasp import check_drawable, disc_of, grasp_of, pairs_of
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
+    from dpgcli.grasping.approach import Way
 
     if plot is not None:
         check_plot(plot)
@@ -66,7 +85,7 @@ def grasp(
         check_drawable(len(pairs_of(chosen, given.scene, both)[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, disc, chosen, both)
+        found = grasp_of(given, disc, chosen, both, Way(approach.value))
     if output is not None:
         found.save(output)
     if plot is not None:

@@ -96,7 +96,8 @@ def grasps(
     found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
-    centers = np.where(is_there, centers + WAYS[scene.held] @ moved + 0.0, np.nan)
+    away = _rounded(WAYS[scene.held] @ moved, scene.finger.straight_length)
+    centers = np.where(is_there, centers + away, np.nan)
     return Grasps(scene, body, seen_from, found, rows, centers)
 
 
@@ -123,6 +124,7 @@ def grasp_rows(found: Grasps) -> Columns:
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
 
+    most = np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)
     rows: Columns = {
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
@@ -133,10 +135,10 @@ def grasp_rows(found: Grasps) -> Columns:
         ),
         "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
         "touching": _joined([_phalanges(t) for t in touches], is_there),
-        "finger_force_x_N": known(forces[0][0]),
-        "finger_force_y_N": known(forces[0][1]),
+        "finger_force_x_N": known(_rounded(forces[0][0], most)),
+        "finger_force_y_N": known(_rounded(forces[0][1], most)),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
-        "max_contact_N": known(np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)),
+        "max_contact_N": known(most),
         "object_x_mm": found.centers[0],
         "object_y_mm": found.centers[1],
         "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
@@ -147,6 +149,11 @@ def grasp_rows(found: Grasps) -> Columns:
     if found.scene.gripper is not None:
         rows.update(_between(found, is_there))
     return {column.name: rows[column.name] for column in columns_of(found.scene)}
+
+
+def _rounded(values: Array, scale: Array | float) -> Array:
+    """Values without those that are nothing but rounding."""
+    return np.where(np.abs(values) > TOUCHES * scale, values, 0.0)
 
 
 def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:

@@ -44,6 +44,14 @@ def swept(base: dict[str, Any], *axes: tuple[str, list[float]], **more: Any) -> 
         (SPEC, {"object.disc.diameter_mm": [12.0, 20.0, 24.0], "object.at_x_mm": [28.0, 34.0]}),
         (SPEC, {"object.at_y_mm": [0.0, -2.5, 3.0], "gripper.base_spacing_mm": [26.0, 30.0]}),
         (SPEC, {"gripper.mounting_angle_deg": [0.0, 8.0], "finger.lattice.stroke_mm": [3.0, 3.5]}),
+        (
+            {**SPEC, "object": {**BODY, "held": "guided"}},
+            {"object.disc.diameter_mm": [16.0, 20.0], "object.at_x_mm": [26.0, 32.0]},
+        ),
+        (
+            {**SPEC, "object": {**BODY, "held": "free"}},
+            {"object.at_y_mm": [0.0, 1.5], "gripper.mounting_angle_deg": [0.0, 5.0]},
+        ),
         (ALONE, {"object.at_y_mm": [-9.0, -7.5], "object.disc.diameter_mm": [10.0, 12.0]}),
     ],
 )

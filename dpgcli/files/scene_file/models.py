@@ -14,6 +14,7 @@ from pydantic.json_schema import SkipJsonSchema
 from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
+from dpgcli.design.scene import Held
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.loads import LoadsSpec
@@ -169,6 +170,7 @@ class Spec(Section):
             hinge_coupling=None if coupling is None else np.array([coupling], float),
             loads=None if self.loads is None else self.loads.known,
             body=None if self.object is None else self.object.known,
+            held=Held.FIXED if self.object is None else Held(self.object.held),
         )
 
 

@@ -13,7 +13,7 @@ PLACE = "at_mm"
 EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
     **dict.fromkeys(PLACES, "a number in mm"),
-    "held": '"fixed": it does not move',
+    "held": '"fixed", "guided" (moves along x) or "free"',
 }
 
 
@@ -37,7 +37,10 @@ class ObjectSpec(Section):
     at_y_mm: Bounded | None = Field(
         default=None, description="Its part along y, in mm, instead of that in at_mm."
     )
-    held: Literal["fixed"] = Field(default="fixed", description="How it is held: it does not move.")
+    held: Literal["fixed", "guided", "free"] = Field(
+        default="fixed",
+        description="How it is held: fixed, guided (it moves along x only), or free.",
+    )
 
     @property
     def known(self) -> Disc:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from dpgcli.design.dimensions import MAX_UNITS, range_issues
 from dpgcli.design.lines import line_issues
 from dpgcli.design.problems import Issue
-from dpgcli.design.scene import Scene
+from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import SpecError
 from dpgcli.files.places import Location, located
 from dpgcli.files.scene_file.models import Spec
@@ -24,8 +24,10 @@ def scene_of(spec: Spec) -> Scene:
     if found := resolution.problems.of(0):
         place = Location("spec")
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
-    body = None if spec.object is None else spec.object.known
-    return replace(resolution.scene(), body=body)
+    scene = resolution.scene()
+    if spec.object is None:
+        return scene
+    return replace(scene, body=spec.object.known, held=Held(spec.object.held))
 
 
 def early_issues(data: Any) -> list[Issue]:
