@@ -14,8 +14,8 @@ from pydantic.json_schema import SkipJsonSchema
 from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
-from dpgcli.design.scene import Held
 from dpgcli.design.resolve import Resolution, resolve
+from dpgcli.design.scene import Held
 from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.loads import LoadsSpec
 from dpgcli.files.scene_file.objects import ObjectSpec
