@@ -225,25 +225,19 @@ def grasp_of(
 
 def check_body(scene: Scene, body: Body) -> None:
     """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
-    from dpgcli.grasping.frames import frames
+    from dpgcli.grasping.frames import begins_in_base
 
     if scene.layer_thickness is None:
         raise UsageError(
             "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
             "half of it inside the lattice"
         )
-    if not isinstance(body, Disc):
-        return
-    height = float(np.max(scene.finger.segment_height))
-    for frame in frames(scene.gripper):
-        x, y = frame.inside(body.center)
-        beside = max(-0.5 * float(np.squeeze(scene.layer_thickness)) - y, y - height, 0.0)
-        if np.hypot(x, beside) < body.radius and x < body.radius:
-            raise UsageError(
-                Field("at"),
-                f" {body.center[0]:g},{body.center[1]:g}: a disc of {2.0 * body.radius:g} mm there "
-                "begins in the base of a finger: move it along x, or take a smaller one",
-            )
+    if begins_in_base(scene, body).any():
+        raise UsageError(
+            Field("at"),
+            f" {body.center[0]:g},{body.center[1]:g}: a body there begins in the base of a finger: "
+            "move it along x, or take a smaller one",
+        )
 
 
 def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, ...]:

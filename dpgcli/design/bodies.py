@@ -5,30 +5,53 @@ from functools import cached_property
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Indices
+
+DIAMETER, PLACES = "disc.diameter_mm", ("at_x_mm", "at_y_mm")  # keys of a spec's object
 
 
 @dataclass(frozen=True)
 class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm.
+
+    Of a batch (2, design) and (design,).
+    """
 
     center: Array
-    radius: float
+    radius: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Disc":
+        """With values of designs, (design,), at a key of a spec's object.
+
+        >>> disc = Disc(np.array([40.0, 0.0]), 20.0).with_value("at_x_mm", np.array([30.0, 50.0]))
+        >>> disc.center.tolist(), disc.radius
+        ([[30.0, 50.0], [0.0, 0.0]], 20.0)
+        """
+        if key == DIAMETER:
+            return Disc(self.center, 0.5 * column)
+        x, y = (column if key == own else at for own, at in zip(PLACES, self.center, strict=True))
+        return Disc(np.stack(np.broadcast_arrays(x, y)), self.radius)
+
+    def take_lanes(self, index: Indices) -> "Disc":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        center, radius = np.reshape(self.center, (2, -1)), np.reshape(self.radius, -1)
+        return Disc(*(_taken(values, index) for values in (center, radius)))
 
     @property
-    def inner_radius(self) -> float:
+    def inner_radius(self) -> float | Array:
         """The radius of the largest circle in it, mm."""
         return self.radius
 
     @property
-    def nearest_x(self) -> float:
+    def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return float(self.center[0]) - self.radius
+        nearest: float | Array = self.center[0] - self.radius
+        return nearest
 
     @property
     def is_mirrored(self) -> bool:
         """Whether both fingers of a gripper meet the same."""
-        return bool(self.center[1] == 0.0)
+        return bool((self.center[1] == 0.0).all())
 
 
 @dataclass(frozen=True)
@@ -41,6 +64,10 @@ class Polygon:
 
     center: Array
     around: Array
+
+    def take_lanes(self, index: Indices) -> "Polygon":
+        """Itself: nothing in it is by design."""
+        return self
 
     @cached_property
     def corners(self) -> Array:
@@ -82,6 +109,10 @@ class Jaws:
     gap: float
     height: float
 
+    def take_lanes(self, index: Indices) -> "Jaws":
+        """Itself: nothing in it is by design."""
+        return self
+
     @cached_property
     def corners(self) -> Array:
         """The ends of the plates in the gripper's frame, the lower one's first, (2, 4), mm."""
@@ -106,3 +137,9 @@ class Jaws:
 
 
 Body = Disc | Jaws | Polygon
+
+
+def _taken(values: Array, index: Indices) -> Array:
+    """Values of some lanes; of an array with one lane for all as many times."""
+    one_for_all = values.shape[-1] == 1
+    return np.take(values, 0 * index if one_for_all else index, axis=-1)

@@ -29,9 +29,9 @@ class Obstacle:
     plates: Indices = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     @classmethod
-    def disc(cls, center: Array, radius: float) -> Self:
-        """A disc about a center (2,)."""
-        return cls(center[:, None, None], np.full((1, 1), radius))
+    def disc(cls, center: Array, radius: float | Array) -> Self:
+        """A disc about a center (2,), or one for each lane, (2, batch)."""
+        return cls(center.reshape(2, 1, -1), np.reshape(radius, (1, -1)))
 
     @classmethod
     def polygon(cls, corners: Array) -> Self:

@@ -5,13 +5,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import PLACES, Disc
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import Positive, Section
 
 PLACE = "at_mm"
 EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
+    **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
 }
 
@@ -30,6 +31,12 @@ class ObjectSpec(Section):
         description="Where its center is in the gripper's frame, in mm: between the bases, x along "
         "the fingers; of a finger alone in its own frame."
     )
+    at_x_mm: Bounded | None = Field(
+        default=None, description="Its part along x, in mm, instead of that in at_mm."
+    )
+    at_y_mm: Bounded | None = Field(
+        default=None, description="Its part along y, in mm, instead of that in at_mm."
+    )
     held: Literal["fixed", "guided", "free"] = Field(
         default="fixed",
         description="How it is held: fixed, guided (it moves along x only), or free.",
@@ -38,4 +45,6 @@ class ObjectSpec(Section):
     @property
     def known(self) -> Disc:
         """The value that it stands for."""
-        return Disc(np.array(self.at_mm, float), 0.5 * self.disc.diameter_mm)
+        own = (self.at_x_mm, self.at_y_mm)
+        at = [said if part is None else part for said, part in zip(self.at_mm, own, strict=True)]
+        return Disc(np.array(at, float), 0.5 * self.disc.diameter_mm)
