@@ -1,6 +1,7 @@
 """`dpg grasp`: what the fingers of a gripper do with a body between them."""
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +23,7 @@ from dpgcli.cli.streams import say
 
 Body = Annotated[
     str | None,
-    typer.Option("--object", metavar="BODY", help="Body to grasp: disc:40, of 40 mm"),
+    typer.Option("--object", metavar="BODY", help="Body: disc:40, jaws:30x40 or a YAML file"),
 ]
 Place = Annotated[
     str | None,
@@ -30,6 +31,22 @@ Place = Annotated[
 ]
 Both = Annotated[
     bool, typer.Option("--both", help="All pairs of states, of the upper and the lower finger")
+]
+
+
+class ApproachName(StrEnum):
+    """How a body comes to where it is grasped."""
+
+    PLACE = "place"
+    INSERT = "insert"
+
+
+Coming = Annotated[
+    ApproachName,
+    typer.Option(
+        "--approach",
+        help="How the body comes: it grows at its place, or is moved in along -x from beyond",
+    ),
 ]
 Plot = Annotated[
     Path | None,
@@ -43,6 +60,7 @@ def grasp(
     at: Place = None,
     patterns: Patterns = None,
     both: Both = False,
+    approach: Coming = ApproachName.PLACE,
     settings: Settings = None,
     printed_as: Annotated[
         Format | None, typer.Option("--format", help="How to print the grasps")
@@ -52,21 +70,22 @@ def grasp(
     quiet: Quiet = False,
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
-    from dpgcli.api.grasp import check_drawable, disc_of, grasp_of, pairs_of
+    from dpgcli.api.bodies import with_body
+    from dpgcli.api.grasp import check_drawable, grasp_of, pairs_of
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
+    from dpgcli.grasping.approach import Way
 
     if plot is not None:
         check_plot(plot)
     check_table_name(output)
-    given = scene_input(spec, settings or ())
-    disc = disc_of(given.scene, body, point("--at", at))
+    given = with_body(scene_input(spec, settings or ()), body, point("--at", at))
     chosen = tuple(patterns or ("*",))
     if plot is not None:
         check_drawable(len(pairs_of(chosen, given.scene, both)[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, disc, chosen, both)
+        found = grasp_of(given, chosen, both, Way(approach.value))
     if output is not None:
         found.save(output)
     if plot is not None:

@@ -1,11 +1,12 @@
-"""How fingers come to touch a body: it grows from nothing at its place; units reset as they must.
+"""How fingers come to touch a body: it grows at its place, or moves to it, and units reset.
 
 Contacts close and open on the way without any change of shape. Where a finger loses its balance, a
-unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as large as
-it is there; then the body goes on growing.
+unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as it is
+there; then the body goes on.
 """
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from dpgcli.grasping.contact import ContactShapes, Obstructed
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
 MOST_HALTS = 40  # by unit
+LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,36 @@ class Approach:
     shapes: ContactShapes
     load: Array
     resets: tuple[Reset, ...]
+
+
+class Way(StrEnum):
+    """How a body comes to where it is grasped."""
+
+    PLACE = "place"
+    INSERT = "insert"
+
+
+def moved_in(obstructed: Obstructed, start: ContactShapes) -> Approach:
+    """Let a body move to its place as its motion says, from where no finger touches it."""
+    met = _share_before_contact(obstructed, start)
+    shapes = obstructed.moved_to(start, met)
+    came = Approach(shapes, met, ())
+    for share in (0.0, *np.arange(1, STAGES + 1) / STAGES):
+        end = met + np.maximum(1.0 / LOOKS, share * (1.0 - met))
+        onwards = approach(obstructed, came.shapes, came.load, np.minimum(end, 1.0))
+        came = Approach(onwards.shapes, onwards.load, (*came.resets, *onwards.resets))
+    return came
+
+
+def _share_before_contact(obstructed: Obstructed, start: ContactShapes) -> Array:
+    """The share of its way that a body has come before it touches a finger, (batch,)."""
+    share = np.zeros(start.coordinates.shape[1])
+    for look in np.arange(1, LOOKS + 1) / LOOKS:
+        there = obstructed.moved_to(start, 0.0 * share + look)
+        gaps = obstructed.gaps()(there.coordinates).value[: obstructed.n_gaps]
+        is_clear = (gaps.min(axis=0) > 0.0) & (share >= look - 1.5 / LOOKS)
+        share = np.where(is_clear, look, share)
+    return share
 
 
 def approach(

@@ -307,6 +307,19 @@ class Obstructed:
         whole = np.broadcast_to(values, (n, values.shape[1]))
         return np.tile(whole, (self.n_fingers, 1)) if self.n_fingers > 1 else values
 
+    def moved_to(self, shapes: ContactShapes, load: Array) -> ContactShapes:
+        """Shapes with the body where its motion has it at a load; the fingers stay."""
+        assert self.motion is not None and self.motion.travel is not None, "it is moved"
+        coordinates = shapes.coordinates.copy()
+        coordinates[self.n_own :] = (load - 1.0) * self.motion.travel
+        return replace(shapes, coordinates=coordinates)
+
+    def at_rest(self, shapes: ContactShapes) -> ContactShapes:
+        """Shapes of fingers whose body has come to its place, as those of one that stays there."""
+        cells = slice(self.n_gaps)
+        coordinates, push = shapes.coordinates[: self.n_own], shapes.push[cells]
+        return replace(shapes, coordinates=coordinates, push=push, active=shapes.active[cells])
+
     def relabeled(self, shapes: ContactShapes) -> ContactShapes:
         """Shapes with each contact counted as that of the side to which it has come."""
         place = self.gaps()(shapes.coordinates).place

@@ -11,8 +11,8 @@ from dpgcli.arrays import Array, Codes, Flags, Indices, total
 from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
-from dpgcli.grasping.approach import Approach, Reset, approach
-from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
+from dpgcli.grasping.contact import Motion, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
@@ -95,30 +95,58 @@ class Placed:
 
 
 def placed(
-    scene: Scene, formulate: Formulate, body: Body, frame: FingerFrame, codes: Codes
+    scene: Scene,
+    formulate: Formulate,
+    body: Body,
+    frame: FingerFrame,
+    codes: Codes,
+    way: Way = Way.PLACE,
 ) -> Placed:
-    """Let a body grow at its place about fingers in these states.
+    """Let fingers in these states meet a body that grows at its place, or moves to it.
 
     Raises ValueError for a scene without the thickness of its layer.
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
     units = UnitSolutions.of(scene.finger)
-    n = scene.finger.n_units
-    pattern = inverted_units(codes, n)
+    pattern = inverted_units(codes, scene.finger.n_units)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
     thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
     bare = Obstructed(units, formulate, thickness, (frame.obstacle(body),), np.zeros(1))
     x = free.equilibrium.coordinates
     depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
-    nothing, begin = np.zeros((bare.n_gaps, len(codes))), np.zeros(len(codes))
-    start = own.finished(x, pattern, nothing, begin)
-    is_stable = free.status == Status.STABLE
+    is_stable = np.asarray(free.status == Status.STABLE)
+    came = (_grown if way is Way.PLACE else _inserted)(own, body, frame, x, pattern, is_stable)
+    is_lost = is_stable & ~came.shapes.is_there
+    return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
+
+
+def _grown(
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+) -> Approach:
+    """How fingers in free states, coordinates (size, batch), meet a body that grows."""
+    begin = np.zeros(x.shape[1])
+    start = own.finished(x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
     start = replace(start, is_there=start.is_there & is_stable)
-    grown = approach(own, start, begin, begin + 1.0)
-    is_lost = is_stable & ~grown.shapes.is_there
-    return Placed(codes, own, grown, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
+    return approach(own, start, begin, begin + 1.0)
+
+
+def _inserted(
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+) -> Approach:
+    """The same of a body that comes in along −x, from beyond where the fingers could reach."""
+    finger, begin = own.units.finger, np.zeros(x.shape[1])
+    furthest = finger.straight_length + finger.segment_height[0] + own.thickness[0]
+    from_there = np.maximum(furthest - body.nearest_x, 0.0)[None]
+    along = frame.along(np.array([1.0, 0.0]))[:, None, None]
+    motion = Motion((along,), travel=-from_there)
+    coming = replace(own, depth=np.zeros(1), motion=motion)
+    start = np.concatenate((x, np.broadcast_to(from_there, (1, len(begin)))))
+    nothing = np.zeros((coming.n_gaps + 1, len(begin)))
+    shapes = coming.finished(start, pattern, nothing, begin)
+    came = moved_in(coming, replace(shapes, is_there=shapes.is_there & is_stable))
+    return replace(came, shapes=coming.at_rest(came.shapes))
 
 
 def described(

@@ -11,6 +11,7 @@ from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.bodies import Body
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Held, Scene
+from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
 from dpgcli.grasping.release import WAYS, let_go, motion_of
@@ -65,7 +66,13 @@ class Grasps:
         return self.fingers[finger], int(self.pairs[finger, row])
 
 
-def grasps(scene: Scene, formulate: Formulate, body: Body, pairs: Sequence[Codes]) -> Grasps:
+def grasps(
+    scene: Scene,
+    formulate: Formulate,
+    body: Body,
+    pairs: Sequence[Codes],
+    way: Way = Way.PLACE,
+) -> Grasps:
     """Pairs of states, (row,) each for the upper and the lower finger, against a body.
 
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
@@ -79,16 +86,19 @@ def grasps(scene: Scene, formulate: Formulate, body: Body, pairs: Sequence[Codes
         if parts and is_alike:
             parts.append(parts[0])
         else:
-            parts.append(placed(scene, formulate, body, frame, codes))
+            parts.append(placed(scene, formulate, body, frame, codes, way))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
     if scene.held is Held.FIXED:
-        fingers = [described(part.own, [part.codes], part.grown, part.status)[0] for part in parts]
+        different = parts[:1] if is_alike else parts
+        told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
+        fingers = [finger for (finger,) in told] * (len(parts) // len(told))
         return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
     found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
-    centers = np.where(is_there, centers + WAYS[scene.held] @ moved + 0.0, np.nan)
+    away = _rounded(WAYS[scene.held] @ moved, scene.finger.straight_length)
+    centers = np.where(is_there, centers + away, np.nan)
     return Grasps(scene, body, seen_from, found, rows, centers)
 
 
@@ -115,6 +125,7 @@ def grasp_rows(found: Grasps) -> Columns:
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
 
+    most = np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)
     rows: Columns = {
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
@@ -127,10 +138,10 @@ def grasp_rows(found: Grasps) -> Columns:
         "touching": _joined(
             [_touching(t, f) for t, f in zip(touches, found.fingers, strict=True)], is_there
         ),
-        "finger_force_x_N": known(forces[0][0]),
-        "finger_force_y_N": known(forces[0][1]),
+        "finger_force_x_N": known(_rounded(forces[0][0], most)),
+        "finger_force_y_N": known(_rounded(forces[0][1], most)),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
-        "max_contact_N": known(np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)),
+        "max_contact_N": known(most),
         "object_x_mm": found.centers[0],
         "object_y_mm": found.centers[1],
         "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
@@ -143,6 +154,11 @@ def grasp_rows(found: Grasps) -> Columns:
     return {column.name: rows[column.name] for column in columns_of(found.scene)}
 
 
+def _rounded(values: Array, scale: Array | float) -> Array:
+    """Values without those that are nothing but rounding."""
+    return np.where(np.abs(values) > TOUCHES * scale, values, 0.0)
+
+
 def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     """Aperture and overlap of the two fingers of each row."""
     assert found.scene.gripper is not None, "of a gripper"
@@ -150,19 +166,19 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     assert thickness is not None, "the face is known"
     poses = [place_in_gripper(found.scene.gripper, thickness, f.nodes) for f in found.fingers]
     halves = [pose.aperture[lanes] for pose, lanes in zip(poses, found.pairs, strict=True)]
-    upper, lower = (_outlines(found, finger)[lanes] for finger, lanes in enumerate(found.pairs))
-    return {
-        "aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan),
-        "overlaps": shapely.intersects(upper, lower) & is_there,
-    }
+    overlaps = np.zeros(len(is_there), bool)
+    upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
+    overlaps[is_there] = shapely.intersects(upper, lower)
+    return {"aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan), "overlaps": overlaps}
 
 
-def _outlines(found: Grasps, finger: int) -> NDArray[np.object_]:
-    """Polygons of a finger in the gripper, (lane,): its face, and its tops back."""
+def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> NDArray[np.object_]:
+    """Polygons of a finger of some rows in the gripper: its face, and its tops back."""
     own, height = found.fingers[finger], found.scene.finger.segment_height
     base = np.stack((0.0 * own.face[0, :1], own.face[1, :1] * 0.0 + height))
     tops = np.stack((own.nodes.top_x, own.nodes.top_y))
     around = np.concatenate((own.face, tops[:, ::-1], base), axis=1)
+    around = around[:, :, found.pairs[finger, rows]]
     return np.asarray(shapely.polygons(found.frames[finger].placed(around).transpose(2, 1, 0)))
 
 
