@@ -84,10 +84,8 @@ def _of_text(said: str, place: Array | None) -> Body:
     return Jaws(_known(place), gap, height)
 
 
-def check_body(scene: Scene) -> None:
+def check_body(scene: Scene, body: Body) -> None:
     """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
-    body = scene.body
-    assert body is not None, "a scene with a body"
     if scene.layer_thickness is None:
         raise UsageError(
             "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "

@@ -179,8 +179,8 @@ def grasp_of(
 ) -> GraspResult:
     """The same, of a scene with a body that was read before."""
     scene = given.scene
-    check_body(scene)
     assert scene.body is not None, "a scene with a body"
+    check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
     keep_freed_memory()
     return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way))

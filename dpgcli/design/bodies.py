@@ -16,19 +16,19 @@ class Disc:
     radius: float
 
     @property
-    def name(self) -> str:
-        """What it is, with its size."""
-        return f"a disc of {2.0 * self.radius:g} mm"
-
-    @property
     def inner_radius(self) -> float:
         """The radius of the largest circle in it, mm."""
         return self.radius
 
     @property
+    def name(self) -> str:
+        """What it is, with its size."""
+        return f"a disc of {2.0 * self.radius:g} mm"
+
+    @property
     def nearest_x(self) -> float:
-        """Where it begins along the fingers, mm."""
-        return float(self.center[0] - self.radius)
+        """The least x of it, mm."""
+        return float(self.center[0]) - self.radius
 
     @property
     def is_mirrored(self) -> bool:
@@ -57,17 +57,17 @@ class Polygon:
         """What it is, with its size."""
         return f"a polygon of {self.around.shape[1]} corners"
 
+    @property
+    def nearest_x(self) -> float:
+        """The least x of it, mm."""
+        return float(self.corners[0].min())
+
     @cached_property
     def inner_radius(self) -> float:
         """The radius of the largest circle in it, mm."""
         import shapely
 
         return float(shapely.maximum_inscribed_circle(shapely.Polygon(self.around.T)).length)
-
-    @property
-    def nearest_x(self) -> float:
-        """Where it begins along the fingers, mm."""
-        return float(self.corners[0].min())
 
     @property
     def is_mirrored(self) -> bool:
@@ -105,14 +105,14 @@ class Jaws:
         return f"jaws of {self.gap:g} x {self.height:g} mm"
 
     @property
+    def nearest_x(self) -> float:
+        """The least x of it, mm."""
+        return float(self.corners[0].min())
+
+    @property
     def inner_radius(self) -> float:
         """The radius of the largest circle between them, mm."""
         return 0.5 * min(self.gap, self.height)
-
-    @property
-    def nearest_x(self) -> float:
-        """Where it begins along the fingers, mm."""
-        return float(self.corners[0].min())
 
     @property
     def is_mirrored(self) -> bool:

@@ -22,11 +22,15 @@ LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: befo
 
 @dataclass(frozen=True)
 class Reset:
-    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,)."""
+    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,).
+
+    `push` (cell, lane) are the pushes, N, at the fold.
+    """
 
     lanes: Indices
     load: Array
     flipped: Flags
+    push: Array
 
 
 @dataclass(frozen=True)
@@ -88,12 +92,13 @@ def approach(
         few = own.relabeled(shapes.take_lanes(lanes))
         family = own.family(few.inverted, few.active)
         ends = _told(own, few, follow(family, own.stacked(few), here[lanes], end[lanes]))
-        moved, flipped = _gone_on(own, few, ends, end[lanes])
+        moved, flipped, push = _gone_on(own, few, ends, end[lanes])
         here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
-            resets.append(Reset(lanes[changed], ends.load[changed], flipped[:, changed]))
+            which = flipped[:, changed], push[:, changed]
+            resets.append(Reset(lanes[changed], ends.load[changed], *which))
         goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
@@ -111,8 +116,8 @@ def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
 
 def _gone_on(
     own: Obstructed, before: ContactShapes, ends: Ends, end: Array
-) -> tuple[ContactShapes, Flags]:
-    """The shapes with which paths go on from where they ended, and units that flipped there."""
+) -> tuple[ContactShapes, Flags, Array]:
+    """The shapes with which paths go on, units that flipped where they ended, and pushes there."""
     size = len(before.coordinates)
     coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
     active, n = before.active.copy(), len(ends.load)
@@ -120,6 +125,7 @@ def _gone_on(
     active[ends.cell[events], events] ^= True
     push = y * own.stiffness
     push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
+    at_fold = push.copy()
     moved = ContactShapes(
         coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)
     )
@@ -133,7 +139,7 @@ def _gone_on(
         there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
-    return moved, flipped
+    return moved, flipped, at_fold
 
 
 def _beyond(ends: Ends) -> Array:

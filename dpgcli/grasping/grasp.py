@@ -194,7 +194,7 @@ def described(
 def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:
     n = own.units.finger.n_units
     parts = [(reset, reset.flipped[finger * n : (finger + 1) * n]) for reset in resets]
-    return tuple(Reset(r.lanes, r.load, f) for r, f in parts)
+    return tuple(replace(reset, flipped=flipped) for reset, flipped in parts)
 
 
 def _certified(own: Obstructed, grown: Approach, there: Equilibrium, finger: int) -> Settled:
