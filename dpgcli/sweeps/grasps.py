@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Indices
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
@@ -52,7 +52,7 @@ class Encounter(NamedTuple):
     units: UnitSolutions
     layer: Array
     gripper: Gripper | None
-    body: Disc
+    body: Body
     held: Held
 
 
