@@ -30,7 +30,7 @@ from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.hard_cases.cases import check_law
-from dpgcli.hard_cases.families import repeated
+from dpgcli.hard_cases.variants import repeated
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.equilibria import ExtendedStates, extended_states

@@ -132,7 +132,10 @@ def _print_table(title: str, records: list[dict[str, str]]) -> None:
 
 def _family(summary: "FamilySummary") -> dict[str, str]:
     counts = {verdict.value: str(n) for verdict, n in summary.verdicts.items()}
-    error = summary.true_threshold_error
+    errors = {
+        "threshold_error": summary.true_threshold_error,
+        "force_error_N": summary.true_force_error,
+    }
     return {
         "family": summary.family,
         "formulation": summary.formulation,
@@ -144,7 +147,7 @@ def _family(summary: "FamilySummary") -> dict[str, str]:
         "condition": _rounded(summary.condition),
         "true_tip_error_mm": _rounded(summary.true_tip_error),
         "iterations": f"{summary.iterations:.0f}" if summary.iterations >= 0 else "-",
-        **({} if math.isnan(error) else {"threshold_error": _rounded(error)}),
+        **{name: _rounded(error) for name, error in errors.items() if not math.isnan(error)},
     }
 
 

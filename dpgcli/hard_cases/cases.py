@@ -12,14 +12,8 @@ import numpy as np
 
 from dpgcli.arrays import Flags
 from dpgcli.errors import Field, UsageError
-from dpgcli.hard_cases.families import (
-    FAMILIES,
-    PATTERNS,
-    Family,
-    Start,
-    Variant,
-    few_patterns,
-)
+from dpgcli.hard_cases.families import FAMILIES, PATTERNS
+from dpgcli.hard_cases.variants import Family, Start, Variant, few_patterns
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import Published
 from dpgcli.states.plan import FORMULATIONS
@@ -120,5 +114,5 @@ def _cases(subject: str, family: Family, base: Finger) -> Iterator[Case]:
 
 
 def _by_chain_alone(variant: Variant) -> bool:
-    """Whether bars do not give way, or there is pressure."""
-    return variant.finger.is_rigid or bool(variant.pressure)
+    """Whether bars do not give way, or there is pressure or a disc."""
+    return variant.finger.is_rigid or bool(variant.pressure) or variant.disc is not None

@@ -1,13 +1,24 @@
 """Families of stiff and extreme variants of a finger, each of which varies one property."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.hard_cases.discs import discs
+from dpgcli.hard_cases.variants import (
+    LONG_FINGER,
+    Family,
+    Start,
+    Variant,
+    changed,
+    few_patterns,
+    repeated,
+    rigid,
+    with_bars,
+)
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
@@ -21,7 +32,6 @@ from dpgcli.states.wells import inverted_wells
 
 ALL_PATTERNS_UP_TO = 4  # units
 N_GRADED = 4  # units
-LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
 FOLD_SYMBOLS = {"force_linearity": "α", "hinge_stiffness": "k_θ", "stroke": "d"}
 CROSSED_DISTANCES = (1e-2, 1e-6, 1e-10, -1e-10, -1e-6, -1e-2)  # of α from its limit
 WALL_RATIOS = (1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6)  # c_w k_b
@@ -51,83 +61,11 @@ FOLDED_STARTS = {  # near and far corner (rad), and the pattern by the dome's op
 }
 
 
-@dataclass(frozen=True)
-class Start:
-    """The start of a search; by default, the pattern's own geometric guess.
-
-    Else each inverted unit is opened by `strokes` strokes, or the corners of every unit, near
-    and far, are at `corners` (rad).
-    """
-
-    strokes: float | None = None
-    corners: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Variant:
-    """A finger of one design with the patterns to solve; none stand for `few_patterns`.
-
-    The solver gets lengths in another unit, with `scale` of these units in a mm. With a sign
-    `pressure` the pressure on all domes goes that way, and what is asked for is where the first of
-    them loses its place.
-    """
-
-    label: str
-    finger: Finger
-    patterns: tuple[str, ...] = ()
-    start: Start = Start()
-    scale: float = 1.0
-    pressure: int = 0
-
-
-class Family(NamedTuple):
-    """Variants of a base finger in one property."""
-
-    name: str
-    variants: Callable[[Finger], Iterator[Variant]]
-
-
-def repeated(finger: Finger, n_units: int) -> Finger:
-    """A finger of n units that repeats those of another in turn."""
-    return finger.with_units([unit % finger.n_units for unit in range(n_units)])
-
-
-def changed(finger: Finger, **values: Array | float) -> Finger:
-    """The finger with other values, one for all units or one for each."""
-    columns = {name: np.reshape(np.asarray(v, float), (-1, 1)) for name, v in values.items()}
-    return finger.changed(**columns)
-
-
-def rigid(finger: Finger) -> Finger:
-    """The finger with bars that keep their lengths."""
-    return changed(finger, linear_stiffness=np.inf)
-
-
-def _with_bars(finger: Finger, ratio: float) -> Finger:
-    """The finger with bars so many times as stiff as its stiffest dome."""
-    return changed(finger, linear_stiffness=ratio * finger.bistable_stiffness.max())
-
-
 def _both(label: str, finger: Finger, **more: Any) -> Iterator[Variant]:
     """The finger as it is, and with rigid bars."""
     yield Variant(label, finger, **more)
     if not finger.is_rigid:
         yield Variant(f"{label}, k_L = ∞", rigid(finger), **more)
-
-
-def few_patterns(n_units: int, *, with_ground: bool = False) -> tuple[str, ...]:
-    """All units inverted, and every other one; of a long finger one unit in four.
-
-    With all inverted a long finger would run into itself.
-
-    >>> few_patterns(3), few_patterns(1, with_ground=True)
-    (('111', '101'), ('1', '0'))
-    """
-    if n_units >= LONG_FINGER:
-        return (("1000" * n_units)[:n_units],)
-    ground = ("0" * n_units,) if with_ground else ()
-    patterns = ("1" * n_units, ("10" * n_units)[:n_units], *ground)
-    return tuple(dict.fromkeys(patterns))
 
 
 def _patterns(base: Finger) -> Iterator[Variant]:
@@ -145,7 +83,7 @@ def _patterns(base: Finger) -> Iterator[Variant]:
 def _stiffness(base: Finger) -> Iterator[Variant]:
     patterns = few_patterns(base.n_units, with_ground=True)
     for exponent in range(16):
-        yield Variant(f"k_L/k_b = 1e{exponent}", _with_bars(base, 10.0**exponent), patterns)
+        yield Variant(f"k_L/k_b = 1e{exponent}", with_bars(base, 10.0**exponent), patterns)
     yield Variant("k_L = ∞", rigid(base), patterns)
 
 
@@ -230,7 +168,7 @@ def _guess(base: Finger) -> Iterator[Variant]:
             f"{strokes:g} stroke{'s' * (strokes != 1.0)}", base, start=Start(strokes=strokes)
         )
     for ratio in (1e6, 1e9, 1e12):
-        stiff = _with_bars(base, ratio)
+        stiff = with_bars(base, ratio)
         yield Variant(f"1 stroke, k_L/k_b = {ratio:g}", stiff, start=Start(strokes=1.0))
 
 
@@ -238,12 +176,12 @@ def _fold(base: Finger) -> Iterator[Variant]:
     """The weakest unit alone, at and beyond the loss of its second well."""
     unit = base.with_units([int(np.argmin(margins(base).force_linearity))])
     folds = limits(unit)
-    stiff = _with_bars(unit, 1e9)
+    stiff = with_bars(unit, 1e9)
     for name in FOLD_SYMBOLS:
         limit = float(getattr(folds, name)[0])
         yield from _approach("k_L = ∞", rigid(unit), name, limit)
         yield from _approach("k_L/k_b = 1e9", stiff, name, limit)
-    soft = _with_bars(unit, 10.0)
+    soft = with_bars(unit, 10.0)
     yield from _approach("k_L/k_b = 10", soft, "force_linearity", _last_linearity(soft))
     if not unit.is_rigid:
         yield from _approach("own k_L", unit, "force_linearity", _last_linearity(unit))
@@ -291,7 +229,7 @@ def _crossed(base: Finger) -> Iterator[Variant]:
         near = changed(finger, force_linearity=folds[label] * (1.0 - distance))
         side = f"{label}, α at fold {'−' if distance > 0.0 else '+'} {abs(distance):g}"
         for ratio in CROSSED_RATIOS:
-            yield Variant(f"{side}, k_L/k_b = {ratio:g}", _with_bars(near, ratio))
+            yield Variant(f"{side}, k_L/k_b = {ratio:g}", with_bars(near, ratio))
         yield Variant(f"{side}, k_L = ∞", rigid(near))
 
 
@@ -323,7 +261,7 @@ def _coupling(base: Finger) -> Iterator[Variant]:
 def _loads(base: Finger) -> Iterator[Variant]:
     """Dead loads up to just below the one that resets a unit, and beyond it."""
     finger = changed(repeated(base, LOADED_UNITS), gravity_y=1.0)
-    fingers = {f"k_L/k_b = {ratio:g}": _with_bars(finger, ratio) for ratio in LOADED_RATIOS}
+    fingers = {f"k_L/k_b = {ratio:g}": with_bars(finger, ratio) for ratio in LOADED_RATIOS}
     inverted = "1" * LOADED_UNITS
     for bars, unloaded in {**fingers, "k_L = ∞": rigid(finger)}.items():
         for words, load in DEAD_LOADS.items():
@@ -359,7 +297,7 @@ def _pressure(base: Finger) -> Iterator[Variant]:
         finger = _with_strokes(unit, np.linspace(0.9, 1.15, n_units))
         for ratio in PRESSED_RATIOS[:: 1 if n_units == 1 else 3]:
             label = f"{n_units} unit{'s' * (n_units > 1)}, k_L/k_b = {ratio:g}"
-            yield from _driven(label, _with_bars(finger, ratio))
+            yield from _driven(label, with_bars(finger, ratio))
         yield from _driven(f"{n_units} unit{'s' * (n_units > 1)}, k_L = ∞", rigid(finger))
     for apart, (bars, finger) in product(NEARLY_EQUAL, _stiff_and_rigid(unit).items()):
         factors = np.array([1.0, 1.0 + apart])
@@ -402,7 +340,7 @@ def _with_strokes(unit: Finger, factors: Array) -> Finger:
 
 
 def _stiff_and_rigid(unit: Finger) -> dict[str, Finger]:
-    return {"k_L/k_b = 1e3": _with_bars(unit, 1e3), "k_L = ∞": rigid(unit)}
+    return {"k_L/k_b = 1e3": with_bars(unit, 1e3), "k_L = ∞": rigid(unit)}
 
 
 PATTERNS = Family("patterns", _patterns)  # states of the finger as it is given
@@ -422,5 +360,6 @@ FAMILIES = (
     Family("coupling", _coupling),  # κ/k_θ from −0.499 to 0.4999999
     Family("loads", _loads),  # forces, couples and weights up to those that reset a unit
     Family("pressure", _pressure),  # thresholds of pressure, at the ends of what there is
+    Family("contact", discs),  # a disc in the way: large and small, grazing, in corners
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

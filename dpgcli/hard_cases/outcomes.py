@@ -51,6 +51,17 @@ class Threshold:
 
 
 @dataclass(frozen=True)
+class Touch:
+    """What a finger against a disc is said to feel: pushes (contact,) N, along its face.
+
+    `walls` (unit,) mm are what they make walls yield.
+    """
+
+    push: Array
+    walls: Array
+
+
+@dataclass(frozen=True)
 class Answer:
     """The solver's answer to a case, with lengths in mm.
 
@@ -70,13 +81,14 @@ class Answer:
     condition: float
     iterations: int
     threshold: Threshold | None = None
+    touch: Touch | None = None
 
 
 @dataclass(frozen=True)
 class Outcome:
     """An answer with its verdict and its true errors (mm, rad), NaN without a true state.
 
-    That of a threshold is relative to it.
+    That of a threshold is relative to it, that of pushes in N.
     """
 
     case: Case
@@ -85,6 +97,7 @@ class Outcome:
     true_tip_error: float
     true_angle_error: float
     true_threshold_error: float = np.nan
+    true_force_error: float = np.nan
 
     @property
     def is_failure(self) -> bool:

@@ -34,6 +34,7 @@ STRESS_COLUMNS = (
     _column("true_angle_error_rad", "rad", "difference from the tip angle in extended precision"),
     _column("iterations", "", "steps of Newton's method", Kind.COUNT),
     _column("true_threshold_error", "", "relative error of a threshold pressure"),
+    _column("true_force_error_N", "N", "largest error of a push of a body in the way"),
 )
 
 
@@ -59,6 +60,7 @@ def rows(outcomes: Sequence[Outcome]) -> Columns:
         "true_angle_error_rad": np.array([outcome.true_angle_error for outcome in outcomes]),
         "iterations": np.array([answer.iterations for answer in answers]),
         "true_threshold_error": np.array([outcome.true_threshold_error for outcome in outcomes]),
+        "true_force_error_N": np.array([outcome.true_force_error for outcome in outcomes]),
     }
 
 
@@ -82,6 +84,7 @@ class FamilySummary:
     true_tip_error: float
     iterations: float
     true_threshold_error: float
+    true_force_error: float
 
 
 def summarized(outcomes: Iterable[Outcome]) -> list[FamilySummary]:
@@ -108,6 +111,7 @@ def _family_summary(names: tuple[str, str, str], outcomes: list[Outcome]) -> Fam
         true_tip_error=_worst(outcome.true_tip_error for outcome in found),
         iterations=_worst(outcome.answer.iterations for outcome in found),
         true_threshold_error=_worst(outcome.true_threshold_error for outcome in found),
+        true_force_error=_worst(outcome.true_force_error for outcome in found),
     )
 
 

@@ -282,7 +282,21 @@ def _further(
 
 def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     """One state of `ExtendedStates`."""
-    bars, unknowns, expansion, factorization = found
+    pose, openings, in_pattern = pose_in_pattern(found.bars, found.unknowns, pattern)
+    return (
+        pose,
+        long_doubles([found.expansion.energy])[0],
+        openings,
+        *_spectrum(found),
+        found.factorization.is_positive,
+        in_pattern,
+    )
+
+
+def pose_in_pattern(
+    bars: Energy, unknowns: list["mpf"], pattern: Flags
+) -> tuple[ExtendedArray, ExtendedArray, bool]:
+    """Tip, openings and whether a shape is one that the pattern says, as in `ExtendedStates`."""
     nodes = bars.nodes(unknowns)
     shape = list(cells(ElasticBars(bars.units).base, nodes))
     angles = [angle for cell in shape for angle in corners(cell)]
@@ -293,16 +307,11 @@ def _row(found: Stationary, pattern: Flags) -> tuple[Any, ...]:
     sides = [x + w > spring_barrier(unit) for x, w, unit in domes]
     is_ahead = [cross(cell.top, strut) > 0 for cell in shape for strut in (cell.near, cell.far)]
     is_upright = max(map(abs, angles)) < np.pi / 2
+    in_pattern = sides == pattern.tolist() and all(is_ahead) and is_upright
     return (
         long_doubles([nodes[-4], nodes[-3], -sum(angles)]),
-        long_doubles([expansion.energy])[0],
         long_doubles(openings),
-        *_spectrum(found),
-        factorization.is_positive,
-        sides == pattern.tolist()
-        and all(is_ahead)
-        and is_upright
-        and not _meets_itself(bars, nodes),
+        in_pattern and not _meets_itself(bars, nodes),
     )
 
 

@@ -15,7 +15,8 @@ from dpgcli.hard_cases.cases import (
     check_families,
     study_finger,
 )
-from dpgcli.hard_cases.families import FAMILIES, FOLDED_STARTS, changed, rigid
+from dpgcli.hard_cases.families import FAMILIES, FOLDED_STARTS
+from dpgcli.hard_cases.variants import changed, rigid
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status, certify

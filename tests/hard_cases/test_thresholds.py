@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dpgcli.hard_cases.cases import Case, built_in_cases, study_finger
-from dpgcli.hard_cases.families import Variant, changed, rigid
 from dpgcli.hard_cases.outcomes import Answer, Verdict
 from dpgcli.hard_cases.table import rows, summarized
+from dpgcli.hard_cases.variants import Variant, changed, rigid
 from dpgcli.hard_cases.verdicts import answered, judged, stress
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.certify import Status

@@ -7,9 +7,10 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.hard_cases.cases import Case, built_in_cases, study_finger
-from dpgcli.hard_cases.families import FAMILIES, FOLDED_STARTS, Start, Variant, changed, rigid
+from dpgcli.hard_cases.families import FAMILIES, FOLDED_STARTS
 from dpgcli.hard_cases.outcomes import Verdict
 from dpgcli.hard_cases.table import STRESS_COLUMNS, rows, summarized
+from dpgcli.hard_cases.variants import Start, Variant, changed, rigid
 from dpgcli.hard_cases.verdicts import answered, judged, scaled, stress
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.finger import Finger

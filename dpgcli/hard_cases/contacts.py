@@ -1,0 +1,142 @@
+"""States against a disc in hard cases: what the solver finds, judged by extended precision.
+
+A state is right if the reference finds it next to the one that is called stable: an equilibrium of
+the same pattern, pushed at as many places, no place pulling and none penetrated, that gives way on
+no motion which its contacts leave.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dpgcli.design.bodies import Disc
+from dpgcli.grasping.frames import frames
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
+from dpgcli.hard_cases.cases import Case
+from dpgcli.hard_cases.outcomes import Answer, Outcome, Touch, Verdict
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.reference.contact import ExtendedContact, RoundBody, extended_contact, penetration
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import codes_of, inverted_units
+from dpgcli.states.settle import settle
+from dpgcli.states.units import UnitSolutions
+
+DEEPEST = 1e-9  # mm: penetration
+STATED_ERROR = 1e-9  # of a push, in N and as a share of the largest
+STAGES = 8  # in which a disc grows about the reference's own search
+
+
+def answered(case: Case) -> Answer:
+    """Let the disc of a case grow about the finger in its pattern."""
+    finger, disc = case.variant.finger, _disc(case)
+    body = Disc(np.array(disc.center), disc.radius)
+    placed = met(
+        UnitSolutions.of(finger),
+        chain_potential,
+        np.array([disc.thickness]),
+        body,
+        frames(None)[0],
+        codes_of(case.inverted),
+    )
+    (found,) = described(placed.own, [placed.codes], placed.grown, placed.status, with_margins=False)
+    return _answer(placed, found)
+
+
+def _disc(case: Case) -> RoundBody:
+    assert case.variant.disc is not None, "a case with a disc"
+    return case.variant.disc
+
+
+def _answer(placed: Placed, found: Grasped) -> Answer:
+    own, shapes = placed.own, placed.grown.shapes
+    n_units = own.units.finger.n_units
+    coordinates = own.potentials(shapes.inverted)[0].coordinates
+    at = shapes.coordinates
+    pose, _ = coordinates.tip(at)
+    walls = coordinates.springs(at).extension - coordinates.openings(at)
+    reached = inverted_units(found.after, n_units)
+    status = Status(found.status[0])
+    if status is Status.STABLE and found.after[0] != found.code[0]:
+        status = Status.ANOTHER_PATTERN
+    push = found.push[:, 0]
+    return Answer(
+        status=status,
+        reached=reached,
+        nodes=np.stack(found.nodes, axis=1).reshape(-1, 1),
+        pose=pose[:, 0],
+        tip_error=float(found.error[0]),
+        angle_error=np.nan,
+        residual=float(found.residual[0]),
+        residual_floor=np.nan,
+        condition=np.nan,
+        iterations=0,
+        touch=Touch(push[push > TOUCHES], walls[:, 0]),
+    )
+
+
+def judged(case: Case, answer: Answer) -> Outcome:
+    """The verdict on an answer with a disc in the way, and the true errors."""
+    if answer.status != Status.STABLE:
+        return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)
+    truth = _next_to(case, answer)
+    if truth is None or not _is_right(case, answer, truth):
+        return Outcome(case, answer, Verdict.WRONG, np.nan, np.nan)
+    assert answer.touch is not None, "an answer of contact"
+    off = np.abs(truth.pose - answer.pose).astype(float)
+    tip_error, angle_error = float(np.hypot(off[0], off[1])), float(off[2])
+    pushed = np.abs(truth.push - answer.touch.push).astype(float)
+    force_error = float(pushed.max(initial=0.0))
+    stated = STATED_ERROR * max(1.0, float(answer.touch.push.max(initial=0.0)))
+    is_exact = tip_error <= answer.tip_error and force_error <= stated
+    verdict = Verdict.RIGHT if is_exact else Verdict.OVERCONFIDENT
+    return Outcome(case, answer, verdict, tip_error, angle_error, true_force_error=force_error)
+
+
+def _next_to(case: Case, answer: Answer) -> ExtendedContact | None:
+    """The equilibrium in extended precision next to an answer, in the pattern that it is in."""
+    assert answer.touch is not None, "an answer of contact"
+    return extended_contact(
+        case.variant.finger,
+        answer.reached[:, 0],
+        _disc(case),
+        answer.nodes[:, 0],
+        answer.touch.walls,
+    )
+
+
+def _is_right(case: Case, answer: Answer, truth: ExtendedContact) -> bool:
+    """Whether an answer is the state that is next to it, and does not penetrate the disc."""
+    assert answer.touch is not None, "an answer of contact"
+    height = float(case.variant.finger.segment_height[0, 0])
+    deep = penetration(_disc(case), answer.nodes[:, 0], height)
+    is_state = truth.is_minimum and truth.in_pattern
+    return is_state and len(truth.push) == len(answer.touch.push) and deep <= DEEPEST
+
+
+def _refusal(case: Case, answer: Answer) -> Verdict:
+    """The verdict on an answer that is not stable in its pattern: was there a state to find?"""
+    if _is_held(case):
+        return Verdict.MISSED
+    if answer.status is not Status.ANOTHER_PATTERN:
+        return Verdict.NO_SUCH_STATE
+    truth = _next_to(case, answer)
+    is_state = truth is not None and _is_right(case, answer, truth)
+    return Verdict.RECOGNIZED if is_state else Verdict.WRONG
+
+
+def _is_held(case: Case) -> bool:
+    """Whether the reference keeps the pattern as the disc grows from where it meets the finger."""
+    finger, disc = case.variant.finger, _disc(case)
+    free = settle(UnitSolutions.of(finger), chain_potential, case.inverted, DEFAULT_TOLERANCE)
+    coordinates, at = free.potential.coordinates, free.equilibrium.coordinates
+    nodes = np.stack(coordinates.stations(at), axis=1).reshape(-1)
+    walls = (coordinates.springs(at).extension - coordinates.openings(at))[:, 0]
+    deep = penetration(disc, nodes, float(finger.segment_height[0, 0]))
+    for left in np.arange(STAGES)[::-1] / STAGES:
+        smaller = replace(disc, radius=disc.radius - left * deep)
+        found = extended_contact(finger, case.inverted[:, 0], smaller, nodes, walls)
+        if found is None or not (found.is_minimum and found.in_pattern):
+            return False
+        nodes, walls = found.nodes, found.walls
+    return True

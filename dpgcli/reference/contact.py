@@ -1,0 +1,354 @@
+"""Equilibria of a finger against a disc in extended precision: the reference for contact.
+
+The finger's energy is that of `reference.energy`; the face is drawn from its nodes here, and gaps
+are differentiated by differences, which cost no digits that are missed. A state is what Newton's
+method makes of the optimality conditions of a set of contacts: balance with their pushes, no gap at
+them. The set is right where no contact pulls and no other place is penetrated.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.finger import Finger
+from dpgcli.reference.energy import Expansion, Vector, cross, measured
+from dpgcli.reference.equilibria import (
+    Energy,
+    ExtendedArray,
+    digits_lost,
+    energy_of,
+    extended,
+    factorize,
+    long_doubles,
+    pose_in_pattern,
+)
+from dpgcli.reference.units import extended_units
+
+if TYPE_CHECKING:
+    from mpmath import mpf
+
+NEAR = 1e-10  # mm: gaps that the search begins to close
+MOST_STEPS, MOST_SETS = 60, 12  # of Newton's method for one set of contacts; of sets
+BENT_AGAIN = 1e-6  # of the finger's length: after a longer step gaps are differentiated twice anew
+LARGEST_OPENING = 0.25  # strokes that one step may open a unit by
+STIFFENED = 15  # digits by which contacts are stiffer than bars where curvature is looked at
+
+
+@dataclass(frozen=True)
+class RoundBody:
+    """A disc in the finger's frame, and the thickness of the finger's layer, mm."""
+
+    center: tuple[float, float]
+    radius: float
+    thickness: float
+
+
+class Place(NamedTuple):
+    """A place of the face: a side, the first is 0, or the corner at the end of so many sides."""
+
+    number: int
+    is_corner: bool
+
+
+@dataclass(frozen=True)
+class ExtendedContact:
+    """An equilibrium against a disc, known to more digits than doubles have.
+
+    `pose` is tip x, y (mm) and angle (rad), (3,), `energy` in mJ. `push` (contact,) N are those at
+    `places`, in their order along the face. `is_minimum`: positive curvature on the motions that
+    contacts leave. `in_pattern` as in `ExtendedStates`. `nodes` (4 n,) and `walls` (unit,), mm, are
+    rounded to doubles.
+    """
+
+    pose: ExtendedArray
+    energy: np.longdouble
+    push: ExtendedArray
+    places: tuple[Place, ...]
+    is_minimum: bool
+    in_pattern: bool
+    nodes: Array
+    walls: Array
+
+
+def extended_contact(
+    finger: Finger, pattern: Flags, body: RoundBody, nodes: Array, walls: Array, digits: int = 50
+) -> ExtendedContact | None:
+    """The equilibrium of a pattern (unit,) against a disc, next to `nodes` (4 n,) and `walls`, mm.
+
+    None where there is none. As many digits as the bars are stiffer than the springs are carried on
+    top.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> straight = np.array([13.5, 0.0, 13.5, 10.75])
+    >>> body = RoundBody((9.0, -8.0), 8.0, 0.0)  # it touches a straight unit without a layer
+    >>> finger, ground, rigid = uniform_finger(1, **STUDY), np.array([False]), np.zeros(1)
+    >>> extended_contact(finger, ground, body, straight, rigid).push.astype(float).tolist()
+    [0.0]
+    """
+    import mpmath
+
+    lost = digits_lost(finger)
+    with mpmath.workdps(digits + lost):
+        bars = energy_of(finger, extended_units(finger), extended(walls))
+        search = _Search(bars, _ExactBody.of(body), digits, lost)
+        here = bars.unknowns(extended(nodes))
+        try:
+            found = search.with_contacts(here, search.closed(here, mpmath.mpf(NEAR)))
+        except (ZeroDivisionError, ValueError):  # nodes that coincide, or a mechanism
+            return None
+        if found is None:
+            return None
+        pose, _, in_pattern = pose_in_pattern(bars, found.unknowns, pattern)
+        return ExtendedContact(
+            pose=pose,
+            energy=long_doubles([bars.at(found.unknowns).energy])[0],
+            push=long_doubles(found.push.values()),
+            places=tuple(found.push),
+            is_minimum=search.is_minimum(found),
+            in_pattern=in_pattern,
+            nodes=np.array(bars.nodes(found.unknowns), float),
+            walls=np.array(bars.walls(found.unknowns), float),
+        )
+
+
+def penetration(body: RoundBody, nodes: Array, height: float) -> float:
+    """How deep a disc is in the face of a finger with these nodes (4 n,), mm; 0 where it is not."""
+    import mpmath
+
+    with mpmath.workdps(30):
+        exact = _ExactBody.of(body)
+        face = exact.face([mpmath.mpf(0)] * 3 + [mpmath.mpf(height), *extended(nodes)])
+        return max(0.0, -float(min(exact.gap(face, place) for place in exact.places(face))))
+
+
+class _ExactBody(NamedTuple):
+    """A `RoundBody` in mpmath numbers."""
+
+    center: Vector
+    radius: "mpf"
+    thickness: "mpf"
+
+    @classmethod
+    def of(cls, body: RoundBody) -> "_ExactBody":
+        x, y, radius, thickness = extended(np.array([*body.center, body.radius, body.thickness]))
+        return cls((x, y), radius, thickness)
+
+    def face(self, stations: Sequence["mpf"]) -> list[Vector]:
+        """F_0 … F_n by the nodes B_0, T_0, B_1, …: half a layer inside B on the line to T."""
+        nodes = []
+        for k in range(0, len(stations), 4):
+            x, y, top_x, top_y = stations[k : k + 4]
+            _, along = measured((top_x - x, top_y - y))
+            nodes.append((x - self.thickness * along[0] / 2, y - self.thickness * along[1] / 2))
+        return nodes
+
+    def gap_of(self, stations: list["mpf"], place: Place) -> "mpf":
+        """The gap at a place by the nodes: of those beside it only, the others far from it."""
+        first = max(0, place.number - place.is_corner)
+        beside = self.face(stations[4 * first : 4 * place.number + 8])
+        return self.gap(beside, Place(place.number - first, place.is_corner))
+
+    def places(self, face: list[Vector]) -> list[Place]:
+        """The nearest place of each side, each once, along the face."""
+        found = []
+        for number, (start, end) in enumerate(pairwise(face)):
+            along, away = _between(start, end), _between(start, self.center)
+            reached = _dot(along, away)
+            if reached <= 0 or reached >= _dot(along, along):
+                found.append(Place(number + int(reached > 0), True))
+            else:
+                found.append(Place(number, False))
+        return sorted(dict.fromkeys(found), key=lambda place: place.number - 0.5 * place.is_corner)
+
+    def gap(self, face: list[Vector], place: Place) -> "mpf":
+        """Distance of the disc from a place, negative where it is in or behind the face."""
+        if not place.is_corner:
+            start, end = face[place.number : place.number + 2]
+            length, along = measured(_between(start, end))
+            return cross(_between(start, self.center), along) - self.radius
+        corner = face[place.number]
+        distance, away = measured(_between(corner, self.center))
+        beside = [
+            measured(_between(start, end))[1]
+            for start, end in pairwise(face[max(0, place.number - 1) : place.number + 2])
+        ]
+        is_behind = len(beside) == 2 and sum(cross(away, along) for along in beside) < 0
+        return (-distance if is_behind else distance) - self.radius
+
+
+def _between(start: Vector, end: Vector) -> Vector:
+    return end[0] - start[0], end[1] - start[1]
+
+
+def _dot(v: Vector, w: Vector) -> "mpf":
+    return v[0] * w[0] + v[1] * w[1]
+
+
+class _Balance(NamedTuple):
+    """Unknowns in balance with pushes at places, and the Lagrangian's expansion there."""
+
+    unknowns: list["mpf"]
+    push: dict[Place, "mpf"]
+    slopes: list[list["mpf"]]
+    hessian: list[list["mpf"]]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Newton's method on the optimality conditions of contacts, of one finger and disc."""
+
+    bars: Energy
+    body: _ExactBody
+    digits: int
+    lost: int
+
+    @property
+    def tolerance(self) -> "mpf":
+        """What is no step any more, of the finger's length."""
+        from mpmath import mpf
+
+        return mpf(10) ** -(2 * self.digits // 5)
+
+    def stations(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """The nodes B_0, T_0, B_1, … at unknowns."""
+        return [0, 0, 0, self.bars.units[0].height, *self.bars.nodes(unknowns)]
+
+    def closed(self, unknowns: list["mpf"], within: "mpf") -> list[Place]:
+        """The places at which the disc is within so much, mm."""
+        face = self.body.face(self.stations(unknowns))
+        return [p for p in self.body.places(face) if self.body.gap(face, p) <= within]
+
+    def with_contacts(self, here: list["mpf"], active: list[Place]) -> _Balance | None:
+        """The equilibrium with the right set of contacts; None where there is none."""
+        for _ in range(MOST_SETS):
+            found = self._balanced(here, active)
+            if found is None:
+                return None
+            held = [place for place in active if found.push[place] >= 0]
+            closed = self.closed(found.unknowns, self.tolerance * self.bars.scale * 100)
+            pulling = set(active) - set(held)
+            now = [place for place in closed if place not in pulling]
+            if set(now) == set(active):
+                return found
+            here, active = found.unknowns, now
+        return None
+
+    def _balanced(self, here: list["mpf"], active: list[Place]) -> _Balance | None:
+        """Newton's method on balance and closed gaps."""
+        from mpmath import lu_solve, matrix
+
+        size, push = len(here), [0 * self.bars.scale] * len(active)
+        bent: list[list[list[mpf]]] | None = None
+        for _ in range(MOST_STEPS):
+            expansion = self.bars.at(here)
+            gaps = [self._gap_by_steps(here, place) for place in active]
+            steps = [_slope(gap, size, self._small) for gap in gaps]
+            bent = bent or [_bend(gap, size, self._small) for gap in gaps]
+            hessian = _lagrangian(expansion, push, bent)
+            system, right = _conditions(hessian, expansion.gradient, steps, gaps)
+            *step, = lu_solve(matrix(system), matrix(right))
+            own, push = step[:size], step[size:]
+            largest = max(map(abs, own)) / self.bars.scale
+            if largest <= self.tolerance:
+                return _Balance(here, dict(zip(active, push, strict=True)), steps, hessian)
+            fraction = 1 / max(1, self.bars.strokes_opened(here, own) / LARGEST_OPENING)
+            here = self.bars.moved(here, [fraction * part for part in own])
+            bent = None if largest > BENT_AGAIN else bent
+        return None
+
+    @property
+    def _small(self) -> "mpf":
+        from mpmath import mpf
+
+        return mpf(10) ** -(self.digits // 3)
+
+    def _gap_by_steps(
+        self, here: list["mpf"], place: Place
+    ) -> Callable[[dict[int, "mpf"]], "mpf"]:
+        """The gap at a place by steps of single unknowns, along the curved update."""
+
+        def gap(steps: dict[int, "mpf"]) -> "mpf":
+            whole = [steps.get(row, 0) for row in range(len(here))]
+            moved = self.bars.moved(here, whole) if steps else here
+            return self.body.gap_of(self.stations(moved), place)
+
+        return gap
+
+    def is_minimum(self, found: _Balance) -> bool:
+        """Whether the Lagrangian bends upwards along all motions that contacts leave.
+
+        It does where it does everywhere with contacts as very stiff springs.
+        """
+        from mpmath import mpf
+
+        size = len(found.unknowns)
+        stiff = mpf(10) ** STIFFENED * max(found.hessian[row][row] for row in range(size))
+        band = [
+            [
+                found.hessian[row][column]
+                + stiff * sum(slope[row] * slope[column] for slope in found.slopes)
+                for column in range(row, -1, -1)
+            ]
+            for row in range(size)
+        ]
+        smallest = mpf(10) ** -(self.digits // 2 + STIFFENED + self.lost)
+        return factorize(band, smallest).is_positive
+
+
+Gap = Callable[[dict[int, "mpf"]], "mpf"]
+
+
+def _slope(gap: Gap, size: int, small: "mpf") -> list["mpf"]:
+    """∂g by central differences."""
+    return [(gap({row: small}) - gap({row: -small})) / (2 * small) for row in range(size)]
+
+
+def _bend(gap: Gap, size: int, small: "mpf") -> list[list["mpf"]]:
+    """∂²g by differences of the lower triangle, [row][column ≤ row]."""
+    still, single = gap({}), [gap({row: small}) for row in range(size)]
+    bent = []
+    for row in range(size):
+        entries = [
+            gap({row: small, column: small}) - single[row] - single[column] + still
+            for column in range(row)
+        ]
+        twice = single[row] - 2 * still + gap({row: -small})
+        bent.append([entry / small**2 for entry in (*entries, twice)])
+    return bent
+
+
+def _lagrangian(
+    expansion: Expansion, push: list["mpf"], bent: list[list[list["mpf"]]]
+) -> list[list["mpf"]]:
+    """∇²E − Σ μ ∇²g as a full matrix."""
+    size = len(expansion.gradient)
+    full = [[0 * expansion.energy] * size for _ in range(size)]
+    for row, entries in enumerate(expansion.band):
+        for depth, entry in enumerate(entries):
+            full[row][row - depth] = entry
+    for row in range(size):
+        for column in range(row + 1):
+            full[row][column] -= sum(
+                mu * own[row][column] for mu, own in zip(push, bent, strict=True)
+            )
+            full[column][row] = full[row][column]
+    return full
+
+
+def _conditions(
+    hessian: list[list["mpf"]],
+    gradient: list["mpf"],
+    slopes: list[list["mpf"]],
+    gaps: list[Gap],
+) -> tuple[list[list["mpf"]], list["mpf"]]:
+    """∇²L s − Σ μ ∇g = −∇E and ∇g · s = −g, for s and μ."""
+    none = [0] * len(slopes)
+    rows = [
+        [*own, *(-slope[row] for slope in slopes)] for row, own in enumerate(hessian)
+    ]
+    rows += [[*slope, *none] for slope in slopes]
+    return rows, [*(-pull for pull in gradient), *(-gap({}) for gap in gaps)]
