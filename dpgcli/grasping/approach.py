@@ -17,6 +17,7 @@ from dpgcli.grasping.contact import ContactShapes, Obstructed
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
 MOST_HALTS = 40  # by unit
+MOST_CHANGES, OUT_OF_ORDER = 8, 1e-12  # of contacts in the end; of a stroke
 LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
 
@@ -102,7 +103,26 @@ def approach(
         goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
+    _put_right(obstructed, shapes, here)
     return Approach(shapes, here, tuple(resets))
+
+
+def _put_right(obstructed: Obstructed, shapes: ContactShapes, load: Array) -> None:
+    """Change contacts that closed or opened too near to others to be told apart on the way.
+
+    Late ones penetrate, others pull.
+    """
+    for _ in range(MOST_CHANGES):
+        family = obstructed.family(shapes.inverted, shapes.active)
+        measured = family.measure(obstructed.stacked(shapes))
+        is_wrong = family.law.margin(measured, load) < -OUT_OF_ORDER
+        lanes = np.flatnonzero(shapes.is_there & is_wrong.any(axis=0))
+        if not len(lanes):
+            break
+        few, own = shapes.take_lanes(lanes), obstructed.take_lanes(lanes)
+        begun = np.where(few.active, few.push, own.stiffness * own.large)
+        push = np.where(few.active ^ is_wrong[:, lanes], begun, 0.0)
+        shapes.put(lanes, own.finished(few.coordinates, few.inverted, push, load[lanes]))
 
 
 def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:

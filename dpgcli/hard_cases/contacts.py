@@ -39,7 +39,9 @@ def answered(case: Case) -> Answer:
         frames(None)[0],
         codes_of(case.inverted),
     )
-    (found,) = described(placed.own, [placed.codes], placed.grown, placed.status, with_margins=False)
+    (found,) = described(
+        placed.own, [placed.codes], placed.grown, placed.status, with_margins=False
+    )
     return _answer(placed, found)
 
 

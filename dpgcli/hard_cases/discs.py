@@ -8,15 +8,18 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from dpgcli.arrays import Array
 from dpgcli.hard_cases.variants import Variant, changed, repeated, rigid, with_bars
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.gaps import FaceGaps
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reference.contact import RoundBody
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
-from dpgcli.states.certify import Status
+from dpgcli.states.certify import Settled, Status
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 
@@ -27,96 +30,127 @@ DIAMETER = 25.0  # mm, where others are varied
 RATIOS = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15)  # k_L/k_b
 GRAZING = (1e-9, 1e-8, 1e-7, 1e-6)  # mm, in touch and not
 DEEP, AT_CLAMP, RESETTING = 0.1, 1e-3, 5.0  # mm into the free shape
-NEXT_TO_CLAMP = 0.02  # of the first phalanx
+
+
+class Free(NamedTuple):
+    """A finger at rest without a disc: coordinates (size, 1), its face and the nodes, (2, node)."""
+
+    settled: Settled
+    bare: Face
+    face: Array
+
+    def along(self, side: int) -> Array:
+        """The direction of a side, (2,)."""
+        way = self.face[:, side + 1] - self.face[:, side]
+        return np.asarray(way / np.hypot(*way))
+
+    def inwards(self, side: int) -> Array:
+        """The direction from a side to what it may touch, (2,)."""
+        x, y = self.along(side)
+        return np.array([y, -x])
+
+    def yielding(self, disc: RoundBody, sides: list[int]) -> Array:
+        """How far sides give way to a push of 1 N on each of them, mm, (side,)."""
+        at = self.settled.equilibrium.coordinates
+        body = Obstacle.disc(np.array(disc.center), disc.radius)
+        slope = FaceGaps(self.bare, body)(at).gradient[:, sides, 0]
+        rates = np.zeros((len(at), len(sides)))
+        rates[self.bare.places] = slope
+        hessian = self.settled.potential.evaluate(at).hessian[..., 0]
+        return np.asarray(rates.T @ solveh_banded(hessian, rates.sum(axis=1), lower=True))
+
+
+Place = Callable[[Free, float, float], Array]  # the center of a disc of a radius, so deep, (2,)
+
+
+def on_side(side: int, share: float = 0.5) -> Place:
+    """On a side."""
+
+    def center(free: Free, radius: float, depth: float) -> Array:
+        start, end = free.face[:, side], free.face[:, side + 1]
+        return np.asarray(start + share * (end - start) + (radius - depth) * free.inwards(side))
+
+    return center
+
+
+def at_tip(free: Free, radius: float, depth: float) -> Array:
+    """At the corner of the tip, from below and ahead."""
+    last = free.face.shape[1] - 2
+    way = (free.inwards(last) + free.along(last)) / np.sqrt(2.0)
+    return np.asarray(free.face[:, -1] + (radius - depth) * way)
+
+
+def below_clamp(free: Free, radius: float, depth: float) -> Array:
+    """At the clamped corner, from below and behind."""
+    return np.asarray(free.face[:, 0] + (radius - depth) * np.array([-0.6, -0.8]))
+
+
+def in_corner(corner: int) -> Place:
+    """Between two sides, as deep in both."""
+
+    def center(free: Free, radius: float, depth: float) -> Array:
+        return _between(free, corner, np.full(2, radius - depth))
+
+    return center
+
+
+def held_by_both(corner: int) -> Place:
+    """Between two sides, so deep that both push, and alike."""
+
+    def center(free: Free, radius: float, depth: float) -> Array:
+        x, y = _between(free, corner, np.full(2, radius))
+        give = free.yielding(RoundBody((x, y), radius, 0.0), [corner - 1, corner])
+        return _between(free, corner, radius - depth * give / give.max())
+
+    return center
+
+
+def _between(free: Free, corner: int, away: Array) -> Array:
+    """The place so far from the two sides at a corner, (2,)."""
+    normals = np.stack((free.inwards(corner - 1), free.inwards(corner)))
+    return np.asarray(free.face[:, corner] + np.linalg.solve(normals, away))
 
 
 class Spot(NamedTuple):
-    """A place of a face (2,), mm, and the way from there to the center of a disc, by its radius."""
+    """Where a disc meets the free state of a pattern."""
 
-    place: Array
-    way: Array
-
-    def disc(self, diameter: float, depth: float, thickness: float) -> RoundBody:
-        """The disc that reaches so deep into the face."""
-        x, y = self.place + (0.5 * diameter - depth) * self.way
-        return RoundBody((float(x), float(y)), 0.5 * diameter, thickness)
+    words: str
+    pattern: str
+    center: Place
 
 
-Choose = Callable[[Array], Spot]  # by the nodes of a face (2, node)
-
-
-def _along(face: Array, side: int) -> Array:
-    way = face[:, side + 1] - face[:, side]
-    return np.asarray(way / np.hypot(*way))
-
-
-def _inwards(face: Array, side: int) -> Array:
-    x, y = _along(face, side)
-    return np.array([y, -x])
-
-
-def on_side(side: int, share: float = 0.5) -> Choose:
-    """A spot on a side."""
-
-    def choose(face: Array) -> Spot:
-        start, end = face[:, side], face[:, side + 1]
-        return Spot(start + share * (end - start), _inwards(face, side))
-
-    return choose
-
-
-def at_tip(face: Array) -> Spot:
-    """The corner at the tip, from below and ahead."""
-    last = face.shape[1] - 2
-    return Spot(face[:, -1], (_inwards(face, last) + _along(face, last)) / np.sqrt(2.0))
-
-
-def in_corner(corner: int) -> Choose:
-    """A corner whose two sides are both touched."""
-
-    def choose(face: Array) -> Spot:
-        before, after = _inwards(face, corner - 1), _inwards(face, corner)
-        return Spot(face[:, corner], (before + after) / (1.0 + before @ after))
-
-    return choose
-
-
-def below_base(face: Array) -> Spot:
-    """The clamped corner, from below and behind."""
-    return Spot(face[:, 0], np.array([-0.6, -0.8]))
-
-
-SPOTS: dict[str, tuple[str, Choose]] = {
-    "under phalanx 2": ("000", on_side(1)),
-    "under phalanx 3": ("111", on_side(2)),
-    "at the tip": ("101", at_tip),
-    "between phalanges 1 and 2": ("110", in_corner(1)),
-    "between phalanges 2 and 3": ("011", in_corner(2)),
+SPOTS = {
+    "straight": Spot("under phalanx 2", "000", on_side(1)),
+    "side": Spot("under phalanx 3", "111", on_side(2)),
+    "tip": Spot("at the tip", "101", at_tip),
+    "corner": Spot("between phalanges 1 and 2", "110", in_corner(1)),
+    "both": Spot("held by phalanges 2 and 3", "011", held_by_both(2)),
 }
+NEXT_TO_CLAMP = Spot("next to the clamp", "000", on_side(0, 0.02))
+BELOW_CLAMP = Spot("below the clamp", "111", below_clamp)
 
 
 def discs(base: Finger) -> Iterator[Variant]:
     """All of them, about three units of a finger."""
     finger = repeated(base, N_UNITS)
-    stiff = {"k_L/k_b = 1e3": with_bars(finger, 1e3), "k_L = ∞": rigid(finger)}
-    for (bars, own), diameter, spot in product(stiff.items(), DIAMETERS, SPOTS):
-        yield from _placed(spot, bars, own, diameter)
-    for ratio, spot in product(RATIOS, SPOTS):
-        yield from _placed(spot, f"k_L/k_b = {ratio:g}", with_bars(finger, ratio), DIAMETER)
-    for (bars, own), by, spot in product(stiff.items(), GRAZING, tuple(SPOTS)[1:4]):
-        for depth in (by, -by):
-            yield from _placed(spot, bars, own, DIAMETER, depth)
-    for bars, own in stiff.items():
-        clamp = "next to the clamp", "000", on_side(0, NEXT_TO_CLAMP)
-        yield from _at(*clamp, bars, own, DIAMETER, AT_CLAMP)
+    stiff, hard = ("k_L/k_b = 1e3", with_bars(finger, 1e3)), ("k_L = ∞", rigid(finger))
+    for bars, diameters in ((hard, DIAMETERS), (stiff, DIAMETERS[1::2])):
+        for diameter, spot in product(diameters, SPOTS):
+            yield from _at(SPOTS[spot], *bars, diameter)
+    for ratio, spot in product(RATIOS, SPOTS.values()):
+        yield from _at(spot, f"k_L/k_b = {ratio:g}", with_bars(finger, ratio))
+    for bars, spots in ((hard, ("side", "tip", "corner")), (stiff, ("corner",))):
+        for spot, by, side in product(spots, GRAZING, (1.0, -1.0)):
+            yield from _at(SPOTS[spot], *bars, depth=side * by)
+    for bars in (hard, stiff):
+        yield from _at(NEXT_TO_CLAMP, *bars, depth=AT_CLAMP)
         for by in GRAZING:
-            yield from _at("clear of the clamp", "111", below_base, bars, own, DIAMETER, -by)
+            yield from _at(BELOW_CLAMP, *bars, depth=-by)
     for words, values in _others(base).items():
-        own = rigid(changed(finger, **values))
-        for spot in SPOTS:
-            yield from _placed(spot, f"{words}, k_L = ∞", own, DIAMETER)
-    for spot in tuple(SPOTS)[1:]:
-        yield from _placed(spot, "k_L = ∞", rigid(finger), DIAMETER, RESETTING)
+        for spot in SPOTS.values():
+            yield from _at(spot, f"{words}, k_L = ∞", rigid(changed(finger, **values)))
+    for name in ("side", "tip", "corner"):
+        yield from _at(SPOTS[name], *hard, depth=RESETTING)
 
 
 def _others(base: Finger) -> dict[str, dict[str, float]]:
@@ -128,39 +162,24 @@ def _others(base: Finger) -> dict[str, dict[str, float]]:
     }
 
 
-def _placed(
-    spot: str, bars: str, finger: Finger, diameter: float, depth: float = DEEP
-) -> Iterator[Variant]:
-    pattern, choose = SPOTS[spot]
-    return _at(spot, pattern, choose, bars, finger, diameter, depth)
-
-
 def _at(
-    spot: str,
-    pattern: str,
-    choose: Choose,
-    bars: str,
-    finger: Finger,
-    diameter: float,
-    depth: float,
+    spot: Spot, bars: str, finger: Finger, diameter: float = DIAMETER, depth: float = DEEP
 ) -> Iterator[Variant]:
-    """A disc at a spot of the free state, if there is one and the base is not in the disc."""
+    """A disc so deep in the free state, if there is one and the base is not in the disc."""
     thickness = LAYER * float(finger.segment_height[0, 0])
-    face = _free_face(finger, pattern, thickness)
-    if face is None:
+    free, radius = _free(finger, spot.pattern, thickness), 0.5 * diameter
+    if free.settled.status[0] != Status.STABLE:
         return
-    disc = choose(face).disc(diameter, depth, thickness)
-    if np.hypot(*(face[:, 0] - disc.center)) > disc.radius:
+    x, y = spot.center(free, radius, depth)
+    if np.hypot(x - free.face[0, 0], y - free.face[1, 0]) > radius:
         side = f"{abs(depth):g} mm {'deep' if depth > 0.0 else 'away'}"
-        label = f"disc of {diameter:g} mm {spot}, {side}, {bars}"
-        yield Variant(label, finger, (pattern,), disc=disc)
+        disc = RoundBody((float(x), float(y)), radius, thickness)
+        label = f"disc of {diameter:g} mm {spot.words}, {side}, {bars}"
+        yield Variant(label, finger, (spot.pattern,), disc=disc)
 
 
-def _free_face(finger: Finger, pattern: str, thickness: float) -> Array | None:
-    """The nodes of the face (2, node) of a free state, None if there is none."""
+def _free(finger: Finger, pattern: str, thickness: float) -> Free:
     inverted = np.array([[digit == "1"] for digit in pattern])
     free = settle(UnitSolutions.of(finger), chain_potential, inverted, DEFAULT_TOLERANCE)
-    if free.status[0] != Status.STABLE:
-        return None
-    face = Face.of(free.potential.coordinates, np.array([[thickness]]))
-    return face.shape(free.equilibrium.coordinates).nodes[..., 0]
+    bare = Face.of(free.potential.coordinates, np.array([[thickness]]))
+    return Free(free, bare, bare.shape(free.equilibrium.coordinates).nodes[..., 0])

@@ -168,7 +168,7 @@ class _ExactBody(NamedTuple):
         """Distance of the disc from a place, negative where it is in or behind the face."""
         if not place.is_corner:
             start, end = face[place.number : place.number + 2]
-            length, along = measured(_between(start, end))
+            _, along = measured(_between(start, end))
             return cross(_between(start, self.center), along) - self.radius
         corner = face[place.number]
         distance, away = measured(_between(corner, self.center))
@@ -250,7 +250,7 @@ class _Search:
             bent = bent or [_bend(gap, size, self._small) for gap in gaps]
             hessian = _lagrangian(expansion, push, bent)
             system, right = _conditions(hessian, expansion.gradient, steps, gaps)
-            *step, = lu_solve(matrix(system), matrix(right))
+            (*step,) = lu_solve(matrix(system), matrix(right))
             own, push = step[:size], step[size:]
             largest = max(map(abs, own)) / self.bars.scale
             if largest <= self.tolerance:
@@ -266,9 +266,7 @@ class _Search:
 
         return mpf(10) ** -(self.digits // 3)
 
-    def _gap_by_steps(
-        self, here: list["mpf"], place: Place
-    ) -> Callable[[dict[int, "mpf"]], "mpf"]:
+    def _gap_by_steps(self, here: list["mpf"], place: Place) -> Callable[[dict[int, "mpf"]], "mpf"]:
         """The gap at a place by steps of single unknowns, along the curved update."""
 
         def gap(steps: dict[int, "mpf"]) -> "mpf":
@@ -347,8 +345,6 @@ def _conditions(
 ) -> tuple[list[list["mpf"]], list["mpf"]]:
     """∇²L s − Σ μ ∇g = −∇E and ∇g · s = −g, for s and μ."""
     none = [0] * len(slopes)
-    rows = [
-        [*own, *(-slope[row] for slope in slopes)] for row, own in enumerate(hessian)
-    ]
+    rows = [[*own, *(-slope[row] for slope in slopes)] for row, own in enumerate(hessian)]
     rows += [[*slope, *none] for slope in slopes]
     return rows, [*(-pull for pull in gradient), *(-gap({}) for gap in gaps)]
