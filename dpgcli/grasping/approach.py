@@ -144,7 +144,8 @@ def _gone_on(
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
     push = own.pushes(before.active, y)
-    push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
+    as_found = own.are_kept | (ends.outcome == PathEnd.ARRIVED)  # one that pulls is to be seen
+    push = np.where(as_found, push, np.where(active, np.maximum(push, 0.0), 0.0))
     at_fold = push.copy()
     moved = ContactShapes(
         coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)

@@ -32,7 +32,7 @@ STRESS_COLUMNS = (
     _column("numerical_error_mm", "mm", "stated numerical error of the tip position"),
     _column("true_tip_error_mm", "mm", "distance from the tip in extended precision"),
     _column("true_angle_error_rad", "rad", "difference from the tip angle in extended precision"),
-    _column("iterations", "", "steps of Newton's method", Kind.COUNT),
+    _column("iterations", "", "steps of Newton's method, 0 of paths against a disc", Kind.COUNT),
     _column("true_threshold_error", "", "relative error of a threshold pressure"),
     _column("true_force_error_N", "N", "largest error of a push of a body in the way"),
 )
