@@ -291,10 +291,11 @@ class Pressed:
         self, family: LoadedPotential[FingerCoordinates, PressedDomes], ends: Ends
     ) -> Flags:
         """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
-        law, measured = family.law, family.followed(ends.coordinates)
-        margin = law.margin(measured, ends.load)
-        if margin is None or law.touching is None:
-            return np.zeros(measured.value.shape, bool)
+        law = family.law
+        if law.touching is None:
+            return np.zeros((self.finger.n_units, len(ends.load)), bool)
+        margin = law.margin(family.followed(ends.coordinates), ends.load)
+        assert margin is not None, "domes that touch can be apart"
         push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL

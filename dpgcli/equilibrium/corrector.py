@@ -85,6 +85,8 @@ def corrected(
     for count in range(MAX_CORRECTIONS + 1):
         look = _look(own, here, depth)
         ended = look.is_there | (count == MAX_CORRECTIONS)
+        if count == 0:  # Newton's step squares what is left: loads need more digits than balance
+            ended &= cell < 0
         rest = np.flatnonzero(~ended)
         is_crowded = ended.mean() > COMPACTING_SHARE
         if is_crowded:
