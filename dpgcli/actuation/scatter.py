@@ -102,7 +102,7 @@ def are_led(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges:
     after[inside.pulse, inside.draw] = inside.after
     does = after == np.array([[pulse.target] for pulse in pulses])
     strays = ~does[:-1]
-    for place in np.flatnonzero(strays.any(axis=1)):
+    for place in np.flatnonzero(strays.any(axis=1)).tolist():
         draws = np.flatnonzero(strays[place] & ~strays[:place].any(axis=0))
         known = after[place, draws]
         for which, begin in ((known < 0, place), (known >= 0, place + 1)):
@@ -111,7 +111,7 @@ def are_led(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges:
                 code = np.where(known < 0, pulses[place].source, known)[which]
                 own = pressed.take_lanes(few)
                 does[begin:, few] = followed(own, line_of, pulses[begin:], code)
-    return does
+    return np.asarray(does)
 
 
 def followed(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], start: Indices) -> Flags:

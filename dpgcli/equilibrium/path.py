@@ -279,7 +279,7 @@ def _tried(
     place = np.maximum(walk.cell, 0), np.arange(len(end))
     scale = np.broadcast_to(family.scale, walk.values.shape)
     target = walk.values[place] + walk.sign * step * scale[place]
-    there = corrected(family, guess, load, cell, target, depth)
+    there = corrected(family, guess, load, cell, target, depth, fewest=1)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
     nearest = KINK if family.n_multipliers else FOLD_DISTANCE
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
