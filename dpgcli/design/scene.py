@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.design.bodies import Body
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
@@ -126,12 +127,12 @@ class Gripper:
     mounting_angle: float | Array
 
 
-@dataclass(frozen=True)
-class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+class Held(StrEnum):
+    """How a body is held while fingers meet it."""
 
-    center: Array
-    radius: float
+    FIXED = "fixed"
+    GUIDED = "guided"  # along x
+    FREE = "free"
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ class Scene:
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
     is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
     its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
-    `pressure` and `body` are None where the spec says nothing of them.
+    `pressure` and `body` are None where the spec says nothing of them; the body is `held` so.
     """
 
     finger: Finger
@@ -168,7 +169,8 @@ class Scene:
     trusts: tuple[Trust, ...] = ()
     warnings: tuple[str, ...] = ()
     pressure: Pressure | None = None
-    body: Disc | None = None
+    body: Body | None = None
+    held: Held = Held.FIXED
 
     def take_lanes(self, index: Indices) -> "Scene":
         """Some designs of a batch, without what is said of a single one."""
@@ -177,4 +179,13 @@ class Scene:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
         layer = None if thickness is None else np.take(thickness, index)
         pressure = self.pressure and self.pressure.take_lanes(index)
-        return Scene(self.finger.take_lanes(index), (), gripper, layer, pressure=pressure)
+        body = self.body and self.body.take_lanes(index)
+        return Scene(
+            self.finger.take_lanes(index),
+            (),
+            gripper,
+            layer,
+            pressure=pressure,
+            body=body,
+            held=self.held,
+        )

@@ -13,16 +13,15 @@ Two ways, for the same minima:
 So constraints are terms beside others, a measure under a law, and paths know nothing of them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Generic, Self, cast
+from typing import Generic, Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import (
     Coordinates,
-    Measure,
     Measured,
     OwnCoordinate,
     Response,
@@ -37,7 +36,9 @@ from dpgcli.equilibrium.contracts import (
 
 @dataclass(frozen=True)
 class AugmentedContact:
-    """The augmented Lagrangian of t = g − b ≥ 0: μ (cell, batch) in N, σ in N/mm, b (batch,) in mm.
+    """The augmented Lagrangian of t = g − b ≥ 0: μ (cell, batch) in N, σ in N/mm, b in mm.
+
+    Of cells that `are_kept`, (cell, 1), it is that of t = 0; b is (batch,) or by cell.
 
     >>> law = AugmentedContact(np.array([[2.0]]), np.array([[10.0]]), np.zeros(1))
     >>> [float(law(np.array([[gap]])).force[0, 0]) for gap in (-0.1, 0.1, 0.3)]  # N
@@ -47,28 +48,33 @@ class AugmentedContact:
     multiplier: Array
     stiffness: Array
     bound: Array
+    are_kept: Flags = field(default_factory=lambda: np.zeros((1, 1), bool))
 
     def pushes(self, gap: Array) -> Array:
-        """max(0, μ − σ t), N."""
-        return np.maximum(0.0, self.multiplier - self.stiffness * (gap - self.bound))
+        """max(0, μ − σ t), N; μ − σ t of cells that are kept."""
+        push = self.multiplier - self.stiffness * (gap - self.bound)
+        return np.where(self.are_kept, push, np.maximum(0.0, push))
 
     def __call__(self, scalar: Array) -> Response:
         """Energy, force and stiffness."""
         push = self.pushes(scalar)
         energy = (push * push - self.multiplier * self.multiplier) / (2.0 * self.stiffness)
-        return Response(energy, 0.0 - push, np.where(push > 0.0, self.stiffness, 0.0))
+        acts = (push > 0.0) | self.are_kept
+        return Response(energy, 0.0 - push, np.where(acts, self.stiffness, 0.0))
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""
         parts = (self.multiplier, self.stiffness, self.bound)
-        return type(self)(*(take_lanes(part, index) for part in parts))
+        multiplier, stiffness, bound = (take_lanes(part, index) for part in parts)
+        return type(self)(multiplier, stiffness, bound, self.are_kept)
 
 
 @dataclass(frozen=True)
-class WithMultipliers(Generic[System]):
-    """Coordinates, and behind them one y = μ/σ (mm) for each of `n` constraints.
+class Extended(Generic[System]):
+    """Coordinates, and behind them `n` lengths of their own: multipliers y = μ/σ, or motions.
 
-    `length` (mm) is what is large of a gap, `stiffness` σ (N/mm), both (1, 1 or batch).
+    `length` (mm) is what is large of them, `stiffness` σ (N/mm) what their curvature is measured
+    by, both (1, 1 or batch).
     """
 
     frame: System
@@ -88,12 +94,12 @@ class WithMultipliers(Generic[System]):
 
     @cached_property
     def force_unit(self) -> Array:
-        """1 for multipliers."""
+        """1 for lengths."""
         return self._with(self.frame.force_unit, np.ones((1, 1)))
 
     @cached_property
     def gradient_scale(self) -> Array:
-        """σ times what is large of a gap, N."""
+        """σ times what is large of a length, N."""
         return self._with(self.frame.gradient_scale, self.stiffness * self.length)
 
     @cached_property
@@ -103,7 +109,7 @@ class WithMultipliers(Generic[System]):
 
     @cached_property
     def step_cap(self) -> Array:
-        """What is large of a gap, mm."""
+        """What is large of a length, mm."""
         return self._with(self.frame.step_cap, self.length)
 
     def take_lanes(self, index: Indices) -> Self:
@@ -113,44 +119,22 @@ class WithMultipliers(Generic[System]):
         return replace(self, frame=frame, length=length, stiffness=stiffness)
 
     def moved(self, coordinates: Array, step: Array) -> Array:
-        """As in the frame; multipliers go straight."""
+        """As in the frame; lengths go straight."""
         size = self.frame.size
         own = self.frame.moved(coordinates[:size], step[:size])
         return np.concatenate((own, coordinates[size:] + step[size:]))
 
 
 @dataclass(frozen=True)
-class Leading:
-    """A measure by the first coordinates only, `size` of them."""
-
-    measure: Measure
-    size: int
-
-    @property
-    def n_cells(self) -> int:
-        """That of the measure."""
-        return self.measure.n_cells
-
-    @property
-    def rows(self) -> tuple[Row, ...]:
-        """Those of the measure."""
-        return self.measure.rows
-
-    def __call__(self, coordinates: Array) -> Measured:
-        """The measure."""
-        return self.measure(coordinates[: self.size])
-
-    def take_lanes(self, index: Indices) -> Self:
-        """The same measure for some lanes of the batch."""
-        return replace(self, measure=self.measure.take_lanes(index))
-
-
-@dataclass(frozen=True)
 class Slack:
-    """g − y of every constraint, with g by the first `size` coordinates and y behind them."""
+    """g − y of every constraint, with g by the first `size` coordinates and y behind them.
+
+    Lane by lane y are those of the constraints in `multiplied`, and 0 of the others.
+    """
 
     gaps: WideMeasure
     size: int
+    multiplied: "Multiplied"
 
     @property
     def n_cells(self) -> int:
@@ -160,39 +144,86 @@ class Slack:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """Those of the gaps and of the multipliers."""
-        return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.n_cells)))
+        return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.multiplied.n)))
 
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − y with its derivatives, (cell, batch)."""
         gaps = self.gaps(coordinates[: self.size])
-        n, n_rows, batch = self.n_cells, len(self.gaps.rows), coordinates.shape[1]
-        own = np.broadcast_to(-np.eye(n)[..., None], (n, n, batch))
+        n, n_rows, batch = self.multiplied.n, len(self.gaps.rows), coordinates.shape[1]
+        own = -self.multiplied.are_of(self.n_cells).astype(float)
+        own = np.broadcast_to(own, (n, self.n_cells, batch))
 
         def bent(force: Array) -> Array:
             whole = np.zeros((n_rows + n, n_rows + n, batch))
             whole[:n_rows, :n_rows] = gaps.bent(force)
             return whole
 
-        value = gaps.value - coordinates[self.size :]
+        value = gaps.value - self.multiplied.spread(coordinates[self.size :], self.n_cells)
         return WideMeasured(value, np.concatenate((gaps.gradient, own)), bent, gaps.place)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same measure for some lanes of the batch."""
-        return replace(self, gaps=self.gaps.take_lanes(index))
+        gaps, multiplied = self.gaps.take_lanes(index), self.multiplied.take_lanes(index)
+        return replace(self, gaps=gaps, multiplied=multiplied)
+
+
+@dataclass(frozen=True)
+class Multiplied:
+    """The constraints that have multipliers: by `cells` (multiplier, batch), −1 for none.
+
+    There are as many multipliers as the lane with most active constraints needs, at least one.
+
+    >>> own = Multiplied.of(np.array([[False, True], [True, False], [True, False]]))
+    >>> own.cells.tolist(), own.spread(np.array([[5.0, 6.0], [7.0, 0.0]]), 3).tolist()
+    ([[1, 0], [2, -1]], [[0.0, 6.0], [5.0, 0.0], [7.0, 0.0]])
+    """
+
+    cells: Indices
+
+    @classmethod
+    def of(cls, active: Flags) -> Self:
+        """Those that are active, (cell, batch)."""
+        n = max(1, int(active.sum(axis=0).max(initial=0)))
+        first = np.argsort(~active, axis=0, kind="stable")[:n]
+        return cls(np.where(np.take_along_axis(active, first, axis=0), first, -1))
+
+    @property
+    def n(self) -> int:
+        """Number of multipliers."""
+        return len(self.cells)
+
+    def are_of(self, n_cells: int) -> Flags:
+        """Which constraint each is of, (multiplier, cell, batch)."""
+        return np.asarray(self.cells[:, None] == np.arange(n_cells)[:, None])
+
+    def spread(self, values: Array, n_cells: int) -> Array:
+        """Values by multiplier, (multiplier, batch), as those of constraints, (cell, batch)."""
+        return total(np.where(self.are_of(n_cells), values[:, None], 0.0))
+
+    def taken(self, values: Array) -> Array:
+        """Values of constraints, (cell, batch), by multiplier."""
+        found = np.take_along_axis(values, np.maximum(self.cells, 0), axis=0)
+        return np.where(self.cells >= 0, found, 0.0)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """Those of some lanes."""
+        return type(self)(take_lanes(self.cells, index))
 
 
 @dataclass(frozen=True)
 class ActiveConstraints:
-    """½ σ (t − y)² of active constraints, as their bounds b = (λ − 1) D rise to 0 with a load λ.
+    """½ σ (t − y)² of active constraints, as their bounds b = (λ − 1) D change with a load λ.
 
-    `active` (cell, batch), `stiffness` σ (1, 1 or batch) in N/mm, `depth` D (batch,) in mm and what
-    is `large` of a gap (batch,), mm.
+    `active` (cell, batch), `stiffness` σ (1, 1 or batch) in N/mm, `depth` D (…, batch) in mm and
+    what is `large` of a gap (batch,), mm. Cells that `are_kept`, (cell, 1), stay active whatever
+    the sign of y.
     """
 
     active: Flags
     stiffness: Array
     depth: Array
     large: Array
+    are_kept: Flags = field(default_factory=lambda: np.zeros((1, 1), bool))
 
     @property
     def is_smooth(self) -> bool:
@@ -210,7 +241,8 @@ class ActiveConstraints:
     def margin(self, measured: Measured | WideMeasured, load: Array) -> Array:
         """y of active constraints and t of the others, over what is large.
 
-        Infinite for t at a place that an active constraint is at, or that is another one's own.
+        Infinite for t at a place that an active constraint is at, or that is another one's own, and
+        for cells that are kept.
         """
         assert isinstance(measured, WideMeasured), "places are known"
         slack = measured.value - (load - 1.0) * self.depth
@@ -219,12 +251,15 @@ class ActiveConstraints:
         is_held = (is_same & self.active[None]).any(axis=1)
         is_elsewhere = place != numbers[:, None]
         other = np.where(is_held | is_elsewhere, np.inf, slack)
-        return np.where(self.active, -slack, other) / self.large
+        margin = np.where(self.active, -slack, other) / self.large
+        return np.where(self.are_kept, np.inf, margin)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""
-        parts = (take_lanes(part, index) for part in (self.stiffness, self.depth, self.large))
-        return type(self)(take_lanes(self.active, index), *parts)
+        parts = (self.stiffness, self.depth, self.large)
+        stiffness, depth, large = (take_lanes(part, index) for part in parts)
+        active = take_lanes(self.active, index)
+        return type(self)(active, stiffness, depth, large, self.are_kept)
 
 
 @dataclass(frozen=True)
@@ -261,13 +296,7 @@ class Stiffened:
         return type(self)(take_lanes(self.stiffness, index))
 
 
-def leading_terms(terms: tuple[Term, ...], size: int) -> tuple[Term, ...]:
-    """Terms by the first `size` coordinates of more; none of them wide."""
-    narrow = ((term, cast("Measure", term.measure)) for term in terms)
-    return tuple(Term(term.kind, Leading(measure, size), term.law) for term, measure in narrow)
-
-
-def multiplier_term(system: WithMultipliers[Coordinates]) -> Term:
+def multiplier_term(system: Extended[Coordinates]) -> Term:
     """The term −½ σ y² of the multipliers."""
     own = OwnCoordinate(Row(1, system.frame.size), system.n)
     return Term("multipliers", own, Stiffened(system.stiffness))

@@ -26,7 +26,7 @@ class Corrected(NamedTuple):
 
     coordinates: Array
     load: Array
-    measured: Measured
+    measured: Measured | WideMeasured
     loaded: Measured | WideMeasured
     along_load: Array  # −H'⁻¹ ∂g/∂λ
     by_hold: Array  # H'⁻¹ ∇q
@@ -53,7 +53,7 @@ class _Points(NamedTuple):
 class _Look(NamedTuple):
     """What there is at points: which are solutions, which stable; and Newton's step from them."""
 
-    measured: Measured
+    measured: Measured | WideMeasured
     loaded: Measured | WideMeasured
     along_load: Array
     by_hold: Array

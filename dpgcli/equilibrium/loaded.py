@@ -120,7 +120,7 @@ class Linearized(NamedTuple):
     gradient: Array
     hessian: Array
     rate: Array
-    followed: Measured
+    followed: Measured | WideMeasured
     loaded: Measured | WideMeasured
 
 
@@ -138,7 +138,7 @@ class LoadedPotential(Generic[System, Law]):
     terms: tuple[Term, ...]
     measure: Measure | WideMeasure
     law: Law
-    followed: Measure
+    followed: Measure | WideMeasure
     scale: Array
     stiffness: Array
     growing: tuple[Term, ...] = ()
@@ -211,7 +211,9 @@ class LoadedPotential(Generic[System, Law]):
             rate += spread(term.measure.rows, at, term.law(at.value).force, gradient)
         return Linearized(gradient, hessian, rate, followed, loaded)
 
-    def looked_at(self, coordinates: Array) -> tuple[Measured | WideMeasured, Measured]:
+    def looked_at(
+        self, coordinates: Array
+    ) -> tuple[Measured | WideMeasured, Measured | WideMeasured]:
         """The loaded and the followed measure."""
         followed = self.followed(coordinates)
         return followed if self.is_by_load else self.measure(coordinates), followed
@@ -233,8 +235,10 @@ def spread(
     return result
 
 
-def along(rows: tuple[Row, ...], measured: Measured, direction: Array) -> Array:
+def along(rows: tuple[Row, ...], measured: Measured | WideMeasured, direction: Array) -> Array:
     """∇q · v of every cell, (cell, batch), for a direction v, (size, batch)."""
+    if isinstance(measured, WideMeasured):
+        return total(measured.gradient * direction[[row.offset for row in rows]][:, None])
     parts = []
     for row, slope in zip(rows, measured.gradient, strict=True):
         clamped = 1 if row.offset < 0 else 0

@@ -1,11 +1,12 @@
-"""How fingers come to touch a body: it grows from nothing at its place; units reset as they must.
+"""How fingers come to touch a body: it grows at its place, or moves to it, and units reset.
 
 Contacts close and open on the way without any change of shape. Where a finger loses its balance, a
-unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as large as
-it is there; then the body goes on growing.
+unit resets (or snaps), exactly at the fold, and the finger goes downhill with the body as it is
+there; then the body goes on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -16,15 +17,20 @@ from dpgcli.grasping.contact import ContactShapes, Obstructed
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
 MOST_HALTS = 40  # by unit
+LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
 
 @dataclass(frozen=True)
 class Reset:
-    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,)."""
+    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,).
+
+    `push` (cell, lane) are the pushes, N, at the fold.
+    """
 
     lanes: Indices
     load: Array
     flipped: Flags
+    push: Array
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,36 @@ class Approach:
     resets: tuple[Reset, ...]
 
 
+class Way(StrEnum):
+    """How a body comes to where it is grasped."""
+
+    PLACE = "place"
+    INSERT = "insert"
+
+
+def moved_in(obstructed: Obstructed, start: ContactShapes) -> Approach:
+    """Let a body move to its place as its motion says, from where no finger touches it."""
+    met = _share_before_contact(obstructed, start)
+    shapes = obstructed.moved_to(start, met)
+    came = Approach(shapes, met, ())
+    for share in (0.0, *np.arange(1, STAGES + 1) / STAGES):
+        end = met + np.maximum(1.0 / LOOKS, share * (1.0 - met))
+        onwards = approach(obstructed, came.shapes, came.load, np.minimum(end, 1.0))
+        came = Approach(onwards.shapes, onwards.load, (*came.resets, *onwards.resets))
+    return came
+
+
+def _share_before_contact(obstructed: Obstructed, start: ContactShapes) -> Array:
+    """The share of its way that a body has come before it touches a finger, (batch,)."""
+    share = np.zeros(start.coordinates.shape[1])
+    for look in np.arange(1, LOOKS + 1) / LOOKS:
+        there = obstructed.moved_to(start, 0.0 * share + look)
+        gaps = obstructed.gaps()(there.coordinates).value[: obstructed.n_gaps]
+        is_clear = (gaps.min(axis=0) > 0.0) & (share >= look - 1.5 / LOOKS)
+        share = np.where(is_clear, look, share)
+    return share
+
+
 def approach(
     obstructed: Obstructed, start: ContactShapes, load: Array, end: Array, *, to_reset: bool = False
 ) -> Approach:
@@ -49,35 +85,47 @@ def approach(
     shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
     resets: list[Reset] = []
     lanes = np.flatnonzero(shapes.is_there & (here < end))
-    for _ in range(MOST_HALTS * obstructed.units.finger.n_units):
+    for _ in range(MOST_HALTS * len(start.inverted)):
         if not len(lanes):
             break
         own = obstructed.take_lanes(lanes)
         few = own.relabeled(shapes.take_lanes(lanes))
         family = own.family(few.inverted, few.active)
-        ends = follow(family, own.stacked(few), here[lanes], end[lanes])
-        moved, flipped = _gone_on(own, few, ends, end[lanes])
+        ends = _told(own, few, follow(family, own.stacked(few), here[lanes], end[lanes]))
+        moved, flipped, push = _gone_on(own, few, ends, end[lanes])
         here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
-            resets.append(Reset(lanes[changed], ends.load[changed], flipped[:, changed]))
+            which = flipped[:, changed], push[:, changed]
+            resets.append(Reset(lanes[changed], ends.load[changed], *which))
         goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     return Approach(shapes, here, tuple(resets))
 
 
+def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
+    """The ends of paths: where a gap closes that is another one's it has jumped, as at a kink."""
+    place = own.gaps()(ends.coordinates[: len(before.coordinates)]).place
+    cell, lanes = np.maximum(ends.cell, 0), np.arange(len(ends.cell))
+    is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
+    is_jump &= ends.outcome == PathEnd.EVENT
+    return replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
+
+
 def _gone_on(
     own: Obstructed, before: ContactShapes, ends: Ends, end: Array
-) -> tuple[ContactShapes, Flags]:
-    """The shapes with which paths go on from where they ended, and units that flipped there."""
+) -> tuple[ContactShapes, Flags, Array]:
+    """The shapes with which paths go on, units that flipped where they ended, and pushes there."""
     size = len(before.coordinates)
     coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
     active, n = before.active.copy(), len(ends.load)
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
-    push = np.where(active, np.maximum(y * own.stiffness, 0.0), 0.0)
+    push = own.pushes(before.active, y)
+    push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
+    at_fold = push.copy()
     moved = ContactShapes(
         coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)
     )
@@ -91,7 +139,7 @@ def _gone_on(
         there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
-    return moved, flipped
+    return moved, flipped, at_fold
 
 
 def _beyond(ends: Ends) -> Array:

@@ -1,4 +1,8 @@
-"""Fingers with round bodies in their way: contact without friction, exactly complementary."""
+"""Fingers with bodies in their way: contact without friction, exactly complementary.
+
+A body that may move has coordinates of its own, behind those of the fingers that it touches. Where
+it does not, fingers know nothing of each other, and each is a scene by itself.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,31 +13,41 @@ from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
-    Leading,
+    Extended,
+    Multiplied,
     Slack,
-    WithMultipliers,
-    leading_terms,
     multiplier_term,
 )
-from dpgcli.equilibrium.contracts import Term, take_lanes
+from dpgcli.equilibrium.contracts import (
+    Coordinates,
+    OwnCoordinate,
+    Row,
+    ScalarLaw,
+    Term,
+    WideMeasure,
+    take_lanes,
+)
 from dpgcli.equilibrium.corrector import corrected
-from dpgcli.equilibrium.loaded import LoadedPotential
+from dpgcli.equilibrium.joined import Joined, OfPart, Together, terms_of_part
+from dpgcli.equilibrium.loaded import LoadedPotential, ShareOfLaw
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.laws import PushOnly
-from dpgcli.mechanics.terms import Formulate
+from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
 STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has rounding in it
 TOLERANCE = 1e-12  # of the forces in play
 CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
 MOST_UPDATES, MOST_STEPS = 30, 120  # of multipliers; of a descent
+STUCK, MOST_STUCK = 1e-8, 4  # of the forces in play; descents in a row that end in a corner
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 
-Constrained = WithMultipliers[FingerCoordinates]
+Constrained = Extended[Coordinates]
 
 
 @dataclass(frozen=True)
@@ -61,20 +75,58 @@ class ContactShapes:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """How a body may move, by q, (motion, batch) in mm.
+
+    `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
+    `resistance` is the law of q, if any. `hold` (motion, batch) N keeps it where it is at a load
+    of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move by
+    itself: q is (λ − 1) D.
+    """
+
+    directions: tuple[Array, ...]
+    resistance: ScalarLaw | None = None
+    hold: Array | None = None
+    travel: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of motions."""
+        return int(self.directions[0].shape[1])
+
+    def take_lanes(self, index: Indices) -> "Motion":
+        """Those of some lanes."""
+        return Motion(
+            tuple(take_lanes(along, index) for along in self.directions),
+            self.resistance and self.resistance.take_lanes(index),
+            None if self.hold is None else take_lanes(self.hold, index),
+            None if self.travel is None else take_lanes(self.travel, index),
+        )
+
+
+@dataclass(frozen=True)
 class Obstructed:
     """Fingers with bodies in their way: one design and body, or one for each lane.
 
-    `thickness` (1, 1 or batch) is that of the layer, `centers` (2, body, 1 or batch) and `radii`
-    (body, 1 or batch) are in the finger's own frame, mm. Bodies may stand in the way by less than
+    There are as many fingers to a lane as there are `bodies`: what the body is in the frame of
+    each. Arrays by unit and by cell are those of the first finger, then of the next; coordinates
+    are interleaved (`equilibrium.joined`), those of the body's `motion` behind them.
+
+    `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm.
     """
 
     units: UnitSolutions
     formulate: Formulate
     thickness: Array
-    centers: Array
-    radii: Array
+    bodies: tuple[Obstacle, ...]
     depth: Array
+    motion: Motion | None = None
+
+    @property
+    def n_fingers(self) -> int:
+        """Fingers to a lane."""
+        return len(self.bodies)
 
     @property
     def stiffness(self) -> Array:
@@ -90,31 +142,132 @@ class Obstructed:
 
     def take_lanes(self, index: Indices) -> "Obstructed":
         """Some of the fingers."""
-        arrays = (self.thickness, self.centers, self.radii, self.depth)
-        taken = (take_lanes(part, index) for part in arrays)
-        return Obstructed(self.units.take_lanes(index), self.formulate, *taken)
+        thickness, depth = take_lanes(self.thickness, index), take_lanes(self.depth, index)
+        bodies = tuple(body.take_lanes(index) for body in self.bodies)
+        motion = self.motion and self.motion.take_lanes(index)
+        units = self.units.take_lanes(index)
+        return Obstructed(units, self.formulate, thickness, bodies, depth, motion)
+
+    def of_finger(self, values: Array, finger: int) -> Array:
+        """What belongs to a finger of coordinates (size, …)."""
+        return values[finger : self.n_own : self.n_fingers]
 
     @cached_property
-    def face(self) -> Face:
-        """The face of the fingers."""
-        return Face.of(self.formulate(self.units.finger).coordinates, self.thickness)
+    def n_own(self) -> int:
+        """Coordinates of all fingers."""
+        return self.n_fingers * self.formulate(self.units.finger).coordinates.size
 
-    def gaps(self, first: Flags | None = None) -> FaceGaps:
-        """Gaps to the bodies in full; at each place only one, if it is said which come first."""
-        return FaceGaps(self.face, self.centers, self.radii, first)
+    @cached_property
+    def faces(self) -> tuple[Face, ...]:
+        """The faces of the fingers, as the body sees them."""
+        alone, n = (
+            Face.of(self.formulate(self.units.finger).coordinates, self.thickness),
+            self.n_fingers,
+        )
+        faces = []
+        for finger in range(n):
+            face = replace(alone, places=n * alone.places + finger)
+            if self.motion is not None:
+                own = np.arange(self.n_own, self.n_own + self.motion.n)
+                face = face.seen_from(self.motion.directions[finger], own)
+            faces.append(face)
+        return tuple(faces)
+
+    def gaps(self, first: Flags | None = None) -> WideMeasure:
+        """Gaps to the bodies in full; at each place only one, if it is said which come first.
+
+        Behind them the motions that are prescribed.
+        """
+        gaps: list[WideMeasure] = []
+        for face, body in zip(self.faces, self.bodies, strict=True):
+            bare = FaceGaps(face, body)
+            n = sum(measure.n_cells for measure in gaps)
+            own = None if first is None else first[n : n + bare.n_cells]
+            gaps.append(replace(bare, first=own))
+        if self.motion is None and len(gaps) == 1:
+            return gaps[0]
+        return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
+
+    @property
+    def _n_motions(self) -> int:
+        return 0 if self.motion is None else self.motion.n
+
+    @property
+    def _motions(self) -> OwnCoordinate:
+        return OwnCoordinate(Row(1, self.n_own), self._n_motions)
+
+    @property
+    def _prescribed(self) -> tuple[OwnCoordinate, ...]:
+        is_told = self.motion is not None and self.motion.travel is not None
+        return (self._motions,) if is_told else ()
+
+    @cached_property
+    def n_gaps(self) -> int:
+        """Cells that are gaps."""
+        pairs = zip(self.faces, self.bodies, strict=True)
+        return sum(FaceGaps(face, body).n_cells for face, body in pairs)
+
+    @cached_property
+    def are_kept(self) -> Flags:
+        """Cells that are no gaps, (cell, 1)."""
+        n_others = sum(measure.n_cells for measure in self._prescribed)
+        return (np.arange(self.n_gaps + n_others) >= self.n_gaps)[:, None]
+
+    @property
+    def _deep(self) -> Array:
+        """D of every cell, (…, batch)."""
+        if self.motion is None or self.motion.travel is None:
+            return self.depth
+        depth, travel = np.broadcast_arrays(self.depth[None], self.motion.travel[:1])
+        depth = np.broadcast_to(depth, (self.n_gaps, depth.shape[1]))
+        return np.concatenate(
+            (depth, np.broadcast_to(self.motion.travel, (self._n_motions, travel.shape[1])))
+        )
 
     def bound(self, load: Array) -> Array:
         """b = (λ − 1) D, mm."""
-        return (load - 1.0) * self.depth
+        return (load - 1.0) * self._deep
 
-    def potential(self, inverted: Flags) -> FingerPotential:
-        """The energy without contact."""
-        return self.formulate(self.units.finger.with_domes(inverted))
+    def potentials(self, inverted: Flags) -> tuple[FingerPotential, ...]:
+        """The energies of the fingers without contact."""
+        n = self.units.finger.n_units
+        parts = inverted.reshape(self.n_fingers, n, -1)
+        return tuple(self.formulate(self.units.finger.with_domes(part)) for part in parts)
 
-    def pressed(self, inverted: Flags, push: Array, load: Array) -> FingerPotential:
+    def bare(self, inverted: Flags, load: Array) -> Potential[Coordinates]:
+        """The energy without contact: of fingers and of what the body's motion costs."""
+        own = self.potentials(inverted)
+        if self.motion is None and len(own) == 1:
+            return own[0]
+        joined = Joined[FingerCoordinates](tuple(potential.coordinates for potential in own))
+        system: Coordinates = joined
+        if self.motion is not None:
+            soft = self.stiffness / STIFFER
+            system = Extended[Coordinates](joined, self.motion.n, self.large, soft)
+        terms = self._terms_of(own)
+        grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing)
+        return Potential(system, (*terms, *grown))
+
+    def _terms_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
+        """The terms of fingers and body that do not know the load."""
+        n, size = len(own), self.n_own
+        terms = [terms_of_part(alone.terms, finger, n, size) for finger, alone in enumerate(own)]
+        resistance = None if self.motion is None else self.motion.resistance
+        resisting = () if resistance is None else (Term("body", self._motions, resistance),)
+        hold = None if self.motion is None else self.motion.hold
+        holding = () if hold is None else (Term("hold", self._motions, DeadLoad(hold)),)
+        return (*(term for part in terms for term in part), *resisting, *holding)
+
+    @property
+    def _growing(self) -> tuple[Term, ...]:
+        """The terms of which the load is the share that acts: what held the body lets go."""
+        hold = None if self.motion is None else self.motion.hold
+        return () if hold is None else (Term("hold", self._motions, DeadLoad(-hold)),)
+
+    def pressed(self, inverted: Flags, push: Array, load: Array) -> Potential[Coordinates]:
         """The augmented Lagrangian for some pushes, (cell, batch), N."""
-        bare = self.potential(inverted)
-        law = AugmentedContact(push, self.stiffness, self.bound(load))
+        bare = self.bare(inverted, load)
+        law = AugmentedContact(push, self.stiffness, self.bound(load), self.are_kept)
         contact = Term("contact", self.gaps(push > 0.0), law)
         return Potential(bare.coordinates, (*bare.terms, contact))
 
@@ -122,17 +275,52 @@ class Obstructed:
         self, inverted: Flags, active: Flags
     ) -> LoadedPotential[Constrained, ActiveConstraints]:
         """The Lagrangians of active contacts, (cell, batch), by the load."""
-        bare = self.potential(inverted)
-        size, finger = bare.coordinates.size, self.units.finger
-        gaps = self.gaps()
-        system = WithMultipliers(bare.coordinates, gaps.n_cells, self.large, self.stiffness)
-        law = ActiveConstraints(active, self.stiffness, self.depth, self.large[0])
-        terms = (*leading_terms(bare.terms, size), multiplier_term(system))
-        dome, slack = Leading(bare.coordinates.dome, size), Slack(gaps, size)
-        scale, stiffness = finger.stroke, self.units.holding_stiffness
-        return LoadedPotential(
-            system, terms, slack, law, dome, scale, stiffness, n_multipliers=gaps.n_cells
+        own = self.potentials(inverted)
+        size, finger, n = self.n_own, self.units.finger, self.n_fingers
+        frame = self.bare(inverted, np.zeros(1)).coordinates
+        gaps, multiplied = self.gaps(), Multiplied.of(active)
+        system = Extended(frame, multiplied.n, self.large, self.stiffness)
+        law = ActiveConstraints(active, self.stiffness, self._deep, self.large[0], self.are_kept)
+        terms = (*self._terms_of(own), multiplier_term(system))
+        domes = tuple(
+            OfPart(alone.coordinates.dome, place, n, size) for place, alone in enumerate(own)
         )
+        followed = domes[0] if n == 1 else Together(domes, size)
+        scale, stiffness = (
+            self._by_finger(finger.stroke),
+            self._by_finger(self.units.holding_stiffness),
+        )
+        slack = Slack(gaps, frame.size, multiplied)
+        return LoadedPotential(
+            system,
+            terms,
+            slack,
+            law,
+            followed,
+            scale,
+            stiffness,
+            self._growing,
+            n_multipliers=multiplied.n,
+        )
+
+    def _by_finger(self, values: Array) -> Array:
+        """Values of each unit, (unit, …), for all fingers."""
+        n = self.units.finger.n_units
+        whole = np.broadcast_to(values, (n, values.shape[1]))
+        return np.tile(whole, (self.n_fingers, 1)) if self.n_fingers > 1 else values
+
+    def moved_to(self, shapes: ContactShapes, load: Array) -> ContactShapes:
+        """Shapes with the body where its motion has it at a load; the fingers stay."""
+        assert self.motion is not None and self.motion.travel is not None, "it is moved"
+        coordinates = shapes.coordinates.copy()
+        coordinates[self.n_own :] = (load - 1.0) * self.motion.travel
+        return replace(shapes, coordinates=coordinates)
+
+    def at_rest(self, shapes: ContactShapes) -> ContactShapes:
+        """Shapes of fingers whose body has come to its place, as those of one that stays there."""
+        cells = slice(self.n_gaps)
+        coordinates, push = shapes.coordinates[: self.n_own], shapes.push[cells]
+        return replace(shapes, coordinates=coordinates, push=push, active=shapes.active[cells])
 
     def relabeled(self, shapes: ContactShapes) -> ContactShapes:
         """Shapes with each contact counted as that of the side to which it has come."""
@@ -144,7 +332,12 @@ class Obstructed:
 
     def stacked(self, shapes: ContactShapes) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
-        return np.concatenate((shapes.coordinates, shapes.push / self.stiffness))
+        y = Multiplied.of(shapes.active).taken(shapes.push / self.stiffness)
+        return np.concatenate((shapes.coordinates, y))
+
+    def pushes(self, active: Flags, multipliers: Array) -> Array:
+        """The pushes of contacts, (cell, batch), that have these multipliers, N."""
+        return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
 
     def relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Go downhill from coordinates at some loads to the next minima, by short steps.
@@ -152,7 +345,7 @@ class Obstructed:
         Domes that only push and are pushed out of their wells are let go, and the others go on.
         """
         found = self._relaxed(start, inverted, push, load)
-        for _ in range(self.units.finger.n_units):
+        for _ in range(self.n_fingers * self.units.finger.n_units):
             fallen = self._fallen(found)
             lanes = np.flatnonzero(fallen.any(axis=0))
             if not len(lanes):
@@ -169,12 +362,17 @@ class Obstructed:
 
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are beyond their barriers, (unit, batch)."""
-        springs = self.potential(shapes.inverted).coordinates.springs(shapes.coordinates)
-        return np.asarray(springs.extension > self.units.wells.spring_barrier)
+        own = []
+        for finger, potential in enumerate(self.potentials(shapes.inverted)):
+            springs = potential.coordinates.springs(self.of_finger(shapes.coordinates, finger))
+            own.append(springs.extension > self.units.wells.spring_barrier)
+        return np.concatenate(own)
 
     def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         here, push, lanes = start.copy(), push.copy(), np.arange(start.shape[1])
-        for _ in range(MOST_UPDATES):
+        found = ContactShapes(here.copy(), push.copy(), push > 0.0, inverted.copy(), lanes < 0)
+        n_stuck = np.zeros(len(lanes), int)
+        for count in range(MOST_UPDATES):
             own = self.take_lanes(lanes)
             potential = own.pressed(inverted[:, lanes], push[:, lanes], load[lanes])
             there = minimize(
@@ -183,23 +381,28 @@ class Obstructed:
             contact = potential.terms[-1]
             assert isinstance(contact.law, AugmentedContact), "the last term"
             pushed = contact.law.pushes(contact.measure(there.coordinates).value)
-            change = np.abs(pushed - push[:, lanes]).max(axis=0) / (own.stiffness * own.large)[0]
             here[:, lanes], push[:, lanes] = there.coordinates, pushed
-            lanes = lanes[change > CLOSE]
+            near = own.finished(there.coordinates, inverted[:, lanes], pushed, load[lanes])
+            away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
+            is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
+            n_stuck = np.where(there.relative_residual > STUCK, n_stuck + 1, 0)
+            goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
+            found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
+            lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
             if not len(lanes):
                 break
-        return self.finished(here, inverted, push, load)
+        return found
 
     def finished(self, near: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Equilibria with the active set that pushes say, (cell, batch), from nearby."""
-        active = push > 0.0
+        active = (push > 0.0) | self.are_kept
         family, n = self.family(inverted, active), len(load)
         nothing, free = np.full(n, -1), np.zeros(n)
-        guess = np.concatenate((near, push / self.stiffness))
+        begun = ContactShapes(near, push, active, inverted.copy(), np.ones(n, bool))
+        guess = self.stacked(begun)
         there = corrected(family, guess, load, nothing, free, max(family.column_depths))
-        size = len(near)
-        y = there.coordinates[size:]
         margin = family.law.margin(there.loaded, load)
         is_there = there.is_fine & (margin >= -CLOSE).all(axis=0)
-        pushes = np.where(active, y * self.stiffness, 0.0)
-        return ContactShapes(there.coordinates[:size], pushes, active, inverted.copy(), is_there)
+        found, y = there.coordinates[: len(near)], there.coordinates[len(near) :]
+        pushes = self.pushes(active, y)
+        return replace(begun, coordinates=found, push=pushes, is_there=is_there)

@@ -1,18 +1,22 @@
-"""What a finger, or a gripper's two, do with a round body in their way."""
+"""What a finger, or a gripper's two, do with a body in their way."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Codes, Flags, total
-from dpgcli.design.scene import Disc, Gripper, Scene
-from dpgcli.equilibrium.newton import looked_at
-from dpgcli.grasping.approach import Approach, Reset, approach
-from dpgcli.grasping.contact import Obstructed
+from dpgcli.arrays import Array, Codes, Flags, Indices, total
+from dpgcli.design.bodies import Body
+from dpgcli.design.scene import Scene
+from dpgcli.equilibrium.newton import Equilibrium, looked_at
+from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
+from dpgcli.grasping.contact import Motion, Obstructed
+from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
-from dpgcli.mechanics.gaps import nearest
+from dpgcli.mechanics.face import Face
+from dpgcli.mechanics.gaps import FaceGaps, Touches
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -22,45 +26,7 @@ from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
 
 MARGIN_TO = 2.0  # of the load: margins are looked for so far
-
-
-class FingerFrame(NamedTuple):
-    """A finger's frame in the gripper's: angle (rad), base (mm) and side, 1 or −1 if mirrored.
-
-    >>> upper, lower = frames(Gripper(base_spacing=60.0, mounting_angle=0.0))
-    >>> lower.inside(np.array([40.0, -5.0])).tolist()  # 25 mm above the lower base
-    [40.0, -25.0]
-    """
-
-    angle: float
-    offset: float
-    side: int
-
-    def inside(self, point: Array) -> Array:
-        """A point of the gripper's frame, (2, …), in the finger's."""
-        x, y = point[0], self.side * point[1] - self.offset
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
-        return np.stack((cos * x + sin * y, cos * y - sin * x))
-
-    def outside(self, vector: Array) -> Array:
-        """A direction in the finger's frame, (2, …), in the gripper's."""
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
-        x, y = cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]
-        return np.stack((x, self.side * y))
-
-    def placed(self, point: Array) -> Array:
-        """A point of the finger's frame, (2, …), in the gripper's."""
-        shift = np.zeros((2,) + (1,) * (point.ndim - 1))
-        shift[1] = self.side * self.offset
-        return self.outside(point) + shift
-
-
-def frames(gripper: Gripper | None) -> tuple[FingerFrame, ...]:
-    """The frames of the upper and the lower finger; of one alone its own."""
-    if gripper is None:
-        return (FingerFrame(0.0, 0.0, 1),)
-    angle, half = float(gripper.mounting_angle), 0.5 * float(gripper.base_spacing)
-    return FingerFrame(angle, half, 1), FingerFrame(angle, half, -1)
+TOUCHES = 1e-12  # N: a smaller push is rounding
 
 
 @dataclass(frozen=True)
@@ -68,16 +34,18 @@ class Grasped:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
-    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
-    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node,
-    batch), in mm. `residual` N and `error` mm are those of the tip. `resets` say what happened.
+    (cell, batch) N is that at each of the places that `touches` are, on `phalanges` (cell,),
+    `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin` what more of the load the next
+    unit bears. `nodes`, and `face` (2, node, batch), in mm. `residual` N and `error` mm are those
+    of the tip. `resets` say what happened.
     """
 
     code: Codes
     after: Codes
     status: NDArray[np.uint8]
     push: Array
-    normal: Array
+    touches: Touches
+    phalanges: Indices
     force: Array
     gap: Array
     margin: Array
@@ -91,73 +59,180 @@ class Grasped:
         *("residual", "error"),
     )
 
+    @classmethod
+    def joined(cls, parts: Sequence["Grasped"]) -> "Grasped":
+        """Those of several batches as one."""
+        arrays = {
+            name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
+            for name in (*cls.BY_LANE, "face")
+        }
+        nodes, touches = (
+            [np.concatenate(v, axis=-1) for v in zip(*values, strict=True)]
+            for values in ([p.nodes for p in parts], [p.touches for p in parts])
+        )
+        resets: list[Reset] = []
+        before = 0
+        for part in parts:
+            resets += [replace(reset, lanes=reset.lanes + before) for reset in part.resets]
+            before += len(part.code)
+        return cls(
+            **arrays,
+            touches=Touches(*touches),
+            phalanges=parts[0].phalanges,
+            nodes=Stations(*nodes),
+            resets=tuple(resets),
+        )
 
-def held(
-    scene: Scene, formulate: Formulate, disc: Disc, frame: FingerFrame, codes: Codes
-) -> Grasped:
-    """Let a body grow at its place about fingers in these states.
+
+@dataclass(frozen=True)
+class Placed:
+    """Fingers about which a body has grown: `status` (batch,) says which are there, or why not."""
+
+    codes: Codes
+    own: Obstructed
+    grown: Approach
+    status: NDArray[np.uint8]
+
+
+def placed(
+    scene: Scene,
+    formulate: Formulate,
+    body: Body,
+    frame: FingerFrame,
+    codes: Codes,
+    way: Way = Way.PLACE,
+) -> Placed:
+    """Let fingers in these states meet a body that grows at its place, or moves to it.
 
     Raises ValueError for a scene without the thickness of its layer.
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
-    units = UnitSolutions.of(scene.finger)
-    n = scene.finger.n_units
-    pattern = inverted_units(codes, n)
+    thickness = np.reshape(scene.layer_thickness, -1)
+    return met(UnitSolutions.of(scene.finger), formulate, thickness, body, frame, codes, way)
+
+
+def met(
+    units: UnitSolutions,
+    formulate: Formulate,
+    thickness: Array,
+    body: Body,
+    frame: FingerFrame,
+    codes: Codes,
+    way: Way = Way.PLACE,
+) -> Placed:
+    """The same of units and layers of some thickness, mm, (1,) or (batch,).
+
+    They, the body and the frame are one for all states, or one for each.
+    """
+    pattern = inverted_units(codes, units.finger.n_units)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
-    center = frame.inside(disc.center)[:, None, None]
-    thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
-    radius = np.full((1, 1), disc.radius)
-    bare = Obstructed(units, formulate, thickness, center, radius, np.zeros(1))
+    bare = Obstructed(units, formulate, thickness[None], (frame.obstacle(body),), np.zeros(1))
     x = free.equilibrium.coordinates
-    depth = np.maximum(disc.radius, -bare.gaps()(x).value.min(axis=0))
+    depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
-    nothing, begin = np.zeros((n, len(codes))), np.zeros(len(codes))
-    start = own.finished(x, pattern, nothing, begin)
-    is_stable = free.status == Status.STABLE
+    is_stable = np.asarray(free.status == Status.STABLE)
+    came = (_grown if way is Way.PLACE else _inserted)(own, body, frame, x, pattern, is_stable)
+    is_lost = is_stable & ~came.shapes.is_there
+    return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
+
+
+def _grown(
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+) -> Approach:
+    """How fingers in free states, coordinates (size, batch), meet a body that grows."""
+    begin = np.zeros(x.shape[1])
+    start = own.finished(x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
     start = replace(start, is_there=start.is_there & is_stable)
-    grown = approach(own, start, begin, begin + 1.0)
-    settled = _certified(own, grown)
-    status = np.where(is_stable, settled.status, free.status)
-    is_lost = is_stable & ~grown.shapes.is_there
-    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
-    return _described(own, codes, grown, settled, status)
+    return approach(own, start, begin, begin + 1.0)
 
 
-def _certified(own: Obstructed, grown: Approach) -> Settled:
-    """The states that fingers have come to rest in, certified with their contacts."""
-    shapes = grown.shapes
-    potential = own.pressed(shapes.inverted, shapes.push, grown.load)
-    there = looked_at(potential, shapes.coordinates)
-    settled = certified(own.units, potential, shapes.inverted, there, DEFAULT_TOLERANCE)
+def _inserted(
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+) -> Approach:
+    """The same of a body that comes in along −x, from beyond where the fingers could reach."""
+    finger, begin = own.units.finger, np.zeros(x.shape[1])
+    furthest = finger.straight_length + finger.segment_height[0] + own.thickness[0]
+    from_there = np.maximum(furthest - body.nearest_x, 0.0)[None]
+    along = frame.along(np.array([1.0, 0.0]))[:, None, None]
+    motion = Motion((along,), travel=-from_there)
+    coming = replace(own, depth=np.zeros(1), motion=motion)
+    start = np.concatenate((x, np.broadcast_to(from_there, (1, len(begin)))))
+    nothing = np.zeros((coming.n_gaps + 1, len(begin)))
+    shapes = coming.finished(start, pattern, nothing, begin)
+    came = moved_in(coming, replace(shapes, is_there=shapes.is_there & is_stable))
+    return replace(came, shapes=coming.at_rest(came.shapes))
+
+
+def described(
+    own: Obstructed,
+    codes: Sequence[Codes],
+    grown: Approach,
+    status: NDArray[np.uint8],
+    *,
+    with_margins: bool = True,
+) -> tuple[Grasped, ...]:
+    """What there is to say of fingers that have come to rest, of each; `status` is that before.
+
+    Margins, which take as long again as all else, are NaN unless they are wanted.
+    """
+    shapes = own.relabeled(grown.shapes)
+    potential = own.pressed(grown.shapes.inverted, grown.shapes.push, grown.load)
+    there = looked_at(potential, grown.shapes.coordinates)
+    settled = [_certified(own, grown, there, finger) for finger in range(own.n_fingers)]
+    is_there = status == Status.STABLE
+    worst = np.max([state.status for state in settled], axis=0)
+    status = np.where(is_there, worst, status)
+    margin = np.full(len(status), np.nan)
+    if with_margins:
+        margin = _margins(own, grown, np.asarray(status == Status.STABLE))
+    gaps = own.gaps()(shapes.coordinates).value
+    n_before, found = 0, []
+    for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):
+        bare = FaceGaps(face, body)
+        touches = bare.touches(shapes.coordinates)
+        cells = slice(n_before, n_before + bare.n_cells)
+        push, n_before = shapes.push[cells], cells.stop
+        rows = slice(finger, own.n_own, own.n_fingers)
+        mine = own.of_finger(shapes.coordinates, finger)
+        found.append(
+            Grasped(
+                code=codes[finger],
+                after=codes_of(state.reached),
+                status=status,
+                push=push,
+                touches=touches,
+                phalanges=bare.phalanges,
+                force=total(np.moveaxis(touches.directions * push, 1, 0)),
+                gap=gaps[cells].min(axis=0),
+                margin=margin,
+                residual=there.residual,
+                error=tip(state, with_compliance=False, whole=there, rows=rows).error,
+                nodes=state.potential.coordinates.stations(mine),
+                face=Face.of(state.potential.coordinates, own.thickness).shape(mine).nodes,
+                resets=_of_finger(grown.resets, own, finger),
+            )
+        )
+    return tuple(found)
+
+
+def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:
+    n = own.units.finger.n_units
+    parts = [(reset, reset.flipped[finger * n : (finger + 1) * n]) for reset in resets]
+    return tuple(replace(reset, flipped=flipped) for reset, flipped in parts)
+
+
+def _certified(own: Obstructed, grown: Approach, there: Equilibrium, finger: int) -> Settled:
+    """The states that a finger of each lane has come to rest in, certified with their contacts."""
+    n = own.units.finger.n_units
+    inverted = grown.shapes.inverted[finger * n : (finger + 1) * n]
+    alone = own.potentials(grown.shapes.inverted)[finger]
+    mine = (own.of_finger(values, finger) for values in (there.coordinates, there.gradient))
+    coordinates, gradient = mine
+    view = replace(there, coordinates=coordinates, gradient=gradient)
+    settled = certified(own.units, alone, inverted, view, DEFAULT_TOLERANCE)
     settled = replace(settled, inverted=settled.reached)
     return replace(settled, status=certify(settled, own.units, DEFAULT_TOLERANCE))
-
-
-def _described(
-    own: Obstructed, codes: Codes, grown: Approach, settled: Settled, status: NDArray[np.uint8]
-) -> Grasped:
-    """What there is to say of fingers that have come to rest."""
-    shapes, coordinates = own.relabeled(grown.shapes), settled.potential.coordinates
-    face = own.face.shape(shapes.coordinates)
-    near = nearest(face, own.centers)
-    push = shapes.push
-    at_tip = tip(settled, with_compliance=False)
-    return Grasped(
-        code=codes,
-        after=codes_of(settled.reached),
-        status=status,
-        push=push,
-        normal=near.normal[:, 0],
-        force=total(np.moveaxis(near.normal[:, 0] * push, 1, 0)),
-        gap=own.gaps()(shapes.coordinates).value.min(axis=0),
-        margin=_margins(own, grown, np.asarray(status == Status.STABLE)),
-        residual=settled.equilibrium.residual,
-        error=at_tip.error,
-        nodes=coordinates.stations(shapes.coordinates),
-        face=face.nodes,
-        resets=grown.resets,
-    )
 
 
 def _margins(own: Obstructed, grown: Approach, is_stable: Flags) -> Array:

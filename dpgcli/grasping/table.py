@@ -8,9 +8,13 @@ import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, distinct
+from dpgcli.design.bodies import Body
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Scene
-from dpgcli.grasping.grasp import FingerFrame, Grasped, frames, held
+from dpgcli.design.scene import Held, Scene
+from dpgcli.grasping.approach import Way
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
+from dpgcli.grasping.release import WAYS, let_go, motion_of
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -18,7 +22,6 @@ from dpgcli.states.gripper import place_in_gripper
 from dpgcli.states.patterns import inverted_units, texts
 
 FORCES, SHAPES = (Output.FORCES,), (Output.SHAPES,)
-TOUCHES = 1e-12  # N: a smaller push is rounding
 
 COLUMNS = (
     Column("pattern", "", "state before the body was there; upper/lower of a pair", kind=Kind.TEXT),
@@ -47,37 +50,56 @@ OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
 class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
-    `pairs` (finger, row) are lanes of the fingers' tables.
+    `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
+    is, mm.
     """
 
     scene: Scene
-    body: Disc
+    body: Body
     frames: tuple[FingerFrame, ...]
     fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
+    centers: Array
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
         return self.fingers[finger], int(self.pairs[finger, row])
 
 
-def grasps(scene: Scene, formulate: Formulate, body: Disc, pairs: Sequence[Codes]) -> Grasps:
+def grasps(
+    scene: Scene,
+    formulate: Formulate,
+    body: Body,
+    pairs: Sequence[Codes],
+    way: Way = Way.PLACE,
+) -> Grasps:
     """Pairs of states, (row,) each for the upper and the lower finger, against a body.
 
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
     """
-    placed = frames(scene.gripper)
-    is_alike = body.center[1] == 0.0 and len(placed) > 1
+    seen_from = frames(scene.gripper)
+    is_alike = body.is_mirrored and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
-    fingers: list[Grasped] = []
-    for frame, codes in zip(placed, needed, strict=True):
-        if fingers and is_alike:
-            fingers.append(fingers[0])
+    parts: list[Placed] = []
+    for frame, codes in zip(seen_from, needed, strict=True):
+        if parts and is_alike:
+            parts.append(parts[0])
         else:
-            fingers.append(held(scene, formulate, body, frame, codes))
+            parts.append(placed(scene, formulate, body, frame, codes, way))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
-    return Grasps(scene, body, placed, tuple(fingers), np.array(lanes))
+    centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
+    if scene.held is Held.FIXED:
+        different = parts[:1] if is_alike else parts
+        told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
+        fingers = [finger for (finger,) in told] * (len(parts) // len(told))
+        return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
+    found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
+    rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
+    is_there = found[0].status == Status.STABLE
+    away = _rounded(WAYS[scene.held] @ moved, scene.finger.straight_length)
+    centers = np.where(is_there, centers + away, np.nan)
+    return Grasps(scene, body, seen_from, found, rows, centers)
 
 
 def columns_of(scene: Scene) -> tuple[Column, ...]:
@@ -103,7 +125,7 @@ def grasp_rows(found: Grasps) -> Columns:
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
 
-    n = len(status)
+    most = np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)
     rows: Columns = {
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
@@ -113,13 +135,15 @@ def grasp_rows(found: Grasps) -> Columns:
             is_there,
         ),
         "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
-        "touching": _joined([_phalanges(t) for t in touches], is_there),
-        "finger_force_x_N": known(forces[0][0]),
-        "finger_force_y_N": known(forces[0][1]),
+        "touching": _joined(
+            [_touching(t, f) for t, f in zip(touches, found.fingers, strict=True)], is_there
+        ),
+        "finger_force_x_N": known(_rounded(forces[0][0], most)),
+        "finger_force_y_N": known(_rounded(forces[0][1], most)),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
-        "max_contact_N": known(np.max([own["push"].max(axis=0) for own in of_fingers], axis=0)),
-        "object_x_mm": np.full(n, found.body.center[0]),
-        "object_y_mm": np.full(n, found.body.center[1]),
+        "max_contact_N": known(most),
+        "object_x_mm": found.centers[0],
+        "object_y_mm": found.centers[1],
         "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
         "margin": known(np.min([own["margin"] for own in of_fingers], axis=0)),
         "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),
@@ -130,6 +154,11 @@ def grasp_rows(found: Grasps) -> Columns:
     return {column.name: rows[column.name] for column in columns_of(found.scene)}
 
 
+def _rounded(values: Array, scale: Array | float) -> Array:
+    """Values without those that are nothing but rounding."""
+    return np.where(np.abs(values) > TOUCHES * scale, values, 0.0)
+
+
 def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     """Aperture and overlap of the two fingers of each row."""
     assert found.scene.gripper is not None, "of a gripper"
@@ -137,19 +166,19 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     assert thickness is not None, "the face is known"
     poses = [place_in_gripper(found.scene.gripper, thickness, f.nodes) for f in found.fingers]
     halves = [pose.aperture[lanes] for pose, lanes in zip(poses, found.pairs, strict=True)]
-    upper, lower = (_outlines(found, finger)[lanes] for finger, lanes in enumerate(found.pairs))
-    return {
-        "aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan),
-        "overlaps": shapely.intersects(upper, lower) & is_there,
-    }
+    overlaps = np.zeros(len(is_there), bool)
+    upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
+    overlaps[is_there] = shapely.intersects(upper, lower)
+    return {"aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan), "overlaps": overlaps}
 
 
-def _outlines(found: Grasps, finger: int) -> NDArray[np.object_]:
-    """Polygons of a finger in the gripper, (lane,): its face, and its tops back."""
+def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> NDArray[np.object_]:
+    """Polygons of a finger of some rows in the gripper: its face, and its tops back."""
     own, height = found.fingers[finger], found.scene.finger.segment_height
     base = np.stack((0.0 * own.face[0, :1], own.face[1, :1] * 0.0 + height))
     tops = np.stack((own.nodes.top_x, own.nodes.top_y))
     around = np.concatenate((own.face, tops[:, ::-1], base), axis=1)
+    around = around[:, :, found.pairs[finger, rows]]
     return np.asarray(shapely.polygons(found.frames[finger].placed(around).transpose(2, 1, 0)))
 
 
@@ -177,6 +206,7 @@ def _resets(finger: Grasped) -> NDArray[np.str_]:
     return np.array(["; ".join(lane) for lane in words])
 
 
-def _phalanges(touches: NDArray[np.bool_]) -> NDArray[np.str_]:
-    numbers = [",".join(str(k + 1) for k in np.flatnonzero(lane)) for lane in touches.T]
-    return np.array(numbers)
+def _touching(touches: NDArray[np.bool_], finger: Grasped) -> NDArray[np.str_]:
+    """The phalanges that touch the body in each row, from the base: "3,4"."""
+    numbers = [distinct(finger.phalanges[row]) for row in touches.T]
+    return np.array([",".join(str(k + 1) for k in row) for row in numbers])

@@ -5,13 +5,16 @@ thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). There is a s
 corners stay joined however the finger bends (our choice; for equal corner angles sides are parallel
 to the chords).
 
+A body that moves by q along D moves the finger by −q D as the body sees it: such coordinates are
+rows before all others, each like a chord's extension at the base.
+
 A corner turns all that lies beyond it by −1 about its station P, so that ∂F/∂θ = R (F − P) with
 R (x, y) = (y, −x); a chord's extension moves all beyond along its direction u. Of coordinates p
 before q along the chain ∂²F/∂p ∂q = R ∂F/∂q if p is a corner, and 0 if it is a chord (our
 derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -64,8 +67,9 @@ def _summed_from_behind(values: Array) -> Array:
 class Face:
     """The face of fingers in some coordinates; lengths in mm, (1 or unit, 1 or batch).
 
-    `places` are the rows of e, a and b of each unit among all coordinates (a, e, b in the order of
-    the chain; rigid bars have no e), and `size` is their number.
+    `places` are the rows of a body's motions, if it has any, and of e, a and b of each unit among
+    all coordinates (a, e, b in the order of the chain; rigid bars have no e). A body moves along
+    `directions`, (2, motion, 1 or batch), in the finger's frame.
     """
 
     length: Array
@@ -73,6 +77,7 @@ class Face:
     n_units: int
     is_rigid: bool
     places: Indices
+    directions: Array = field(default_factory=lambda: np.zeros((2, 0, 1)))
 
     @classmethod
     def of(cls, coordinates: FingerCoordinates, thickness: Array) -> Self:
@@ -91,35 +96,56 @@ class Face:
         places = rows.reshape(finger.n_units, -1)[:, order].ravel()
         return cls(finger.segment_length, 0.5 * thickness, finger.n_units, finger.is_rigid, places)
 
+    def part(self, first: int, stop: int) -> Self:
+        """The face of units first+1 … stop, clamped at the nearer end of the first."""
+        n_rows = len(self.places) // self.n_units
+        length = self.length if len(self.length) == 1 else self.length[first:stop]
+        places = self.places[first * n_rows : stop * n_rows]
+        return replace(self, length=length, n_units=stop - first, places=places)
+
+    def seen_from(self, directions: Array, places: Indices) -> Self:
+        """As a body sees it that moves along `directions` by the coordinates at `places`."""
+        return replace(self, directions=directions, places=np.append(places, self.places))
+
     @cached_property
     def _moves(self) -> tuple[Indices, Flags]:
         """The first node that each row moves, and whether the row is a corner."""
         kinds = [True, True] if self.is_rigid else [True, False, True]
+        n_motions = self.directions.shape[1]
         first = np.repeat(np.arange(1, self.n_units + 1), len(kinds))
-        return first, np.tile(np.array(kinds), self.n_units)
+        is_corner = np.tile(np.array(kinds), self.n_units)
+        base = np.zeros(n_motions, np.int64)
+        return np.append(base, first), np.append(base > 0, is_corner)
 
     def shape(self, coordinates: Array) -> FaceShape:
         """The face at coordinates, (size, batch)."""
-        n = self.n_units
-        rows = coordinates[self.places].reshape(n, -1, coordinates.shape[1])
+        n, n_motions = self.n_units, self.directions.shape[1]
+        rows = coordinates[self.places[n_motions:]].reshape(n, -1, coordinates.shape[1])
         zero = np.zeros((n, coordinates.shape[1]))
         near, far = rows[:, 0], rows[:, -1]
         chord = zero if self.is_rigid else rows[:, 1]
         pose = pose_of(internal(_as_chain(chord, near, far), is_rigid=False), self.length)
         base = np.zeros((2, 1, coordinates.shape[1]))
         stations = np.concatenate((base, np.stack((pose.x, pose.y))), axis=1)
+        if n_motions:
+            moved = self.directions * coordinates[self.places[:n_motions]]
+            stations = stations - total(np.moveaxis(moved, 1, 0))[:, None]
         angle = np.concatenate((base[0], pose.strut_angle))
         inwards = np.stack((np.sin(angle), -np.cos(angle)))
         pivots = [stations[:, :-1], stations[:, 1:]]
         if not self.is_rigid:
             pivots.insert(1, np.stack((pose.chord_cos, pose.chord_sin)))
         origin = np.stack(pivots, axis=2).reshape(2, -1, coordinates.shape[1])
+        if n_motions:
+            away = np.broadcast_to(-self.directions, (2, n_motions, coordinates.shape[1]))
+            origin = np.concatenate((away, origin), axis=1)
         return FaceShape(stations + self.half_thickness * inwards, *self._moves, origin)
 
     def take_lanes(self, index: Indices) -> Self:
         """The faces of some lanes of the batch."""
-        length, half = (take_lanes(part, index) for part in (self.length, self.half_thickness))
-        return replace(self, length=length, half_thickness=half)
+        parts = (self.length, self.half_thickness, self.directions)
+        length, half, directions = (take_lanes(part, index) for part in parts)
+        return replace(self, length=length, half_thickness=half, directions=directions)
 
 
 def _as_chain(chord: Array, near: Array, far: Array) -> Array:

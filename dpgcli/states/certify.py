@@ -31,8 +31,9 @@ class Status(IntEnum):
     ANOTHER_PATTERN = 2
     NOT_BISTABLE = 3
     GAP_CLOSED = 4  # under pressure only: see `actuation.rest`
-    FOLDED = 5
-    NOT_CONVERGED = 6
+    NOT_HELD = 5  # of a body that may move only: see `grasping.release`
+    FOLDED = 6
+    NOT_CONVERGED = 7
 
     @property
     def text(self) -> str:
@@ -53,6 +54,7 @@ _MEANINGS = {
     Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",
     Status.GAP_CLOSED: "a gap is closed beyond the place of its dome at rest, which would push as "
     "pressure comes; where that dome really is a calibration's curve knows",
+    Status.NOT_HELD: "nothing keeps the body between the fingers: let go of, it leaves them",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
     "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",

@@ -6,6 +6,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, total
 from dpgcli.equilibrium.banded import forward
+from dpgcli.equilibrium.newton import Equilibrium
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled
 
 TIP_ROUNDING = 8.0 * np.finfo(float).eps  # of the finger's length
@@ -29,8 +30,16 @@ class Tip:
     stiffness: Array | None = None
 
 
-def tip(settled: Settled, *, with_compliance: bool) -> Tip:
+def tip(
+    settled: Settled,
+    *,
+    with_compliance: bool,
+    whole: Equilibrium | None = None,
+    rows: slice = slice(None),
+) -> Tip:
     """Pose, error and compliance C = J H⁻¹ Jᵀ of the tip from the factorization at hand.
+
+    That of the `whole`, if the finger is only a part of it, with these rows.
 
     The error is twice the step Newton would take next, |J H⁻¹ g|, plus what rounding leaves: a
     few units in the last place, more for many units and where the curvature is small. Twice,
@@ -54,6 +63,10 @@ def tip(settled: Settled, *, with_compliance: bool) -> Tip:
     equilibrium = settled.equilibrium
     finger = settled.finger
     pose, jacobian = settled.potential.coordinates.tip(equilibrium.coordinates)
+    if whole is not None:
+        own, equilibrium = jacobian, whole
+        jacobian = np.zeros((len(whole.coordinates), *own.shape[1:]))
+        jacobian[rows] = own
     sides = np.concatenate((jacobian, equilibrium.gradient[:, None]), axis=1)
     sides = forward(equilibrium.factorization, sides)
     with np.errstate(all="ignore"):  # a mechanism has no stiffness, or nearly none

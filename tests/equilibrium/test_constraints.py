@@ -12,9 +12,9 @@ from dpgcli.equilibrium.banded import factorize
 from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
+    Extended,
+    Multiplied,
     Slack,
-    WithMultipliers,
-    leading_terms,
     multiplier_term,
 )
 from dpgcli.equilibrium.contracts import (
@@ -26,6 +26,7 @@ from dpgcli.equilibrium.contracts import (
     WideMeasured,
 )
 from dpgcli.equilibrium.corrector import corrected
+from dpgcli.equilibrium.joined import terms_of_part
 from dpgcli.equilibrium.loaded import LoadedPotential
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.potential import Potential
@@ -126,14 +127,14 @@ def lagrangian(
     """Wells in each coordinate under constraints; the load raises bounds by `depth`."""
     size, n = gaps.slope.shape[1], gaps.n_cells
     sigma, large = np.array([[SIGMA]]), np.ones((1, 1))
-    system = WithMultipliers(Lengths(size), n, large, sigma)
+    system = Extended(Lengths(size), n, large, sigma)
     bare = (Term("wells", OwnCoordinate(Row(1, 0), size), Wells(k)),)
     law = ActiveConstraints(active, sigma, np.array([depth]), large[0])
-    terms = (*leading_terms(bare, size), multiplier_term(system))
+    terms = (*terms_of_part(bare, 0, 1, size), multiplier_term(system))
     return LoadedPotential(
         system,
         terms,
-        Slack(gaps, size),
+        Slack(gaps, size, Multiplied.of(np.ones((n, 1), bool))),
         law,
         Each(size),
         np.ones((size, 1)),
@@ -304,14 +305,14 @@ def test_margins_of_places_that_are_shared() -> None:
 def test_lanes_taken(dense: Callable[[Array], Array]) -> None:
     sigma, large = np.array([[7.0, 3.0, 5.0]]), np.ones((1, 3))
     gaps, active = quadrics(5, 4, 2), np.array([[True, False, True], [False, True, True]])
-    system = WithMultipliers(Lengths(4), 2, large, sigma)
+    system = Extended(Lengths(4), 2, large, sigma)
     law = ActiveConstraints(active, sigma, np.array([1.0, 2.0, 3.0]), large[0])
-    bare = leading_terms((Term("wells", OwnCoordinate(Row(1, 0), 4), Wells(1.0)),), 4)
+    bare = terms_of_part((Term("wells", OwnCoordinate(Row(1, 0), 4), Wells(1.0)),), 0, 1, 4)
     followed, one = Each(4), np.ones((4, 1))
     family = LoadedPotential(
         system,
         (*bare, multiplier_term(system)),
-        Slack(gaps, 4),
+        Slack(gaps, 4, Multiplied.of(np.ones((2, 3), bool))),
         law,
         followed,
         one,

@@ -18,6 +18,7 @@ from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.contact import ContactShapes, Obstructed
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
@@ -164,8 +165,8 @@ def begun() -> Callable[..., tuple[Obstructed, ContactShapes]]:
         free = settle(units, chain_potential, inverted, 1e-12)
         assert (free.status == 0).all(), "free states that these tests start from are stable"
         x, n = free.equilibrium.coordinates, len(patterns)
-        where = np.array(center)[:, None, None], np.array([[radius]])
-        bare = Obstructed(units, chain_potential, np.array([[thickness]]), *where, np.zeros(1))
+        body = Obstacle(np.array(center)[:, None, None], np.array([[radius]]))
+        bare = Obstructed(units, chain_potential, np.array([[thickness]]), (body,), np.zeros(1))
         depth = np.maximum(radius, -bare.gaps()(x).value.min(axis=0))
         obstructed = replace(bare, depth=depth)
         nothing = np.zeros((finger.n_units, n))

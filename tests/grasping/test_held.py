@@ -1,4 +1,4 @@
-"""`held`: what is said of a gripper's fingers on a disc."""
+"""`placed`: what is said of a gripper's fingers on a disc."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,16 +6,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dpgcli.design.scene import Disc, Gripper, Scene
+from dpgcli.arrays import Codes
+from dpgcli.design.bodies import Disc
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import grasp
-from dpgcli.grasping.grasp import Grasped, frames, held
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import Grasped, described, placed
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.terms import chain_potential
+from dpgcli.mechanics.terms import Formulate, chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
 
 Fingers = Callable[..., Finger]
 ALONE = frames(None)[0]
+
+
+def held(
+    scene: Scene, formulate: Formulate, disc: Disc, frame: FingerFrame, codes: Codes
+) -> Grasped:
+    """Fingers at rest on a disc that does not move."""
+    found = placed(scene, formulate, disc, frame, codes)
+    (finger,) = described(found.own, [codes], found.grown, found.status)
+    return finger
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ class Found:
         self.own = own(drawn.finger, shapes.inverted[:, 0], 1.5, drawn.center, drawn.radius)
         self.push = self.grown.obstructed.relabeled(shapes).push[:, 0]
         self.q = shapes.coordinates[:, 0]
-        coordinates = self.grown.obstructed.potential(shapes.inverted).coordinates
+        coordinates = self.grown.obstructed.potentials(shapes.inverted)[0].coordinates
         self.unit = np.broadcast_to(coordinates.force_unit, (len(self.q), 1))[:, 0]
 
 

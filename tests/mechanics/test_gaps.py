@@ -11,6 +11,7 @@ from dpgcli.mechanics.coordinates import FingerCoordinates, Internal
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FAR, FaceGaps
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
 
 Fingers = Callable[..., Finger]
@@ -43,7 +44,7 @@ def gaps_of(
         normal = normal + np.array([after[1], -after[0]]) / np.hypot(*after)
         normal /= np.hypot(*normal)
     center = nodes[:, side] + share * along + inwards * normal
-    return FaceGaps(face, center[:, None, None], np.array([[3.0]]), first)
+    return FaceGaps(face, Obstacle(center[:, None, None], np.array([[3.0]])), first)
 
 
 def bent_shape(coordinates: FingerCoordinates, random_shape: Shapes, place: str) -> Array:
@@ -159,7 +160,7 @@ def test_gaps_are_distances_of_places_that_are_nearest_around(
     face = Face.of(coordinates, np.array([[1.5]]))
     place = random.uniform(-15.0, 65.0, (2, lanes)), random.uniform(-35.0, 15.0, (2, lanes))
     centers = np.stack(place)
-    measured = FaceGaps(face, centers, np.array([[2.0], [5.0]]))(at)
+    measured = FaceGaps(face, Obstacle(centers, np.array([[2.0], [5.0]])))(at)
     nodes = face.shape(at).nodes
     for lane, body in np.ndindex(lanes, 2):
         center, own = centers[:, body, lane], slice(4 * body, 4 * body + 4)
@@ -193,7 +194,7 @@ def test_a_corner_that_opens_towards_the_body_has_two_gaps(reference_finger: Fin
     coordinates = chain_potential(reference_finger(2)).coordinates
     at, center = np.array([[0.0], [0.2], [0.2], [0.0]]), np.array([12.5, -7.0])
     face = Face.of(coordinates, np.array([[1.5]]))
-    gaps = FaceGaps(face, center[:, None, None], np.array([[2.0]]))(at)
+    gaps = FaceGaps(face, Obstacle(center[:, None, None], np.array([[2.0]])))(at)
     nodes = face.shape(at).nodes[..., 0]
     for side in range(2):
         own = LineString(nodes[:, side : side + 2].T).distance(Point(center)) - 2.0
@@ -217,7 +218,8 @@ def test_a_straight_finger(
     """Of 40.5 mm, its face at y = −0.75 mm, and a body of 1 mm."""
     coordinates = chain_potential(reference_finger(3)).coordinates
     face = Face.of(coordinates, np.array([[1.5]]))
-    gaps = FaceGaps(face, np.array(center)[:, None, None], np.array([[1.0]]))(np.zeros((6, 1)))
+    body = Obstacle(np.array(center)[:, None, None], np.array([[1.0]]))
+    gaps = FaceGaps(face, body)(np.zeros((6, 1)))
     assert gaps.value == pytest.approx(np.full((3, 1), gap), abs=1e-14)
     assert gaps.place.ravel().tolist() == places
 
@@ -225,7 +227,8 @@ def test_a_straight_finger(
 def test_the_base_does_not_move(reference_finger: Fingers) -> None:
     coordinates = chain_potential(reference_finger(3, 1e4)).coordinates
     face = Face.of(coordinates, np.array([[1.5]]))
-    gaps = FaceGaps(face, np.array([[[-3.0]], [[-4.75]]]), np.array([[1.0]]))(np.zeros((12, 1)))
+    body = Obstacle(np.array([[[-3.0]], [[-4.75]]]), np.array([[1.0]]))
+    gaps = FaceGaps(face, body)(np.zeros((12, 1)))
     assert not gaps.gradient.any()
     assert not gaps.bent(np.ones((3, 1))).any()
 
@@ -235,7 +238,7 @@ def test_lanes_have_their_own_bodies(graded_finger: Fingers, random_shape: Shape
     face = Face.of(coordinates, np.array([[1.5, 2.0, 2.5]]))
     random, index = np.random.default_rng(42), np.array([2, 0])
     centers = np.stack((random.uniform(0.0, 40.0, (2, 3)), random.uniform(-20.0, -5.0, (2, 3))))
-    gaps = FaceGaps(face, centers, random.uniform(1.0, 4.0, (2, 3)))
+    gaps = FaceGaps(face, Obstacle(centers, random.uniform(1.0, 4.0, (2, 3))))
     at, force = coordinates.of_shape(random_shape(3, 43, 3)), random.uniform(0.0, 1.0, (6, 3))
     every, few = gaps(at), gaps.take_lanes(index)(at[:, index])
     assert (few.value == every.value[:, index]).all()

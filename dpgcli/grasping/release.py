@@ -1,0 +1,104 @@
+"""Bodies that may move: let go of where they were placed, they go where forces on them balance.
+
+The body has grown about the fingers while it was kept in its place. What keeps it is a force on
+each of its motions; as that goes to nothing the body and its fingers move on, and units reset as
+they must. A body that no finger keeps from moving on leaves them: there is no rest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Indices
+from dpgcli.design.scene import Held
+from dpgcli.grasping.approach import Approach, approach
+from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
+from dpgcli.grasping.frames import FingerFrame
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described
+from dpgcli.states.certify import Status
+
+LANES = 1024  # at a time: each takes the squares of its coordinates a few times over
+WAYS = {Held.GUIDED: np.array([[1.0], [0.0]]), Held.FREE: np.eye(2)}  # of a body's motions
+
+
+def motion_of(held: Held, frames: Sequence[FingerFrame]) -> Motion:
+    """How a body may move that is held so, in the frames of its fingers."""
+    ways = WAYS[held][..., None]
+    return Motion(tuple(frame.along(ways) for frame in frames))
+
+
+def let_go(
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    motion: Motion,
+    *,
+    with_margins: bool = True,
+) -> tuple[tuple[Grasped, ...], Array]:
+    """Fingers at `lanes` of each part with a body between them that is let go of.
+
+    Also how far the bodies have moved, (motion, lane), mm. The motion is one for all, or by lane.
+    """
+    n = len(lanes[0])
+    chunks = []
+    for at in range(0, max(n, 1), LANES):
+        some = [index[at : at + LANES] for index in lanes]
+        own = motion.take_lanes(np.arange(at, at + len(some[0])))
+        chunks.append(_let_go(parts, some, own, with_margins=with_margins))
+    fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, _ in chunks), strict=True))
+    return fingers, np.concatenate([moved for _, moved in chunks], axis=1)
+
+
+def _let_go(
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    motion: Motion,
+    *,
+    with_margins: bool,
+) -> tuple[tuple[Grasped, ...], Array]:
+    own, start = together(parts, lanes, motion)
+    gone = released(own, start)
+    codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
+    before = [part.status[index] for part, index in zip(parts, lanes, strict=True)]
+    status = np.max(before, axis=0)
+    is_lost = (status == Status.STABLE) & ~_is_held(gone.shapes)
+    status = np.where(is_lost, np.uint8(Status.NOT_HELD), status)
+    fingers = described(own, codes, gone, status, with_margins=with_margins)
+    return fingers, gone.shapes.coordinates[own.n_own :]
+
+
+def _is_held(shapes: ContactShapes) -> NDArray[np.bool_]:
+    """Which bodies are at rest, and touched at all."""
+    return np.asarray(shapes.is_there & (shapes.push > TOUCHES).any(axis=0))
+
+
+def together(
+    parts: Sequence[Placed], lanes: Sequence[Indices], motion: Motion
+) -> tuple[Obstructed, ContactShapes]:
+    """The fingers of a lane as one, with a body that may move: those at `lanes` of each part."""
+    few = [part.grown.shapes.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
+    alone = [part.own.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
+    bodies = tuple(own.bodies[0] for own in alone)
+    depth = np.max([own.depth for own in alone], axis=0)
+    own = replace(alone[0], bodies=bodies, depth=depth, motion=motion)
+    n = len(lanes[0])
+    coordinates = np.stack([shapes.coordinates for shapes in few], axis=1).reshape(-1, n)
+    shapes = ContactShapes(
+        np.concatenate((coordinates, np.zeros((motion.n, n)))),
+        np.concatenate([shapes.push for shapes in few]),
+        np.concatenate([shapes.active for shapes in few]),
+        np.concatenate([shapes.inverted for shapes in few]),
+        np.all([shapes.is_there for shapes in few], axis=0),
+    )
+    return own, shapes
+
+
+def released(own: Obstructed, shapes: ContactShapes) -> Approach:
+    """Let go of bodies that were kept where they are."""
+    assert own.motion is not None, "a body that may move"
+    begin = np.zeros(shapes.coordinates.shape[1])
+    potential = own.pressed(shapes.inverted, shapes.push, begin + 1.0)
+    kept = potential.evaluate(shapes.coordinates).gradient[own.n_own :]
+    keeping = replace(own, depth=np.zeros(1), motion=replace(own.motion, hold=kept))
+    return approach(keeping, shapes, begin, begin + 1.0)
