@@ -33,7 +33,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import select
-from dpgcli.text import counted, shortened
+from dpgcli.text import counted, number_in, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -193,10 +193,7 @@ def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
 
 def _diameter(text: str) -> float:
     kind, _, size = text.partition(":")
-    try:
-        diameter = float(size)
-    except ValueError:
-        diameter = float("nan")
+    diameter = number_in(size)
     if kind != "disc" or not SMALLEST_DISC <= diameter <= LARGEST_DISC:
         raise UsageError(
             Field("object"),
