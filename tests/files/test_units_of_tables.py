@@ -284,6 +284,58 @@ def test_a_frame_in_another_unit(tmp_path: Path) -> None:
             read_states(path, 2)
 
 
+OWN_FRAME = "# first_station_mm: 5.375, 0.75"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(
+            "# first_station_mm [cm]: 0.5375, 0.075",
+            "# First_station_mm: 5, 0",
+            "# tip offset: 1, 2",
+        ),
+        *("# first_station_mm = 5, 0", "# FIRST-STATION 5 0", "first_station_mm: 5, 0"),
+        *("first_station_mm;5;0", "// first_station_mm: 5, 0", '"first_station_mm","5","0"'),
+        *(
+            "# first_station_mm (mm): 5, 0",
+            "#% first_station_mm: 5, 0",
+            "# first_stations_mm: 5, 0",
+        ),
+    ],
+)
+def test_what_may_be_a_frame_is_no_remark_that_is_left_out(tmp_path: Path, line: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    path.write_text(f"{line}\n{path.read_text()}")
+    with pytest.raises(SpecError, match=r"1: comment: .*first_station_mm or tip_offset_mm, in mm"):
+        read_states(path, 2)
+
+
+@pytest.mark.parametrize("other", ["5.375, -0.75", "0.5375, 0.075 cm", "5.375; 0.75", "5.375", ""])
+def test_a_frame_is_one(tmp_path: Path, other: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    table = path.read_text()
+    again = f"# first_station_mm: {other}\n"
+    for text in (f"{OWN_FRAME}\n{again}{table}", f"{OWN_FRAME}\n{table}{again}"):
+        path.write_text(text)
+        with pytest.raises(SpecError, match=r"first_station_mm: expected (each point|two numbers)"):
+            read_states(path, 2)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"{OWN_FRAME}\n{OWN_FRAME}\n{{}}", f"{OWN_FRAME},,\n{{}}", f'"{OWN_FRAME}",,\n{{}}'),
+        *(f"{{}}{OWN_FRAME}\n", "#first_station_mm:[5.375,0.75]\n{}"),
+        f"# The first station, 2: at\n# first station\n{OWN_FRAME}\n{{}}",
+    ],
+)
+def test_a_frame_that_is_one_is_taken(tmp_path: Path, text: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    path.write_text(text.format(path.read_text()))
+    assert read_states(path, 2).first_station == (5.375, 0.75)
+
+
 def test_a_chosen_column_has_the_unit_that_the_file_says(tmp_path: Path) -> None:
     """Whatever stands in brackets behind another title."""
     from dpgcli.files.csv_file import Choice
