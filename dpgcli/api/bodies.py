@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from dpgcli.api.inputs import SceneInput, check_texts, path_of, point
 from dpgcli.arrays import Array
@@ -15,7 +14,7 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.files.scene_file.objects import ObjectSpec
 from dpgcli.files.scene_file.problems import checked_object
 from dpgcli.files.yaml_file import read_document
-from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.frames import begins_in_base
 from dpgcli.text import shortened
 
 SMALLEST, LARGEST = 1e-3, 1e4  # mm: of what a text says
@@ -91,24 +90,9 @@ def check_body(scene: Scene, body: Body) -> None:
             "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
             "half of it inside the lattice"
         )
-    base = -0.5 * float(np.squeeze(scene.layer_thickness)), float(scene.finger.segment_height.max())
-    if any(_is_in(body, frame, base) for frame in frames(scene.gripper)):
+    if begins_in_base(scene, body).any():
         raise UsageError(
             Field("at"),
             f" {body.center[0]:g},{body.center[1]:g}: {body.name} there begins in the base of a "
             "finger: move it along x, or take a smaller one",
         )
-
-
-def _is_in(body: Body, frame: FingerFrame, base: tuple[float, float]) -> bool:
-    """Whether a body meets the base of a finger, between these places above x = 0."""
-    if isinstance(body, Disc):
-        x, y = frame.inside(body.center)
-        beside = max(base[0] - y, y - base[1], 0.0)
-        return bool(np.hypot(x, beside) < body.radius)
-    strut = shapely.LineString([(0.0, place) for place in base])
-    return bool(shapely.relate_pattern(strut, _area(frame.inside(body.corners)), "T********"))
-
-
-def _area(corners: Array) -> shapely.Polygon:
-    return shapely.Polygon(corners.T)

@@ -98,7 +98,7 @@ class JawsResult:
         if not all(pattern in lanes for pattern in STUDY):
             return
         (known, force), (other, measured) = STUDY.items()
-        rest = self.jaws.gap
+        rest = float(self.jaws.gap)
         fitted = Mechanism.fitted(Branch.of(self.path, lanes[known]), rest, force)
         if fitted is None:
             yield (

@@ -5,18 +5,40 @@ from functools import cached_property
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Indices
+
+# keys of a spec's object
+DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
+PLACES = ("at_x_mm", "at_y_mm")
 
 
 @dataclass(frozen=True)
 class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm.
+
+    Of a batch (2, design) and (design,).
+    """
 
     center: Array
-    radius: float
+    radius: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Disc":
+        """With values of designs, (design,), at a key of a spec's object.
+
+        >>> disc = Disc(np.array([40.0, 0.0]), 20.0).with_value("at_x_mm", np.array([30.0, 50.0]))
+        >>> disc.center.tolist(), disc.radius
+        ([[30.0, 50.0], [0.0, 0.0]], 20.0)
+        """
+        if key == DIAMETER:
+            return Disc(self.center, 0.5 * column)
+        return Disc(_moved(self.center, key, column), self.radius)
+
+    def take_lanes(self, index: Indices) -> "Disc":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        return Disc(_taken(self.center.reshape(2, -1), index), _taken(self.radius, index))
 
     @property
-    def inner_radius(self) -> float:
+    def inner_radius(self) -> float | Array:
         """The radius of the largest circle in it, mm."""
         return self.radius
 
@@ -26,19 +48,22 @@ class Disc:
         return f"a disc of {2.0 * self.radius:g} mm"
 
     @property
-    def nearest_x(self) -> float:
+    def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return float(self.center[0]) - self.radius
+        nearest: float | Array = self.center[0] - self.radius
+        return nearest
 
     @property
     def is_mirrored(self) -> bool:
         """Whether both fingers of a gripper meet the same."""
-        return bool(self.center[1] == 0.0)
+        return bool((self.center[1] == 0.0).all())
 
 
 @dataclass(frozen=True)
 class Polygon:
     """A body with straight sides: a reference point (2,), and corners from there, (2, corner), mm.
+
+    Of a batch the point is (2, design).
 
     >>> Polygon(np.array([40.0, 0.0]), np.array([[0.0, 3.0, 3.0], [0.0, -4.0, 4.0]])).is_mirrored
     True
@@ -47,10 +72,19 @@ class Polygon:
     center: Array
     around: Array
 
+    def with_value(self, key: str, column: Array) -> "Polygon":
+        """With values of designs, (design,), at a key of a spec's object."""
+        return Polygon(_moved(self.center, key, column), self.around)
+
+    def take_lanes(self, index: Indices) -> "Polygon":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        return Polygon(_taken(self.center.reshape(2, -1), index), self.around)
+
     @cached_property
     def corners(self) -> Array:
-        """The corners in the gripper's frame, (2, corner), mm."""
-        return np.asarray(self.center[:, None] + self.around)
+        """The corners in the gripper's frame, (2, corner) or (2, corner, design), mm."""
+        around = self.around if self.center.ndim == 1 else self.around[..., None]
+        return np.asarray(self.center[:, None] + around)
 
     @property
     def name(self) -> str:
@@ -58,9 +92,9 @@ class Polygon:
         return f"a polygon of {self.around.shape[1]} corners"
 
     @property
-    def nearest_x(self) -> float:
+    def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return float(self.corners[0].min())
+        return np.asarray(self.corners[0].min(axis=0))
 
     @cached_property
     def inner_radius(self) -> float:
@@ -72,32 +106,51 @@ class Polygon:
     @property
     def is_mirrored(self) -> bool:
         """Whether both fingers of a gripper meet the same."""
-        mirrored = self.corners[:, ::-1] * np.array([[1.0], [-1.0]])
+        corners = self.corners
+        mirrored = np.stack((corners[0], -corners[1]))[:, ::-1]
         n = mirrored.shape[1]
         turned = (np.roll(mirrored, shift, axis=1) for shift in range(n))
-        return any(np.array_equal(self.corners, other) for other in turned)
+        return any(np.array_equal(corners, other) for other in turned)
 
 
 @dataclass(frozen=True)
 class Jaws:
     """Two flat plates along x with a gap between them, about a center (2,); mm.
 
-    Fingers meet them from outside, as the sides of a block.
+    Fingers meet them from outside, as the sides of a block. Of a batch (2, design) and (design,).
 
     >>> Jaws(np.array([40.0, 0.0]), gap=30.0, height=40.0).corners.tolist()
     [[20.0, 60.0, 60.0, 20.0], [-15.0, -15.0, 15.0, 15.0]]
     """
 
     center: Array
-    gap: float
-    height: float
+    gap: float | Array
+    height: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Jaws":
+        """With values of designs, (design,), at a key of a spec's object."""
+        if key == GAP:
+            return Jaws(self.center, column, self.height)
+        if key == HEIGHT:
+            return Jaws(self.center, self.gap, column)
+        return Jaws(_moved(self.center, key, column), self.gap, self.height)
+
+    def take_lanes(self, index: Indices) -> "Jaws":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        sizes = (_taken(values, index) for values in (self.gap, self.height))
+        return Jaws(_taken(self.center.reshape(2, -1), index), *sizes)
 
     @cached_property
     def corners(self) -> Array:
-        """The ends of the plates in the gripper's frame, the lower one's first, (2, 4), mm."""
-        x, y = 0.5 * self.height, 0.5 * self.gap
+        """The ends of the plates in the gripper's frame, the lower one's first, mm.
+
+        They are (2, 4), or (2, 4, design) of a batch.
+        """
+        x, y = np.broadcast_arrays(0.5 * np.asarray(self.height), 0.5 * np.asarray(self.gap))
         around = np.array([[-x, x, x, -x], [-y, -y, y, y]])
-        return np.asarray(self.center[:, None] + around)
+        if around.ndim == self.center.ndim + 1:
+            return np.asarray(self.center[:, None] + around)
+        return np.asarray(self.center.reshape(2, 1, -1) + around.reshape(2, 4, -1))
 
     @property
     def name(self) -> str:
@@ -105,19 +158,32 @@ class Jaws:
         return f"jaws of {self.gap:g} x {self.height:g} mm"
 
     @property
-    def nearest_x(self) -> float:
+    def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return float(self.corners[0].min())
+        return np.asarray(self.corners[0].min(axis=0))
 
     @property
-    def inner_radius(self) -> float:
+    def inner_radius(self) -> float | Array:
         """The radius of the largest circle between them, mm."""
-        return 0.5 * min(self.gap, self.height)
+        return 0.5 * np.minimum(self.gap, self.height)
 
     @property
     def is_mirrored(self) -> bool:
         """Whether both fingers of a gripper meet the same."""
-        return bool(self.center[1] == 0.0)
+        return bool((self.center[1] == 0.0).all())
 
 
 Body = Disc | Jaws | Polygon
+
+
+def _moved(center: Array, key: str, column: Array) -> Array:
+    """A center with one coordinate of designs, (2, design)."""
+    x, y = (column if key == own else at for own, at in zip(PLACES, center, strict=True))
+    return np.stack(np.broadcast_arrays(x, y))
+
+
+def _taken(values: float | Array, index: Indices) -> Array:
+    """Values of some designs, (…, design); of those that are alike in all as many times."""
+    lanes = np.atleast_1d(values)
+    one_for_all = lanes.shape[-1] == 1
+    return np.take(lanes, 0 * index if one_for_all else index, axis=-1)

@@ -179,4 +179,13 @@ class Scene:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
         layer = None if thickness is None else np.take(thickness, index)
         pressure = self.pressure and self.pressure.take_lanes(index)
-        return Scene(self.finger.take_lanes(index), (), gripper, layer, pressure=pressure)
+        body = self.body and self.body.take_lanes(index)
+        return Scene(
+            self.finger.take_lanes(index),
+            (),
+            gripper,
+            layer,
+            pressure=pressure,
+            body=body,
+            held=self.held,
+        )

@@ -14,6 +14,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 
+WIDE, SMALL = 8, 2**14  # of bands: depth; numbers in a column of all lanes
+
 in_lanes = np.errstate(
     divide="ignore", invalid="ignore", over="ignore"
 )  # one lane's division by zero is its own
@@ -46,6 +48,8 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
     >>> factorize(band, (1, 0)).pivots.ravel()
     array([4., 2.])
     """
+    if _is_wide(band.shape):
+        return _factorize_wide(band, column_depths)
     for column, depth in enumerate(column_depths):
         if depth == 0:
             continue
@@ -54,6 +58,36 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
         for k in range(depth):
             band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
     return Factorization(band[1:], band[0], column_depths)
+
+
+def _is_wide(shape: tuple[int, ...]) -> bool:
+    """Whether so many small steps would take longer than to work on halves that are not needed."""
+    depth, _, batch = shape
+    return depth > WIDE + 1 and depth * batch <= SMALL
+
+
+def _factorize_wide(band: Array, column_depths: tuple[int, ...]) -> Factorization:
+    """The same by whole squares, A[r, c] at once for r < c, too: these are in rows before the band.
+
+    Lanes have the same bits as one by one.
+    """
+    padded = np.concatenate((np.zeros_like(band), band))
+    own = padded[len(band) :]
+    for column, depth in enumerate(column_depths):
+        if depth == 0:
+            continue
+        below = own[1 : depth + 1, column].copy()
+        factors = np.divide(below, own[0, column], out=own[1 : depth + 1, column])
+        square = _square(own, column + 1, depth)
+        square -= below[:, None] * factors
+    return Factorization(own[1:], own[0], column_depths)
+
+
+def _square(own: Array, first: int, size: int) -> Array:
+    """A[r, c] for rows and columns from `first` on, (size, size, batch): a view of the band."""
+    by_depth, by_column, by_lane = own.strides
+    shape, strides = (size, size, own.shape[2]), (by_depth, by_column - by_depth, by_lane)
+    return np.lib.stride_tricks.as_strided(own[:, first:], shape, strides)
 
 
 @in_lanes
@@ -85,7 +119,24 @@ def backward(factorization: Factorization, y: Array) -> Array:
     array([1., 2.])
     """
     lower = factorization.lower
+    if len(lower) > WIDE:  # whatever the batch: the order of sums is another
+        return _backward_wide(factorization, y)
     for column in range(len(factorization.column_depths) - 1, -1, -1):
         for k in range(factorization.column_depths[column]):
             y[column] -= lower[k, column] * y[column + 1 + k]
+    return y
+
+
+def _backward_wide(factorization: Factorization, y: Array) -> Array:
+    """The same, each unknown taken out of all equations before it at once: Lᵀ by columns."""
+    lower = factorization.lower
+    by_depth, by_column, by_lane = lower.strides
+    for row in range(1, len(y)):
+        at = len(y) - row
+        n = min(at, len(lower))  # L[at, at − 1], L[at, at − 2], …
+        shape, strides = (n, y.shape[-1]), (by_depth - by_column, by_lane)
+        factors = np.lib.stride_tricks.as_strided(lower[:, at - 1 :], shape, strides)[::-1]
+        if y.ndim == 3:
+            factors = factors[:, None]
+        y[at - n : at] -= factors * y[at]
     return y

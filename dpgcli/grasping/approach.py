@@ -123,7 +123,7 @@ def _gone_on(
     active, n = before.active.copy(), len(ends.load)
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
-    push = y * own.stiffness
+    push = own.pushes(before.active, y)
     push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
     at_fold = push.copy()
     moved = ContactShapes(

@@ -108,11 +108,26 @@ def placed(
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
-    units = UnitSolutions.of(scene.finger)
-    pattern = inverted_units(codes, scene.finger.n_units)
+    thickness = np.reshape(scene.layer_thickness, -1)
+    return met(UnitSolutions.of(scene.finger), formulate, thickness, body, frame, codes, way)
+
+
+def met(
+    units: UnitSolutions,
+    formulate: Formulate,
+    thickness: Array,
+    body: Body,
+    frame: FingerFrame,
+    codes: Codes,
+    way: Way = Way.PLACE,
+) -> Placed:
+    """The same of units and layers of some thickness, mm, (1,) or (batch,).
+
+    They, the body and the frame are one for all states, or one for each.
+    """
+    pattern = inverted_units(codes, units.finger.n_units)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
-    thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
-    bare = Obstructed(units, formulate, thickness, (frame.obstacle(body),), np.zeros(1))
+    bare = Obstructed(units, formulate, thickness[None], (frame.obstacle(body),), np.zeros(1))
     x = free.equilibrium.coordinates
     depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
@@ -150,9 +165,17 @@ def _inserted(
 
 
 def described(
-    own: Obstructed, codes: Sequence[Codes], grown: Approach, status: NDArray[np.uint8]
+    own: Obstructed,
+    codes: Sequence[Codes],
+    grown: Approach,
+    status: NDArray[np.uint8],
+    *,
+    with_margins: bool = True,
 ) -> tuple[Grasped, ...]:
-    """What there is to say of fingers that have come to rest, of each; `status` is that before."""
+    """What there is to say of fingers that have come to rest, of each; `status` is that before.
+
+    Margins, which take as long again as all else, are NaN unless they are wanted.
+    """
     shapes = own.relabeled(grown.shapes)
     potential = own.pressed(grown.shapes.inverted, grown.shapes.push, grown.load)
     there = looked_at(potential, grown.shapes.coordinates)
@@ -160,7 +183,9 @@ def described(
     is_there = status == Status.STABLE
     worst = np.max([state.status for state in settled], axis=0)
     status = np.where(is_there, worst, status)
-    margin = _margins(own, grown, np.asarray(status == Status.STABLE))
+    margin = np.full(len(status), np.nan)
+    if with_margins:
+        margin = _margins(own, grown, np.asarray(status == Status.STABLE))
     gaps = own.gaps()(shapes.coordinates).value
     n_before, found = 0, []
     for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):

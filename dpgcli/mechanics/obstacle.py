@@ -29,26 +29,29 @@ class Obstacle:
     plates: Indices = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     @classmethod
-    def disc(cls, center: Array, radius: float) -> Self:
-        """A disc about a center (2,)."""
-        return cls(center[:, None, None], np.full((1, 1), radius))
+    def disc(cls, center: Array, radius: float | Array) -> Self:
+        """A disc about a center (2,), or one for each lane, (2, batch)."""
+        return cls(center.reshape(2, 1, -1), np.reshape(radius, (1, -1)))
 
     @classmethod
     def polygon(cls, corners: Array) -> Self:
-        """A polygon by its corners (2, corner), one way round or the other.
+        """A polygon by its corners (2, corner), one way round or the other, or one for each lane.
 
-        Corners in the middle of a straight side are left out.
+        Corners (2, corner, batch) are those of one polygon, moved or stretched. Corners in the
+        middle of a straight side are left out.
         """
-        onwards = np.roll(corners, -1, axis=1) - corners
+        first = corners if corners.ndim == 2 else corners[..., 0]
+        onwards = np.roll(first, -1, axis=1) - first
         before = np.roll(onwards, 1, axis=1)
         turn = before[0] * onwards[1] - before[1] * onwards[0]
         is_turn = np.abs(turn) > STRAIGHT * np.hypot(*before) * np.hypot(*onwards)
-        x, y = around = corners[:, is_turn]
+        x, y = first[:, is_turn]
+        around = corners[:, is_turn]
         if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0.0:
             around = around[:, ::-1]
         number = np.arange(around.shape[1])
         plates = np.stack((number, np.roll(number, -1)), axis=1)
-        return cls(around[..., None], np.zeros((len(number), 1)), plates)
+        return cls(around.reshape(2, len(number), -1), np.zeros((len(number), 1)), plates)
 
     @cached_property
     def is_reentrant(self) -> Flags:

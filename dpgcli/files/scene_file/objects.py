@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from dpgcli.design.bodies import Body, Disc, Jaws, Polygon
+from dpgcli.design.bodies import PLACES, Body, Disc, Jaws, Polygon
 from dpgcli.design.problems import Issue
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import Positive, Section
@@ -18,6 +18,7 @@ KINDS = ("disc", "jaws", POLYGON)
 MOST_CORNERS = 64
 EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
+    **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
     POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
@@ -62,6 +63,12 @@ class ObjectSpec(Section):
         description="Where its center is in the gripper's frame, in mm: between the bases, x along "
         "the fingers; of a finger alone in its own frame."
     )
+    at_x_mm: Bounded | None = Field(
+        default=None, description="Its part along x, in mm, instead of that in at_mm."
+    )
+    at_y_mm: Bounded | None = Field(
+        default=None, description="Its part along y, in mm, instead of that in at_mm."
+    )
     held: Literal["fixed", "guided", "free"] = Field(
         default="fixed",
         description="How it is held: fixed, guided (it moves along x only), or free.",
@@ -70,7 +77,9 @@ class ObjectSpec(Section):
     @property
     def known(self) -> Body:
         """The value that it stands for."""
-        center = np.array(self.at_mm, float)
+        own = (self.at_x_mm, self.at_y_mm)
+        at = [said if part is None else part for said, part in zip(self.at_mm, own, strict=True)]
+        center = np.array(at, float)
         if self.jaws is not None:
             return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm)
         if self.polygon is not None:

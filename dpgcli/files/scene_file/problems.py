@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dpgcli.design.bodies import PLACES
 from dpgcli.design.dimensions import (
     LARGEST,
     MAX_UNITS,
@@ -97,7 +98,10 @@ PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE, objects.POLYGON
 MAPPINGS = ("overrides", *EXPECTED)
 MOST_SHOWN = 6  # parts of a list
 WHOLE = (("data",), ("loads",))  # sections whose values may be lists
-BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
+BOUNDED = (
+    *("units", "force_linearity", "mounting_angle_deg"),
+    *(*loads.LoadsSpec.model_fields, *PLACES),
+)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
 
@@ -226,8 +230,6 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     if path[:1] == UNCERTAINTY:
         return "a key that designs can differ in", dotted(path), "the tables have no uncertainties"
-    if path[:1] == OBJECT:
-        return "a key that designs can differ in", dotted(path), "sweeps have no body: dpg grasp"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
     if pattern in SECTIONS or str(path[-1]) in (*MAPPINGS, *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
