@@ -25,7 +25,7 @@ from dpgcli.states.patterns import codes_of
 Fingers = Callable[..., Finger]
 ALONE = frames(None)[0]
 BARS = (1e3, 1e4, np.inf)
-SEEDS = (0, 1, 2, 4, 7, 10, 13, 14)
+SEEDS = (0, 3, 4, 6, 9, 10, 15, 16, 18, 19, 24, 26, 28, 31, 35, 37)
 ROUNDING = 1e-9  # mm
 
 
@@ -79,8 +79,8 @@ class Drawn:
         values["force_linearity"] = random.uniform(0.02, 0.04, (n, 1))
         finger = Finger(n, **values, linear_stiffness=np.array([[BARS[seed % 3]]]))
         self.finger = finger.changed(wall_compliance=np.array([[0.6 if seed % 2 else 0.0]]))
-        self.pattern = "".join(random.choice(["0", "1"], n, p=[0.3, 0.7]))
-        x, top = random.uniform(12.0, 13.5 * n), -random.uniform(2.5, 6.0)
+        self.pattern = "".join(random.choice(["0", "1"], n, p=[0.4, 0.6]))
+        x, top = random.uniform(10.0, 13.5 * n), -random.uniform(1.0, 3.0)
         self.body: Body = below(random.uniform(5.0, 20.0), random.uniform(8.0, 30.0), x, top)
         if seed % 2:
             turn = np.sort(random.uniform(0.0, 2.0 * np.pi, 5))
@@ -105,7 +105,6 @@ class Found:
         (told,) = grasp.described(
             self.placed.own, [self.placed.codes], self.placed.grown, self.placed.status
         )
-        touches = told.touches
         self.contacts = [
             (
                 float(push[cell]),
@@ -136,18 +135,13 @@ class Found:
         return np.reshape(np.array(values), (len(self.contacts), q.shape[1]))
 
     def _to_face(self, nodes: Array, point: Array) -> Array:
-        best = None
-        for start, end in pairwise(range(nodes.shape[1])):
-            along = nodes[:, end] - nodes[:, start]
-            length = np.sqrt(along[0] ** 2 + along[1] ** 2)
-            away = point[:, None] - nodes[:, start]
-            share = (away[0] * along[0] + away[1] * along[1]) / length**2
-            off = (away[0] * along[1] - away[1] * along[0]) / length
-            is_on = -1e-7 <= share.real[0] <= 1.0 + 1e-7
-            if is_on and (best is None or abs(off.real[0]) < abs(best.real[0])):
-                best = off
-        assert best is not None
-        return np.asarray(best)
+        """The distance of a point from the line of the side that it is on in the solution."""
+        sides = pairwise(self.nodes(self.q[:, None])[..., 0].T)
+        on = shapely.Point(point)
+        side = int(np.argmin([shapely.LineString(ends).distance(on) for ends in sides]))
+        along, away = nodes[:, side + 1] - nodes[:, side], point[:, None] - nodes[:, side]
+        length = np.sqrt(along[0] ** 2 + along[1] ** 2)
+        return np.asarray((away[0] * along[1] - away[1] * along[0]) / length)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -191,9 +185,9 @@ def test_slsqp_finds_the_same_minima(seed: int, own: Callable[..., Any]) -> None
     assert best.fun == pytest.approx(energy(found.q * found.unit), rel=1e-9, abs=1e-12)
 
 
-def test_most_of_them_touch(own: Callable[..., Any]) -> None:
+def test_all_of_them_touch(own: Callable[..., Any]) -> None:
     touched = [len(Found(seed, own).contacts) for seed in SEEDS]
-    assert sum(n > 0 for n in touched) >= 8
+    assert min(touched) > 0
 
 
 @pytest.mark.parametrize("kind", ["jaws", "polygon"])
