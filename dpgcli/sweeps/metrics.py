@@ -306,7 +306,7 @@ METRICS = (
     _count(
         "n_grasps",
         "states that touch the body, at rest",
-        lambda m: m.alike(0 if m.n_grasps is None else m.n_grasps),
+        lambda m: m.alike(0) if m.n_grasps is None else m.n_grasps,
         (Output.SHAPES, Output.FORCES),
         Group.GRASP,
     ),
