@@ -16,6 +16,7 @@ import numpy as np
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.arrays import Array, Columns, Flags, keep_freed_memory
 from dpgcli.benchmark.ablation import ablations, check_ablation
+from dpgcli.benchmark.contacts import DiscCase, meets_disc
 from dpgcli.benchmark.methods import (
     BenchmarkMethod,
     BenchmarkResult,
@@ -46,6 +47,7 @@ from dpgcli.temporary import temporary_folder
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
+TOUCHING_STATES = 8  # of those against a disc
 BATCH = 4096  # states of a call, as in a sweep
 GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)
 TABLE_UNITS = 20  # of a finger all of whose states go into a Parquet file
@@ -72,7 +74,7 @@ COLUMNS = (
     Column("rms_energy_error_mJ", "mJ", "root mean square of the energies' errors"),
     Column("bound_mm", "mm", "bound on the change of a tip, known before"),
     Column("max_threshold_error", "", "largest relative error of a pressure at which it snaps"),
-    Column("times_as_long", "", "time of a threshold over that of this package, one way"),
+    Column("times_as_long", "", "time of a threshold or a contact over that of this package"),
     Column("seconds", "s", "wall time of a call, median"),
     Column("seconds_min", "s", "wall time of a call, smallest"),
     Column("seconds_max", "s", "wall time of a call, largest"),
@@ -134,6 +136,9 @@ class Bench:
                 yield self._row(method, _only(reference, few))
         if self.scene.pressure is not None:
             yield from self._thresholds(self.scene.pressure)
+        if meets_disc(self.scene):
+            apart = -(-patterns.shape[1] // TOUCHING_STATES)
+            yield from self._contacts(patterns[:, ::apart])
         if self.known is not None:
             yield self._model_error(self.known)
         yield from self._by_units()
@@ -183,6 +188,14 @@ class Bench:
                 "max_threshold_error": _largest(off[np.isfinite(off)]),
                 "times_as_long": times["seconds_per_state"] / own,
             }
+
+    def _contacts(self, patterns: Flags) -> Iterator[BenchRow]:
+        """States of the upper finger against the disc."""
+        case, own = DiscCase.of(self.scene, patterns), math.nan
+        for method in case.methods():
+            row = self._row(method, case.truth)
+            own = row["seconds_per_state"] if math.isnan(own) else own
+            yield {**row, "times_as_long": row["seconds_per_state"] / own}
 
     def _facts(
         self, group: str, method: str, n_states: int, finger: Finger | None = None

@@ -110,7 +110,7 @@ def _numerics(potential: FingerPotential, coordinates: Array) -> tuple[float, fl
     The condition, in the 2-norm, is that of H scaled to a unit diagonal: of what no choice of
     units for the coordinates can mend (van der Sluis 1969, to a factor of their number).
     """
-    hessian = _dense(potential.evaluate(coordinates).hessian)
+    hessian = dense(potential.evaluate(coordinates).hessian)
     if not np.isfinite(hessian).all():
         return np.nan, np.inf
     rounding = np.abs(hessian) @ np.abs(coordinates) / potential.coordinates.force_unit
@@ -120,7 +120,7 @@ def _numerics(potential: FingerPotential, coordinates: Array) -> tuple[float, fl
     return float(np.finfo(float).eps * rounding.max()), min(condition, LARGEST_CONDITION)
 
 
-def _dense(band: Array) -> Array:
+def dense(band: Array) -> Array:
     """The full matrix of a band of one lane."""
     size = band.shape[1]
     full = np.zeros((size, size))
