@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES, check_body
+from dpgcli.api.bodies import check_body
+from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
