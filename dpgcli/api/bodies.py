@@ -15,7 +15,7 @@ from dpgcli.files.scene_file.objects import ObjectSpec
 from dpgcli.files.scene_file.problems import checked_object
 from dpgcli.files.yaml_file import read_document
 from dpgcli.grasping.frames import begins_in_base
-from dpgcli.text import shortened
+from dpgcli.text import number_in, shortened
 
 SMALLEST, LARGEST = 1e-3, 1e4  # mm: of what a text says
 JAW_HEIGHT = 40.0  # mm, unless the text says it
@@ -70,10 +70,7 @@ def _known(place: Array | None) -> Array:
 
 def _of_text(said: str, place: Array | None) -> Body:
     kind, _, sizes = said.partition(":")
-    try:
-        numbers = [float(size) for size in sizes.split("x")]
-    except ValueError:
-        numbers = []
+    numbers = [number_in(size) for size in sizes.split("x")]
     is_known = len(numbers) in {"disc": (1,), "jaws": (1, 2)}.get(kind, ())
     if not is_known or not all(SMALLEST <= size <= LARGEST for size in numbers):
         raise UsageError(Field("object"), f" {shortened(said)}: {KINDS}")

@@ -1,4 +1,7 @@
-"""Bodies that fingers meet: a disc, the jaws of a mechanism, a polygon."""
+"""Bodies that fingers meet: a disc, the jaws of a mechanism, a polygon.
+
+Of a batch of designs centers are (2, design), sizes (design,) and corners (2, corner, design).
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,17 +10,13 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 
-# keys of a spec's object
 DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
-PLACES = ("at_x_mm", "at_y_mm")
+PLACES = "at_x_mm", "at_y_mm"  # these are keys of a spec's object
 
 
 @dataclass(frozen=True)
 class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm.
-
-    Of a batch (2, design) and (design,).
-    """
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
 
     center: Array
     radius: float | Array
@@ -35,17 +34,17 @@ class Disc:
 
     def take_lanes(self, index: Indices) -> "Disc":
         """Those of some designs of a batch; one that is alike in all is repeated."""
-        return Disc(_taken(self.center.reshape(2, -1), index), _taken(self.radius, index))
+        return Disc(_centers(self.center, index), _sizes(self.radius, index))
+
+    @property
+    def name(self) -> str:
+        """What it is, with its size; of a single one."""
+        return f"a disc of {2.0 * self.radius:g} mm"
 
     @property
     def inner_radius(self) -> float | Array:
         """The radius of the largest circle in it, mm."""
         return self.radius
-
-    @property
-    def name(self) -> str:
-        """What it is, with its size."""
-        return f"a disc of {2.0 * self.radius:g} mm"
 
     @property
     def nearest_x(self) -> float | Array:
@@ -63,8 +62,6 @@ class Disc:
 class Polygon:
     """A body with straight sides: a reference point (2,), and corners from there, (2, corner), mm.
 
-    Of a batch the point is (2, design).
-
     >>> wedge = np.array([[0.0, 3.0, 3.0], [0.0, -4.0, 4.0]])
     >>> bool(Polygon(np.array([40.0, 0.0]), wedge).is_mirrored)
     True
@@ -74,28 +71,29 @@ class Polygon:
     around: Array
 
     def with_value(self, key: str, column: Array) -> "Polygon":
-        """With values of designs, (design,), at a key of a spec's object."""
+        """With values of designs, (design,), at a key of a spec's object: of its place."""
         return Polygon(_moved(self.center, key, column), self.around)
 
     def take_lanes(self, index: Indices) -> "Polygon":
         """Those of some designs of a batch; one that is alike in all is repeated."""
-        return Polygon(_taken(self.center.reshape(2, -1), index), self.around)
+        return Polygon(_centers(self.center, index), self.around)
+
+    @property
+    def name(self) -> str:
+        """What it is, with its size; of a single one."""
+        return f"a polygon of {self.around.shape[1]} corners"
 
     @cached_property
     def corners(self) -> Array:
-        """The corners in the gripper's frame, (2, corner) or (2, corner, design), mm."""
+        """The corners in the gripper's frame, (2, corner), mm."""
         around = self.around if self.center.ndim == 1 else self.around[..., None]
         return np.asarray(self.center[:, None] + around)
 
     @property
-    def name(self) -> str:
-        """What it is, with its size."""
-        return f"a polygon of {self.around.shape[1]} corners"
-
-    @property
     def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return np.asarray(self.corners[0].min(axis=0))
+        nearest: float | Array = self.corners[0].min(axis=0)
+        return nearest
 
     @cached_property
     def inner_radius(self) -> float:
@@ -107,11 +105,10 @@ class Polygon:
     @property
     def is_mirrored(self) -> Flags:
         """Whether both fingers of a gripper meet the same, () or (design,)."""
-        corners = self.corners
-        mirrored = np.stack((corners[0], -corners[1]))[:, ::-1]
-        n = mirrored.shape[1]
-        turned = (np.roll(mirrored, shift, axis=1) for shift in range(n))
-        are_alike = [(corners == other).all(axis=(0, 1)) for other in turned]
+        x, y = self.corners[:, ::-1]
+        mirrored = np.stack((x, -y))
+        turned = (np.roll(mirrored, shift, axis=1) for shift in range(len(x)))
+        are_alike = [(self.corners == other).all(axis=(0, 1)) for other in turned]
         return np.asarray(np.any(are_alike, axis=0))
 
 
@@ -119,7 +116,7 @@ class Polygon:
 class Jaws:
     """Two flat plates along x with a gap between them, about a center (2,); mm.
 
-    Fingers meet them from outside, as the sides of a block. Of a batch (2, design) and (design,).
+    Fingers meet them from outside, as the sides of a block.
 
     >>> Jaws(np.array([40.0, 0.0]), gap=30.0, height=40.0).corners.tolist()
     [[20.0, 60.0, 60.0, 20.0], [-15.0, -15.0, 15.0, 15.0]]
@@ -139,35 +136,32 @@ class Jaws:
 
     def take_lanes(self, index: Indices) -> "Jaws":
         """Those of some designs of a batch; one that is alike in all is repeated."""
-        sizes = (_taken(values, index) for values in (self.gap, self.height))
-        return Jaws(_taken(self.center.reshape(2, -1), index), *sizes)
-
-    @cached_property
-    def corners(self) -> Array:
-        """The ends of the plates in the gripper's frame, the lower one's first, mm.
-
-        They are (2, 4), or (2, 4, design) of a batch.
-        """
-        x, y = np.broadcast_arrays(0.5 * np.asarray(self.height), 0.5 * np.asarray(self.gap))
-        around = np.array([[-x, x, x, -x], [-y, -y, y, y]])
-        if around.ndim == self.center.ndim + 1:
-            return np.asarray(self.center[:, None] + around)
-        return np.asarray(self.center.reshape(2, 1, -1) + around.reshape(2, 4, -1))
+        gap, height = _sizes(self.gap, index), _sizes(self.height, index)
+        return Jaws(_centers(self.center, index), gap, height)
 
     @property
     def name(self) -> str:
-        """What it is, with its size."""
+        """What it is, with its size; of a single one."""
         return f"jaws of {self.gap:g} x {self.height:g} mm"
+
+    @cached_property
+    def corners(self) -> Array:
+        """The ends of the plates in the gripper's frame, the lower one's first, (2, 4), mm."""
+        x, y = 0.5 * self.height, 0.5 * self.gap
+        around = np.array([[-x, x, x, -x], [-y, -y, y, y]])
+        return np.asarray(self.center[:, None] + around)
 
     @property
     def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
-        return np.asarray(self.corners[0].min(axis=0))
+        nearest: float | Array = self.corners[0].min(axis=0)
+        return nearest
 
     @property
     def inner_radius(self) -> float | Array:
         """The radius of the largest circle between them, mm."""
-        return 0.5 * np.minimum(self.gap, self.height)
+        radius: float | Array = 0.5 * np.minimum(self.gap, self.height)
+        return radius
 
     @property
     def is_mirrored(self) -> Flags:
@@ -179,13 +173,20 @@ Body = Disc | Jaws | Polygon
 
 
 def _moved(center: Array, key: str, column: Array) -> Array:
-    """A center with one coordinate of designs, (2, design)."""
+    """Centers with values of designs, (design,), at the key of a part of their place."""
     x, y = (column if key == own else at for own, at in zip(PLACES, center, strict=True))
     return np.stack(np.broadcast_arrays(x, y))
 
 
-def _taken(values: float | Array, index: Indices) -> Array:
-    """Values of some designs, (…, design); of those that are alike in all as many times."""
-    lanes = np.atleast_1d(values)
-    one_for_all = lanes.shape[-1] == 1
-    return np.take(lanes, 0 * index if one_for_all else index, axis=-1)
+def _centers(center: Array, index: Indices) -> Array:
+    """Centers of some designs, (2, design); one for all as many times."""
+    return _taken(center.reshape(2, -1), index)
+
+
+def _sizes(size: float | Array, index: Indices) -> Array:
+    """Sizes of some designs, (design,); one for all as many times."""
+    return _taken(np.reshape(size, -1), index)
+
+
+def _taken(values: Array, index: Indices) -> Array:
+    return np.take(values, 0 * index if values.shape[-1] == 1 else index, axis=-1)

@@ -55,8 +55,9 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
             continue
         below = band[1 : depth + 1, column].copy()
         factors = np.divide(below, band[0, column], out=band[1 : depth + 1, column])
-        for k in range(depth):
-            band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
+        for k in range(depth):  # along diagonals: rows side by side in memory
+            updated = band[k, column + 1 : column + 1 + depth - k]
+            updated -= below[k:] * factors[: depth - k]
     return Factorization(band[1:], band[0], column_depths)
 
 

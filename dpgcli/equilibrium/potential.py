@@ -192,9 +192,11 @@ def _assemble_load(
 
 def add(target: Array, row: Row, values: Array) -> None:
     """Add one value per cell, (cell, batch), to a row each; a clamped cell has none."""
-    clamped = 1 if row.offset < 0 else 0
-    first = row.offset + clamped * row.stride
-    target[first :: row.stride][: len(values) - clamped] += values[clamped:]
+    first, stride = row.offset, row.stride
+    if first < 0:
+        first, values = first + stride, values[1:]
+    rows = target[first : first + stride * len(values) : stride]
+    rows += values
 
 
 def _rows_by_cell(rows: tuple[Row, ...], n_cells: int) -> list[list[int]]:

@@ -21,7 +21,7 @@ SIDEWAYS = -0.25  # of n_x + n_y: a plate with more faces up, or away from the b
 
 
 class PlateGaps(NamedTuple):
-    """Of each plate and node: n · (F − P), whether it is over the plate, n, how deep the tip is.
+    """Of plates and nodes: n · (F − P), whether one is over a plate, n, and how deep the tip is.
 
     `distance`, `is_over` and `ends`, the number of the point at the nearer end of the plate, are
     (plate, node, batch); `normal` is (2, plate, 1 or batch), `depth` (batch,) of the tip, in mm, is

@@ -7,12 +7,12 @@ from typing import Self
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, total
-from dpgcli.equilibrium.contracts import Response, Term, take_lanes
+from dpgcli.equilibrium.contracts import OwnCoordinate, Response, Row, Term, take_lanes
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import GRAVITY, Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.neighbors import NeighborTurns
 from dpgcli.mechanics.walls import Walled
@@ -79,7 +79,7 @@ def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     """
     finger = coordinates.finger
     corner, bar = Quadratic(2.0 * finger.hinge_stiffness), Quadratic(finger.linear_stiffness)
-    hinges = coordinates.corners if finger.hinge_stiffness.any() else ()
+    hinges = coordinates.corners if "hinge_stiffness" in finger.parts else ()
     domes, wall = DomeSprings(finger.law, finger.domes), Quadratic(finger.bistable_stiffness)
     return (
         Term("bistable", coordinates.dome, domes),
@@ -107,20 +107,42 @@ def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     """
     finger = coordinates.finger
     moment = finger.end_moment
-    turning = coordinates.corners if moment.any() else ()
+    turning = coordinates.corners if "end_moment" in finger.parts else ()
     loads = [(angle, moment) for angle in turning]
-    for axis, force in enumerate((finger.tip_force_x, finger.tip_force_y)):
-        if force.any():
-            loads.append((coordinates.position(axis), force))
-    if finger.unit_weight.any():
+    for axis, name in enumerate(("tip_force_x", "tip_force_y")):
+        if name in finger.parts:
+            loads.append((coordinates.position(axis), getattr(finger, name)))
+    if "unit_weight" in finger.parts:
         shape = (finger.n_units, finger.unit_weight.shape[1])
         weights = np.broadcast_to(finger.unit_weight, shape)
         whole = total(weights)[None]
         shares = weights / np.where(whole != 0.0, whole, 1.0)
-        for axis, along in enumerate((finger.gravity_x, finger.gravity_y)):
-            if along.any():
-                loads.append((coordinates.center(axis, shares), whole * along))
+        for axis, name in enumerate(GRAVITY):
+            if name in finger.parts:
+                loads.append((coordinates.center(axis, shares), whole * getattr(finger, name)))
     return tuple(Term(LOAD, measure, DeadLoad(force)) for measure, force in loads)
+
+
+def springs_merged(system: FingerCoordinates, terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    """The same energy, with the springs of single coordinates as one term that is ahead of others.
+
+    >>> import numpy as np
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> chain = Chain(uniform_finger(2, **STUDY))
+    >>> [term.kind for term in springs_merged(chain, finger_terms(chain))]
+    ['springs', 'bistable']
+    """
+    stiffness, others = np.zeros((system.size, 1)), []
+    for term in terms:
+        measure, law = term.measure, term.law
+        if isinstance(measure, OwnCoordinate) and isinstance(law, Quadratic):
+            rows = slice(measure.row.offset, None, measure.row.stride)
+            stiffness = stiffness + np.zeros(law.stiffness.shape[1])
+            stiffness[rows][: measure.n_cells] += law.stiffness
+        else:
+            others.append(term)
+    every = OwnCoordinate(Row(1, 0), system.size)
+    return Term("springs", every, Quadratic(stiffness)), *others
 
 
 def chain_potential(finger: Finger) -> FingerPotential:
