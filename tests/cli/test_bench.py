@@ -38,6 +38,24 @@ def test_tables_a_figure_in_text_and_the_cheapest_way(call: Any) -> None:
     assert result.stderr == ""
 
 
+def test_a_spec_with_a_disc_has_its_states(call: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dpgcli.benchmark.contacts.BATCH", 4)
+    monkeypatch.setattr(module, "TOUCHING_STATES", 2)
+    disc = ("-s", "object={disc: {diameter_mm: 16}, at_mm: [25, -14]}")
+    result = call(*BENCH, *disc)
+    assert result.exit_code == ExitCode.DONE
+    _, _, table = result.stdout.partition("The states against the spec's disc\n\n")
+    heads, *lines = table.split("\n\n")[0].splitlines()
+    assert heads.split()[:3] == ["method", "certified", "n_missing"]
+    assert [line.split("  ")[0] for line in lines] == [
+        "this package, 2 states at once",
+        "this package, 4 states at once",
+        "SciPy SLSQP",
+        "SciPy trust-constr",
+    ]
+    assert "spec's disc" not in call(*BENCH).stdout
+
+
 def test_all_rows_in_files(call: Any, folder: Path) -> None:
     options = ("-o", "b.parquet", "--json", "b.json", "--plot", "b.svg", "--format", "csv")
     result = call(*BENCH, *options)
