@@ -144,3 +144,17 @@ def test_tables_have_the_error_of_pushes_and_of_nothing_else(held: Case) -> None
     contact, mirror = summarized(outcomes)
     assert contact.true_force_error == errors[0]
     assert np.isnan(mirror.true_force_error)
+
+
+def test_a_state_of_another_pattern_is_not_the_one_that_was_missed(
+    held: Case, answer: Answer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = contacts.extended_contact
+    refused = replace(answer, status=Status.NOT_CONVERGED)
+    for name in ("is_minimum", "in_pattern"):
+        monkeypatch.setattr(
+            contacts,
+            "extended_contact",
+            lambda *args, name=name: replace(found(*args), **{name: False}),
+        )
+        assert judged(held, refused).verdict is Verdict.NO_SUCH_STATE

@@ -6,7 +6,16 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.reference.contact import RoundBody, extended_contact, penetration
+from dpgcli.reference.contact import (
+    RoundBody,
+    _Balance,
+    _ExactBody,
+    _Search,
+    extended_contact,
+    penetration,
+)
+from dpgcli.reference.equilibria import energy_of
+from dpgcli.reference.units import extended_units
 
 CENTER, LONG, TURN = (9.0, -8.0), np.hypot(9.0, 8.0), np.arctan2(8.0, 9.0)
 
@@ -96,3 +105,22 @@ def test_penetration_is_that_of_the_nearest_place(
 ) -> None:
     nodes = np.array([13.5, 0.0, 13.5, 10.75])
     assert penetration(RoundBody(center, radius, 0.0), nodes, 10.75) == pytest.approx(deep)
+
+
+def test_behind_a_corner_is_as_deep_as_the_corner_is_away() -> None:
+    nodes = np.array([13.5, 0.0, 13.5, 10.75, 25.5, -6.0, 30.0, 3.0])
+    behind = RoundBody((14.0, 3.0), 1.0, 0.0)
+    assert penetration(behind, nodes, 10.75) == pytest.approx(1.0 + np.hypot(0.5, 3.0))
+
+
+@pytest.mark.parametrize(("along", "is_minimum"), [(2, True), (-2, False)])
+def test_curvature_counts_on_the_motions_that_contacts_leave(along: int, is_minimum: bool) -> None:
+    """Downhill across the contact, which holds that back; up or down along it."""
+    with mpmath.workdps(50):
+        bars = energy_of(unit(), extended_units(unit()), [])
+        search = _Search(bars, _ExactBody.of(RoundBody(CENTER, 8.0, 0.0)), 50, 0)
+        zero, one = mpmath.mpf(0), mpmath.mpf(1)
+        hessian = [[-one, zero], [zero, along * one]]
+        found = _Balance([zero, zero], {}, [[one, zero]], hessian)
+        assert search.is_minimum(found) is is_minimum
+        assert not search.is_minimum(found._replace(slopes=[]))
