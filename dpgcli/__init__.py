@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from dpgcli.api.check import check
     from dpgcli.api.compare import compare
     from dpgcli.api.explain import explain
+    from dpgcli.api.finger import uniform_finger
     from dpgcli.api.fits.bistable import fit_bistable
     from dpgcli.api.fits.finger import fit_finger
     from dpgcli.api.fits.grid import fit_grid
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
         UsageError,
     )
     from dpgcli.files.calibration import read_calibration
-    from dpgcli.mechanics.finger import uniform_finger
 
 __all__ = [
     "ActuationError",
@@ -109,7 +109,7 @@ _HOMES = {
     "stress": "api.stress",
     "sweep": "api.sweep",
     "transitions": "api.transitions",
-    "uniform_finger": "mechanics.finger",
+    "uniform_finger": "api.finger",
     "validate": "api.validate",
 }
 

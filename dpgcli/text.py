@@ -6,6 +6,7 @@ from collections.abc import Sequence
 KeyPath = tuple[str | int, ...]
 
 MAX_SHOWN = 60
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 COMMAND = re.compile(r"(^\s*):(?=:)|(#)#(?=\w*\[)")
 
 
@@ -45,6 +46,15 @@ def control_character(name: str) -> str:
     ('\\\\t', '')
     """
     return next((ascii(c)[1:-1] for c in name if c < " " or "\x7f" <= c < "\xa0"), "")
+
+
+def number_in(text: str) -> float:
+    """The number that people read in a text, NaN where there is none: float takes 1_0 for 10.
+
+    >>> number_in(" -0.75"), number_in("1_0"), number_in("１０")
+    (-0.75, nan, nan)
+    """
+    return float(text) if NUMBER.fullmatch(text.strip()) else float("nan")
 
 
 def quoted(value: object) -> str:

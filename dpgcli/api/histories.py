@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dpgcli.api.inputs import by_text, each_of, path_of
+from dpgcli.api.inputs import BYTES, by_text, each_of, path_of
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.design.lines import NAME, TIME
 from dpgcli.design.pressure import History, Pressure
@@ -74,9 +74,9 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
 
 
 def _is_array(values: Any) -> bool:
-    """Whether values are in an order, and their parts of one length."""
+    """Whether values are in an order, no letters, and their parts of one length."""
     try:
-        return np.ndim(values) > 0
+        return not isinstance(values, BYTES) and np.ndim(values) > 0
     except ValueError:
         return False
 

@@ -12,11 +12,11 @@ from importlib import util
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeGuard, TypeVar
 
 from dpgcli.calibration.choices import MOST_RESAMPLES
 from dpgcli.calibration.known import Frame, KnownStates
-from dpgcli.design.dimensions import LARGEST, SMALLEST
+from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, SpecError, UsageError
 from dpgcli.files.calibration import Calibration
@@ -47,6 +47,8 @@ Place: TypeAlias = Sequence[float] | None
 """Two numbers in mm; None where somebody else says them."""
 
 ORIGINS = ("as given", "from the data's header", "from the spec")
+N_COORDINATES = 2
+BYTES = (bytes, bytearray, memoryview)  # whose items are numbers of letters
 LARGEST_WHOLE = 2**1000  # far beyond any seed
 NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
 FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
@@ -93,7 +95,11 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
             raise UsageError(Field("settings"), " change a spec, not a finger's values")
         if isinstance(spec, SceneInput):
             return spec
-        return SceneInput("scene", Scene(spec, sources=()) if isinstance(spec, Finger) else spec)
+        scene = Scene(spec, sources=()) if isinstance(spec, Finger) else spec
+        if scene.finger.n_units > MAX_UNITS:
+            found = f" of {scene.finger.n_units:,} units: expected at most {MAX_UNITS}"
+            raise UsageError(Field("spec"), found)
+        return SceneInput("scene", scene)
     if isinstance(spec, Mapping):
         return _scene("spec", _without_files(spec, settings), Path())
     path = path_of("spec", spec)
@@ -210,10 +216,10 @@ def _number(value: Decimal | Fraction | int) -> float | int:
 def each_of(value: Any) -> tuple[Any, ...]:
     """The items of a sequence; of what is none, such as a text, itself.
 
-    >>> each_of("abc"), each_of(["a", "b"])
-    (('abc',), ('a', 'b'))
+    >>> each_of("abc"), each_of(["a", "b"]), each_of(b"ab")
+    (('abc',), ('a', 'b'), (b'ab',))
     """
-    if isinstance(value, str) or not isinstance(value, Iterable):
+    if isinstance(value, (str, *BYTES)) or not isinstance(value, Iterable):
         return (value,)
     try:
         return tuple(value)
@@ -262,10 +268,19 @@ def check_numbers(**values: float | None) -> None:
     >>> check_numbers(tolerance=1e-9, target_error=None)
     """
     for field, value in values.items():
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        is_in_reach = is_number and not (isinstance(value, Integral) and abs(value) > LARGEST)
-        if value is not None and not is_in_reach:
+        if value is not None and not is_number(value):
             raise UsageError(Field(field), f" {quoted(value)}: expected a number")
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a number, and no whole one that is beyond those with a decimal point.
+
+    >>> is_number(2), is_number(True), is_number("2"), is_number(10**400)
+    (True, False, False, False)
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    return not isinstance(value, Integral) or abs(int(value)) <= LARGEST
 
 
 def check_whole(**values: int | None) -> None:
@@ -326,15 +341,14 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     >>> point("first_station", [5.375, -0.75])
     (5.375, -0.75)
     """
-    try:
-        x, y = map(float, place)
-    except (TypeError, ValueError, OverflowError):
-        x, y = float("nan"), 0.0
-    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
+    is_listed = isinstance(place, Sequence) or hasattr(place, "tolist")  # no set, and no table
+    parts = each_of(place) if is_listed else ()
+    numbers = [float(part) for part in parts if is_number(part) and abs(part) <= LARGEST]
+    if not len(numbers) == len(parts) == N_COORDINATES:
         raise UsageError(
             Field(field), f" {quoted(place)}: expected two numbers in mm, such as 5.375, -0.75"
         )
-    return x, y
+    return numbers[0], numbers[1]
 
 
 def frame_of(

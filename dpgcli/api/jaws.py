@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES, check_body
+from dpgcli.api.bodies import check_body
+from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -97,7 +98,7 @@ class JawsResult:
         if not all(pattern in lanes for pattern in STUDY):
             return
         (known, force), (other, measured) = STUDY.items()
-        rest = self.jaws.gap
+        rest = float(self.jaws.gap)
         fitted = Mechanism.fitted(Branch.of(self.path, lanes[known]), rest, force)
         if fitted is None:
             yield (

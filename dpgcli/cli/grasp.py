@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Body = Annotated[
     str | None,
-    typer.Option("--object", metavar="BODY", help="Body to grasp: disc:40, of 40 mm"),
+    typer.Option("--object", metavar="BODY", help="Body: disc:40, jaws:30x40 or a YAML file"),
 ]
 Place = Annotated[
     str | None,
@@ -80,7 +80,8 @@ def grasp(
     quiet: Quiet = False,
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
-    from dpgcli.api.grasp import check_drawable, disc_of, grasp_of, pairs_of
+    from dpgcli.api.bodies import with_body
+    from dpgcli.api.grasp import check_drawable, grasp_of, pairs_of
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.grasping.approach import Way
@@ -93,13 +94,13 @@ def grasp(
         _check_alone(body, both, approach)
         _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
         return
-    disc = disc_of(given.scene, body, point("--at", at))
+    given = with_body(given, body, point("--at", at))
     chosen = tuple(patterns or ("*",))
     if plot is not None:
         check_drawable(len(pairs_of(chosen, given.scene, both)[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, disc, chosen, both, Way(approach.value))
+        found = grasp_of(given, chosen, both, Way(approach.value))
     if output is not None:
         found.save(output)
     if plot is not None:

@@ -162,12 +162,13 @@ def point(option: str, text: str | None) -> tuple[float, float] | None:
     """A place of an option, in mm; none of no text. Raises UsageError for what is none."""
     from dpgcli.design.dimensions import LARGEST
     from dpgcli.errors import UsageError
+    from dpgcli.text import number_in
 
     if text is None:
         return None
     try:
-        x, y = map(float, text.split(","))
-    except ValueError:
+        x, y = map(number_in, text.split(","))
+    except ValueError:  # one, or three
         x, y = float("nan"), 0.0
     if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
         raise UsageError(f"{option} {text}: expected two numbers in mm, such as 5.375,-0.75")

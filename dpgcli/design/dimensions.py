@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.design.bodies import PLACES, Disc
+from dpgcli.design.bodies import PLACES, Body
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.geometry import chamber_width
 from dpgcli.design.loads import FORCES, MASS, MOMENT, GivenLoads
@@ -129,7 +129,7 @@ class Design:
     pressure: GivenPressure | None = None
     hinge_coupling: Array | None = None
     loads: GivenLoads | None = None
-    body: Disc | None = None
+    body: Body | None = None
     held: Held = Held.FIXED
 
     def with_values(self, columns: Sizes) -> "Design":

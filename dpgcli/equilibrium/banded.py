@@ -55,8 +55,9 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
             continue
         below = band[1 : depth + 1, column].copy()
         factors = np.divide(below, band[0, column], out=band[1 : depth + 1, column])
-        for k in range(depth):
-            band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
+        for k in range(depth):  # along diagonals: rows side by side in memory
+            updated = band[k, column + 1 : column + 1 + depth - k]
+            updated -= below[k:] * factors[: depth - k]
     return Factorization(band[1:], band[0], column_depths)
 
 
@@ -73,21 +74,22 @@ def _factorize_wide(band: Array, column_depths: tuple[int, ...]) -> Factorizatio
     """
     padded = np.concatenate((np.zeros_like(band), band))
     own = padded[len(band) :]
+    square = _square(own)
     for column, depth in enumerate(column_depths):
         if depth == 0:
             continue
         below = own[1 : depth + 1, column].copy()
         factors = np.divide(below, own[0, column], out=own[1 : depth + 1, column])
-        square = _square(own, column + 1, depth)
-        square -= below[:, None] * factors
+        beyond = slice(column + 1, column + 1 + depth)
+        square[beyond, beyond] -= below[:, None] * factors
     return Factorization(own[1:], own[0], column_depths)
 
 
-def _square(own: Array, first: int, size: int) -> Array:
-    """A[r, c] for rows and columns from `first` on, (size, size, batch): a view of the band."""
+def _square(own: Array) -> Array:
+    """A[r, c], (size, size, batch), as a view of its band: only within the band is it there."""
     by_depth, by_column, by_lane = own.strides
-    shape, strides = (size, size, own.shape[2]), (by_depth, by_column - by_depth, by_lane)
-    return np.lib.stride_tricks.as_strided(own[:, first:], shape, strides)
+    shape, strides = (own.shape[1], *own.shape[1:]), (by_depth, by_column - by_depth, by_lane)
+    return np.lib.stride_tricks.as_strided(own, shape, strides)
 
 
 @in_lanes
@@ -129,14 +131,11 @@ def backward(factorization: Factorization, y: Array) -> Array:
 
 def _backward_wide(factorization: Factorization, y: Array) -> Array:
     """The same, each unknown taken out of all equations before it at once: Lᵀ by columns."""
-    lower = factorization.lower
-    by_depth, by_column, by_lane = lower.strides
-    for row in range(1, len(y)):
-        at = len(y) - row
-        n = min(at, len(lower))  # L[at, at − 1], L[at, at − 2], …
-        shape, strides = (n, y.shape[-1]), (by_depth - by_column, by_lane)
-        factors = np.lib.stride_tricks.as_strided(lower[:, at - 1 :], shape, strides)[::-1]
+    below = _square(factorization.lower)  # L from its second row on
+    for row in range(len(y) - 1, 0, -1):
+        before = slice(max(0, row - len(factorization.lower)), row)
+        factors = below[row - 1, before]
         if y.ndim == 3:
             factors = factors[:, None]
-        y[at - n : at] -= factors * y[at]
+        y[before] -= factors * y[row]
     return y

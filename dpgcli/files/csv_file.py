@@ -22,6 +22,7 @@ from dpgcli.files.content import content_of, decoded
 from dpgcli.files.frames import frame_of
 from dpgcli.files.headers import headed, may_be_titles
 from dpgcli.files.layout import (
+    COMMENT,
     GROUPED,
     NUMBER,
     Marks,
@@ -97,7 +98,7 @@ class Sheet:
 
     `names` are ours for columns that were chosen. By name, `units` are those that the file says
     itself, `titles` what it calls a column that was chosen; `reversed` are those whose sign is.
-    `comments` are lines with a # above the header, and their numbers.
+    `remarks` are lines above the header, comments below it as well, and their numbers.
     """
 
     file: str
@@ -109,7 +110,7 @@ class Sheet:
     units: Mapping[str, str] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     reversed: frozenset[str] = frozenset()
-    comments: tuple[tuple[int, str], ...] = ()
+    remarks: tuple[tuple[int, str], ...] = ()
 
     def cells(self, name: str) -> list[str]:
         """The texts of one column."""
@@ -300,7 +301,7 @@ def read_sheet(
         head.units,
         head.titles,
         head.reversed,
-        tuple(_comments(lines[:line])) if is_file else (),
+        tuple(_remarks(lines, line)) if is_file else (),
     )
     problems += [*_unfound(sheet, choice), *_form_problems(sheet, line)]
     problems += _renamed(sheet, wanted, line)
@@ -335,10 +336,10 @@ def _asked(sheet: Sheet, row: int) -> Problem:
     return sheet.problem(row, "row", "numbers, not what may be titles", shown(cells), hint)
 
 
-def _comments(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
+def _remarks(lines: Sequence[str], header: int) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(map(str.strip, lines), start=1):
-        if line.startswith("#"):
-            yield number, line.lstrip("#").strip()
+        if number < header or (number > header and COMMENT.match(line)):
+            yield number, line
 
 
 def _unfound(sheet: Sheet, choice: Choice) -> Iterator[Problem]:

@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dpgcli.files.layout import SheetRow, header_in, is_number, is_of_units
+from dpgcli.files.layout import SheetRow, has_numbers, header_in, is_number, is_of_units
+from dpgcli.files.unit_words import are_units, together, unit_in
 from dpgcli.files.units import bare, name_and_unit
 
 
@@ -13,8 +14,9 @@ class Head:
     """Names of columns in the order of the cells, and the rows below.
 
     `line` is that of the header. By name, `titles` are those of columns that were chosen, `units`
-    what the file has behind a title or in a row of units; `reversed` are names whose numbers are.
-    `untitled` are places of columns without a title, behind the first that has one.
+    what the file has behind a title, in a row of units, or anywhere in the title of one of those;
+    `reversed` are names whose numbers are. `untitled` are places of columns without a title, behind
+    the first that has one.
     """
 
     names: tuple[str, ...]
@@ -45,21 +47,22 @@ def headed(
     titles = list(rows[place].cells)
     if _are_numbers(titles, below, sources):
         below, titles = list(rows[place:]), [str(n) for n in range(1, len(titles) + 1)]
-    if below and is_of_units(below[0]):
-        units = below.pop(0).cells
-    else:
-        units = rows[place - 1].cells if place and is_of_units(rows[place - 1]) else []
+    units = [row.cells for row in _units_above(rows[:place])]
+    if below and _is_of_units_below(below[0], below[1:]):
+        units.append(below.pop(0).cells)
     found = dict(_found(titles, columns))
+    chosen = {column for column, _ in found.values()}
     names = _named(titles, found, wanted)
     needed = {*found} | {n for n in names if n in wanted}
     n_names = _width(names, below, needed if may_be_longer else names)
     first = next((place for place, title in enumerate(titles) if title), 0)
-    said = {name: unit for name, unit in zip(names, _units(titles, units), strict=True) if unit}
+    own = [unit_in(t) if n in chosen else name_and_unit(t)[1] for n, t in enumerate(titles)]
+    said = dict(zip(names, _together(own, units), strict=True))
     return Head(
         tuple(names[:n_names]),
         _cut(below, n_names, len(titles)),
         line,
-        said,
+        {name: unit for name, unit in said.items() if unit},
         {name: titles[column] for name, (column, _) in found.items()},
         frozenset(name for name, (_, is_reversed) in found.items() if is_reversed),
         tuple(place for place in range(first, n_names) if not titles[place]),
@@ -142,15 +145,24 @@ def _named(
     return names
 
 
-def _units(titles: Sequence[str], row: Sequence[str]) -> list[str]:
-    """The unit of each column, by the row of units or by its title; both where they differ.
+def _units_above(rows: Sequence[SheetRow]) -> Iterator[SheetRow]:
+    """Rows above the header that name units; those with text between have nothing else."""
+    if rows and is_of_units(rows[-1]):
+        yield rows[-1]
+    yield from (row for row in rows[:-1] if are_units(row.cells))
 
-    What is said twice, and not alike, is no unit that is known: it will be asked about.
-    """
-    below = [bare(cell) for cell in row[: len(titles)]]
-    below += [""] * (len(titles) - len(below))
-    both = ((name_and_unit(title)[1], unit) for title, unit in zip(titles, below, strict=True))
-    return [" and ".join(dict.fromkeys(filter(None, pair))) for pair in both]
+
+def _is_of_units_below(row: SheetRow, rows: Sequence[SheetRow]) -> bool:
+    """Whether the first row below the header names units: a 1 beside them may be a number."""
+    if has_numbers(row):
+        return is_of_units(row) and _has_words_above_numbers(row.cells, rows)
+    return is_of_units(row)
+
+
+def _together(own: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The unit of each column, by its title and by the rows of units; all where they differ."""
+    for column, unit in enumerate(own):
+        yield together([unit, *(bare(row[column]) for row in rows if len(row) > column)])
 
 
 def _width(names: Sequence[str], rows: Sequence[SheetRow], needed: Container[str]) -> int:

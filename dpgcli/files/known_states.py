@@ -13,7 +13,6 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
 from dpgcli.files.layout import NUMBER
 from dpgcli.files.places import Location, in_order, located, shown
-from dpgcli.files.units import stem_and_unit
 from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
@@ -25,7 +24,11 @@ PATTERN_OF = {"ground": "0", "inverted": "1"}
 OF_ONE_UNIT = {UNIT: "pattern", "opening_mm": "opening1_mm", "push_N": "push1_N"}
 CLAMPED = "chamber1_angle_rad"  # the first chamber, whose turn counts as none
 STATION, OFFSET = "first_station_mm", "tip_offset_mm"
-FRAME_STEMS = tuple(stem_and_unit(key)[0] for key in (STATION, OFFSET))
+OF_FRAME = re.compile(rf"#+ *({STATION}|{OFFSET}) *:(.*)")
+MAY_BE_OF_FRAME = re.compile(
+    r"[\W_]*(?:first[\W_]*station|tip[\W_]*offset).*[0-9:=]", re.IGNORECASE
+)
+ENDS = '",; \t'  # what a spreadsheet writes around a comment
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
@@ -97,20 +100,23 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
     """Points of the frame by key, from comments, and what is wrong with them."""
     frame: dict[str, tuple[float, float]] = {}
     problems = []
-    for line, text in sheet.comments:
-        key, mark, said = (part.strip() for part in text.partition(":"))
-        if not mark or stem_and_unit(key)[0] not in FRAME_STEMS:
+    for line, text in sheet.remarks:
+        if not MAY_BE_OF_FRAME.match(text):
             continue
-        if key not in (STATION, OFFSET):
-            place = Location(sheet.file, line)
-            problems.append(located(place, key, f"{STATION} or {OFFSET}, in mm", shown(key)))
+        place = Location(sheet.file, line)
+        said = OF_FRAME.fullmatch(text.strip(ENDS))
+        if said is None:
+            expected = f"{STATION} or {OFFSET}, in mm, as in # {STATION}: 5.375, 0.75"
+            problems.append(located(place, "comment", expected, shown(text)))
             continue
-        numbers = said.removeprefix("[").removesuffix("]").split(",")
-        if len(numbers) == len(TIP) and all(NUMBER.fullmatch(n.strip()) for n in numbers):
-            frame[key] = (float(numbers[0]), float(numbers[1]))
-        else:
-            place = Location(sheet.file, line)
-            problems.append(located(place, key, "two numbers in mm, such as 5.375, -0.75", said))
+        key, numbers = said[1], said[2].strip().removeprefix("[").removesuffix("]").split(",")
+        if len(numbers) != len(TIP) or not all(NUMBER.fullmatch(n.strip()) for n in numbers):
+            expected = "two numbers in mm, such as 5.375, -0.75"
+            problems.append(located(place, key, expected, said[2].strip()))
+            continue
+        point = (float(numbers[0]), float(numbers[1]))
+        if frame.setdefault(key, point) != point:
+            problems.append(located(place, key, "each point once", "another one"))
     return frame, problems
 
 

@@ -12,12 +12,13 @@ from itertools import groupby, pairwise
 
 from dpgcli.errors import Problem
 from dpgcli.files.places import MOST_ALIKE, Location, located
+from dpgcli.files.unit_words import are_units
 from dpgcli.files.units import is_unit, name_and_unit
 
 COMMENT = re.compile(r"#+\s|#$")
 SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more
 BLANKS = re.compile("  +")  # no tabs, and none that group thousands
-IN_BRACKETS = r"[\[(<][^\[\]()<>]{0,30}[\])>]"
+IN_BRACKETS = r"[\[(<{][^\[\]()<>{}]{0,30}[\])>}]"
 WORD = re.compile(f"{IN_BRACKETS}|[^ ]+(?: {IN_BRACKETS})?")  # a title has its unit behind it
 PARTED = "\x1f"  # between cells that blanks part: a tab may stand within one
 QUOTED = re.compile('"[^"]*"')
@@ -203,8 +204,9 @@ def has_numbers(row: SheetRow) -> bool:
 
 
 def is_of_units(row: SheetRow) -> bool:
-    """Whether a row names units, one of them at least, and has no number."""
-    return not has_numbers(row) and any(is_unit(cell) for cell in row.cells if cell)
+    """Whether a row names units: it has no number beside them, but for the 1 of no unit."""
+    is_any = not has_numbers(row) and any(is_unit(cell) for cell in row.cells if cell)
+    return is_any or are_units(row.cells)
 
 
 def marks_in(cells: Sequence[str], separator: str) -> Marks:

@@ -34,10 +34,11 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     "moment": {"Nmm": 1, "Nm": 1e3, "mNm": 1, "kNmm": 1e3, "Ncm": 10},
     "rotation": {"rad": 1, "mrad": 1e-3, "deg": math.pi / 180, "\u00b0": math.pi / 180},
 }
-BRACKETED = re.compile(r"\((.*)\)|\[(.*)\]|<(.*)>")
-IN_NAME = re.compile(
-    r"(?P<name>.*\S)\s*(?:\((?P<a>[^()]*)\)|\[(?P<b>[^][]*)\]|\s(?:/|in)\s*(?P<c>\S+))"
-)
+PAIRS = ("()", "[]", "<>", "{}", "\uff08\uff09", "\u3010\u3011")  # the last in East Asia
+OPEN, CLOSE = (tuple(re.escape(pair[side]) for pair in PAIRS) for side in (0, 1))
+BRACKETED = re.compile("|".join(f"{a}(.*){b}" for a, b in zip(OPEN, CLOSE, strict=True)))
+IN_BRACKETS = "|".join(f"{a}([^{a}{b}]*){b}" for a, b in zip(OPEN, CLOSE, strict=True))
+IN_NAME = re.compile(rf"(?P<name>.*\S)\s*(?:{IN_BRACKETS}|\s(?:/|in)\s*(?P<bare>\S+))")
 KNOWN = frozenset(unit for units in FACTORS.values() for unit in units)
 WORDS = "|".join([*sorted(filter(str.isidentifier, KNOWN)), "[cm]?m2"])
 IN_KEY = re.compile(rf"(.+?)_((?:{WORDS})(?:_(?:per_)?(?:{WORDS}))*)")
@@ -51,7 +52,7 @@ def factor_of(quantity: str, unit: str) -> float | None:
     >>> factor_of("force", "kN"), factor_of("moment", "N*m"), factor_of("force", "mm")
     (1000.0, 1000.0, None)
     """
-    factor = FACTORS[quantity].get(_plain(unit))
+    factor = FACTORS[quantity].get(plain_unit(unit))
     return None if factor is None else float(factor)
 
 
@@ -61,7 +62,7 @@ def is_unit(text: str) -> bool:
     >>> is_unit("kN"), is_unit("N mm/rad"), is_unit("[V]"), is_unit("Load")
     (True, True, True, False)
     """
-    plain = _plain(text)
+    plain = plain_unit(text)
     is_known = plain in KNOWN or KNOWN.issuperset(plain.split("/"))
     return is_known or BRACKETED.fullmatch(text) is not None
 
@@ -85,8 +86,9 @@ def name_and_unit(title: str) -> tuple[str, str]:
     match = IN_NAME.fullmatch(title)
     if match is None:
         return title, ""
-    unit = next(match[group] for group in "abc" if match[group] is not None).strip()
-    if match["c"] is not None and not is_unit(unit):  # no unit, but words
+    _, *units = match.groups()
+    unit = next(unit for unit in units if unit is not None).strip()
+    if match["bare"] is not None and not is_unit(unit):  # no unit, but words
         return title, ""
     return match["name"], unit
 
@@ -113,8 +115,10 @@ def is_same(unit: str, own: str) -> bool:
     """
     if not own:
         return unit in NO_UNIT
-    factors = ((units.get(_plain(unit)), units.get(_plain(own))) for units in FACTORS.values())
-    return _plain(unit) == _plain(own) or any(a is not None and a == b for a, b in factors)
+    factors = (
+        (units.get(plain_unit(unit)), units.get(plain_unit(own))) for units in FACTORS.values()
+    )
+    return plain_unit(unit) == plain_unit(own) or any(a is not None and a == b for a, b in factors)
 
 
 def are_alike(unit: str, other: str) -> bool:
@@ -124,7 +128,7 @@ def are_alike(unit: str, other: str) -> bool:
     (True, True, False)
     """
     ours, theirs = (
-        {quantity for quantity, units in FACTORS.items() if _plain(text) in units}
+        {quantity for quantity, units in FACTORS.items() if plain_unit(text) in units}
         for text in (unit, other)
     )
     return bool(ours & theirs) or not ours | theirs
@@ -155,10 +159,10 @@ def listed(quantity: str) -> str:
     return f"a unit of {quantity}: {', '.join(most)} or {last}"
 
 
-def _plain(unit: str) -> str:
+def plain_unit(unit: str) -> str:
     """A unit without brackets and what stands between its parts.
 
-    >>> _plain("[N·mm]"), _plain("N/mm^2"), _plain("mm³")
+    >>> plain_unit("[N·mm]"), plain_unit("N/mm^2"), plain_unit("mm³")
     ('Nmm', 'N/mm2', 'mm3')
     """
     text = bare(unit.strip()).translate(str.maketrans("\u00b2\u00b3", "23", "^*\u00b7 ."))

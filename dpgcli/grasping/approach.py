@@ -137,6 +137,11 @@ def _gone_on(
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
         beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
         there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
+        lost = np.flatnonzero(~there.is_there)
+        if len(lost):  # pushes of contacts that the fall has left lead nowhere
+            own_, anew = few.take_lanes(lost), there.take_lanes(lost)
+            args = anew.coordinates, anew.inverted, 0.0 * anew.push, beyond[lost]
+            there.put(lost, own_.relaxed(*args))
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
     return moved, flipped, at_fold

@@ -44,7 +44,7 @@ STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has
 TOLERANCE = 1e-12  # of the forces in play
 CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
 MOST_UPDATES, MOST_STEPS = 30, 120  # of multipliers; of a descent
-STUCK, MOST_STUCK = 1e-8, 4  # of the forces in play; descents in a row that end in a corner
+STUCK, MOST_STUCK = 1e-8, 4  # of the forces in play; descents that end in a corner
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 
 Constrained = Extended[Coordinates]
@@ -385,7 +385,7 @@ class Obstructed:
             near = own.finished(there.coordinates, inverted[:, lanes], pushed, load[lanes])
             away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
             is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
-            n_stuck = np.where(there.relative_residual > STUCK, n_stuck + 1, 0)
+            n_stuck = n_stuck + (there.relative_residual > STUCK)
             goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
             found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
             lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.bodies import Body, Disc
@@ -61,15 +62,25 @@ def begins_in_base(scene: Scene, body: Body) -> Flags:
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
-    half, height = 0.5 * np.asarray(scene.layer_thickness), scene.finger.segment_height.max(axis=0)
+    low, high = -0.5 * np.asarray(scene.layer_thickness), scene.finger.segment_height.max(axis=0)
     found = np.zeros(1, bool)
-    if not isinstance(body, Disc):
-        return found
     for frame in frames(scene.gripper):
-        x, y = frame.inside(body.center)
-        beside = np.maximum(np.maximum(-half - y, y - height), 0.0)
-        found = found | ((np.hypot(x, beside) < body.radius) & (x < body.radius))
-    return found
+        if isinstance(body, Disc):
+            x, y = frame.inside(body.center)
+            beside = np.maximum(np.maximum(low - y, y - high), 0.0)
+            found = found | ((np.hypot(x, beside) < body.radius) & (x < body.radius))
+        else:
+            found = found | _is_in(frame.inside(body.corners), low, high)
+    return np.asarray(found)
+
+
+def _is_in(corners: Array, low: Array, high: Array) -> Flags:
+    """Whether polygons, (2, corner[, design]), meet struts from one y to another at x = 0."""
+    low, high = np.broadcast_arrays(np.reshape(low, -1), np.reshape(high, -1))
+    ends = np.stack((np.stack((0.0 * low, low)), np.stack((0.0 * high, high))))
+    struts = shapely.linestrings(np.moveaxis(ends, -1, 0))
+    areas = shapely.polygons(np.moveaxis(corners.reshape(2, corners.shape[1], -1), (0, 1), (2, 1)))
+    return np.asarray(shapely.relate_pattern(struts, areas, "T********"))
 
 
 def frames(gripper: Gripper | None) -> tuple[FingerFrame, ...]:

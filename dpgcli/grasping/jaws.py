@@ -71,8 +71,10 @@ def jaw_path(
     """Fingers in these states at jaws that go from the first aperture to the last, and back."""
     begun = placed(scene, formulate, replace(jaws, gap=gaps[0]), frame, codes)
     shapes = begun.grown.shapes
-    (finger,) = described(begun.own, [codes], begun.grown, begun.status)
-    is_stable = np.asarray(finger.status == Status.STABLE)
+    (finger,) = described(begun.own, [codes], begun.grown, begun.status, with_margins=False)
+    is_other = (finger.status == Status.STABLE) & (finger.after != codes)
+    status = np.where(is_other, np.uint8(Status.ANOTHER_PATTERN), finger.status)
+    is_stable = np.asarray(status == Status.STABLE)
     shapes = replace(shapes, is_there=shapes.is_there & is_stable)
     share, halts = np.arange(n_steps + 1) / n_steps, list[Halt]()
     told: list[tuple[float, Array, Array, Codes]] = []
@@ -89,7 +91,7 @@ def jaw_path(
             told.append((begin + load * (end - begin), *_told(own, shapes, load, end - begin)))
         shapes = own.at_rest(shapes)
     gap, squeeze, stiffness, code = (np.array(values) for values in zip(*told, strict=True))
-    return JawPath(codes, gap, squeeze, stiffness, code, finger.status, tuple(halts))
+    return JawPath(codes, gap, squeeze, stiffness, code, status, tuple(halts))
 
 
 def _with_jaws(
@@ -125,11 +127,11 @@ def _told(
     own: Obstructed, shapes: ContactShapes, load: float, travel: float
 ) -> tuple[Array, Array, Codes]:
     """Squeeze, its slope by the aperture, and the states, (lane,)."""
-    n = len(shapes.is_there)
-    family = own.family(shapes.inverted, shapes.active)
+    here, n = own.relabeled(shapes), len(shapes.is_there)
+    family = own.family(here.inverted, here.active)
     nothing, free = np.full(n, -1), np.zeros(n)
     depth = max(family.column_depths)
-    there = corrected(family, own.stacked(shapes), np.full(n, load), nothing, free, depth)
+    there = corrected(family, own.stacked(here), np.full(n, load), nothing, free, depth)
     slope = there.along_load[-1] * own.stiffness[0] / travel
     squeeze = np.where(shapes.is_there, shapes.push[-1], np.nan)
     stiffness = np.where(shapes.is_there, slope, np.nan)

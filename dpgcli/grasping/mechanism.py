@@ -27,12 +27,14 @@ class Branch:
 
     @classmethod
     def of(cls, path: JawPath, lane: int) -> "Branch":
-        """The beginning of a lane's path, as jaws open."""
+        """The beginning of a lane's path, by rising apertures."""
         halts = [halt.step for halt in path.halts if halt.lane == lane]
         turn = len(path.gap) // 2 + 1
         known = ~np.isnan(path.squeeze[:turn, lane])
         stop = min([*halts, turn, *np.flatnonzero(~known)])
-        rows = slice(0, stop)
+        rows = np.arange(stop)
+        if path.gap[0] > path.gap[turn - 1]:
+            rows = rows[::-1]  # they close first
         return cls(path.gap[rows], path.squeeze[rows, lane], path.stiffness[rows, lane])
 
     @property

@@ -78,7 +78,7 @@ def grasps(
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
     """
     seen_from = frames(scene.gripper)
-    is_alike = body.is_mirrored and len(seen_from) > 1
+    is_alike = bool(body.is_mirrored) and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
     parts: list[Placed] = []

@@ -94,6 +94,8 @@ class FaceGaps:
         pushes = np.zeros((2, len(shape.nodes[0]), 0, coordinates.shape[1]))
         if len(self.obstacle.plates):
             plates = plate_gaps(shape, self.obstacle)
+            is_beyond = (plates.depth > 0.0) & (own < -plates.depth)
+            own = np.where(is_beyond, FAR, own)  # the tip comes out on a shorter way
             place = np.concatenate((place, self._at_plates(plates, place)))
             own = np.concatenate((own, plates.distance.reshape(-1, coordinates.shape[1])))
             pushes = _pushed(plates)

@@ -35,20 +35,21 @@ class Obstacle:
 
     @classmethod
     def polygon(cls, corners: Array) -> Self:
-        """A polygon by its corners (2, corner), one way round or the other.
+        """A polygon by its corners (2, corner), or (2, corner, batch), one way round or the other.
 
-        Corners in the middle of a straight side are left out.
+        Corners in the middle of a straight side are left out; those of a batch are of one kind.
         """
+        corners = corners.reshape(*corners.shape[:2], -1)
         onwards = np.roll(corners, -1, axis=1) - corners
         before = np.roll(onwards, 1, axis=1)
         turn = before[0] * onwards[1] - before[1] * onwards[0]
-        is_turn = np.abs(turn) > STRAIGHT * np.hypot(*before) * np.hypot(*onwards)
+        is_turn = (np.abs(turn) > STRAIGHT * np.hypot(*before) * np.hypot(*onwards)).any(axis=1)
         x, y = around = corners[:, is_turn]
-        if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0.0:
+        if (x * np.roll(y, -1, axis=0) - np.roll(x, -1, axis=0) * y)[:, 0].sum() < 0.0:
             around = around[:, ::-1]
         number = np.arange(around.shape[1])
         plates = np.stack((number, np.roll(number, -1)), axis=1)
-        return cls(around[..., None], np.zeros((len(number), 1)), plates)
+        return cls(around, np.zeros((len(number), 1)), plates)
 
     @cached_property
     def is_reentrant(self) -> Flags:

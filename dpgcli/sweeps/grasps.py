@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Indices
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
@@ -52,7 +52,7 @@ class Encounter(NamedTuple):
     units: UnitSolutions
     layer: Array
     gripper: Gripper | None
-    body: Disc
+    body: Body
     held: Held
 
 
@@ -68,7 +68,9 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
         parts += [_met(own, frame, codes) for frame in seen_from[1:]]
         every, motion = np.arange(len(codes)), motion_of(own.held, seen_from)
         found, by = let_go(parts, [every] * len(parts), motion, with_margins=False)
-        fingers, moved = [_Finger.of(finger) for finger in found], WAYS[own.held] @ by
+        fingers = [_Finger.of(finger) for finger in found]
+        is_held = fingers[0].status == Status.STABLE
+        moved = np.where(is_held, WAYS[own.held] @ by + 0.0, np.nan)
     return _rows(own, seen_from, fingers, moved)
 
 
@@ -116,7 +118,7 @@ def _told(part: Placed) -> _Finger:
 
 def _lower(own: Encounter, frame: FingerFrame, codes: Codes, upper: _Finger) -> _Finger:
     """The lower finger: the upper one's mirror image where the body is on the axis."""
-    off = np.flatnonzero(own.body.center[1] != 0.0)
+    off = np.flatnonzero(~own.body.is_mirrored)
     if not len(off):
         return upper
     angle, offset = (np.broadcast_to(part, len(codes))[off] for part in frame[:2])
@@ -150,8 +152,8 @@ def _rows(
         "finger_force_y_N": known(forces[0][1]),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
         "max_contact_N": known(np.max([finger.largest for finger in fingers], axis=0)),
-        "object_x_mm": known(place[0]),
-        "object_y_mm": known(place[1]),
+        "object_x_mm": place[0],
+        "object_y_mm": place[1],
         "penetration_mm": known(np.max([np.maximum(0.0, -f.gap) for f in fingers], axis=0)),
     }
     return {column.name: rows[column.name] for column in grasp_columns(is_pair=len(fingers) > 1)}

@@ -51,13 +51,12 @@ class Metrics:
     n_designs: int
     pressure: Pressure | None = None
     n_stable: Indices = field(init=False)
-    n_grasps: Indices = field(init=False)
+    n_grasps: Indices | None = field(init=False, default=None)  # None without bodies
     extremes: dict[str, Array] = field(init=False, default_factory=dict)
     n_told: dict[str, Indices] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.n_stable = np.zeros(self.n_designs, np.int64)
-        self.n_grasps = np.zeros(self.n_designs, np.int64)
         self.length = np.broadcast_to(self.units.finger.straight_length, self.n_designs)
         self.hulls: list[tuple[Indices, Any]] = []
         self.tips = DistinctTips()
@@ -73,14 +72,19 @@ class Metrics:
                 is_told = stable & self._is_known(metric, block[metric.over])
                 self._extend(metric, block[metric.over], is_told)
         if "n_contacts" in block:
-            self.n_grasps += (stable & (block["n_contacts"] > 0)).sum(axis=1)
+            n_before = 0 if self.n_grasps is None else self.n_grasps
+            self.n_grasps = n_before + (stable & (block["n_contacts"] > 0)).sum(axis=1)
         self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
     def columns(self) -> Columns:
         """One row per design; NaN where it has no stable state."""
         known = (m for m in METRICS if not m.over or m.name in self.extremes)
-        has_pressure = self.pressure is not None
-        return {m.name: m.of(self) for m in known if has_pressure or not m.needs_pressure}
+        has_pressure, has_bodies = self.pressure is not None, self.n_grasps is not None
+        return {
+            m.name: m.of(self)
+            for m in known
+            if (has_pressure or not m.needs_pressure) and (has_bodies or m.group is not Group.GRASP)
+        }
 
     @cached_property
     def pressed(self) -> "PressedDesigns":
@@ -302,7 +306,7 @@ METRICS = (
     _count(
         "n_grasps",
         "states that touch the body, at rest",
-        lambda m: m.n_grasps,
+        lambda m: m.alike(0) if m.n_grasps is None else m.n_grasps,
         (Output.SHAPES, Output.FORCES),
         Group.GRASP,
     ),

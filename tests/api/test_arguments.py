@@ -1,6 +1,7 @@
 """Arguments of a wrong type are the user's mistake: they are named, with what was expected."""
 
 import inspect
+import math
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
@@ -14,7 +15,7 @@ import pytest
 
 import dpgcli as dpg
 from dpgcli.api.given import sweep_input
-from dpgcli.api.inputs import scene_input
+from dpgcli.api.inputs import point, scene_input
 from dpgcli.api.recalibration import recalibrated_scene
 from dpgcli.files.scene_file import scene_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -35,6 +36,10 @@ DESIGNS = {"design": [0], "calibration": ["given"], "status": ["stable"], "reaso
 
 
 GRID = {"dome_height_mm": [1.0, 2.0, 4.0], "stroke_mm": [0.5, 2.0, 8.0]}
+GRIPPER = {
+    "finger": BASE["finger"] | {"geometry": {"limiting_layer_thickness_mm": 1.5}},
+    "gripper": {"base_spacing_mm": 30.0, "mounting_angle_deg": 0.0},
+}
 TIPS = {"pattern": ["00"], "tip_x_mm": [27.0], "tip_y_mm": [1.0]}
 
 
@@ -113,6 +118,12 @@ def fit(**given: Any) -> Any:
         (lambda: fit(fix=3.5), "fix 3.5: expected values by key"),
         (lambda: fit(fix="stroke_mm=3.5"), "fix 'stroke_mm=3.5': expected values by key"),
         (lambda: fit(fix={"stroke_mm": 10**400}), "fix stroke_mm=1000*: expected a number from"),
+        (lambda: fit(fix={"force_linearity": True}), "fix force_linearity=True: expected a number"),
+        (lambda: dpg.fit_finger(BASE, TIPS, error="tips=1_0"), "error 'tips=1_0': expected a num"),
+        (lambda: dpg.actuate(BASE, pressure=memoryview(b"ab")), "pressure <memory .* expected two"),
+        (lambda: dpg.actuate(BASE, pressure=b"ab"), "pressure b'ab': expected two numbers"),
+        (lambda: dpg.actuate(BASE, pressure=bytearray(b"ab")), "pressure bytearray.*expected two"),
+        (lambda: dpg.predict(FINGER, patterns=b"11"), "patterns b'11': expected a text"),
         (lambda: fit(fix={1: 2}), "fix 1: no value of the law"),
         (lambda: fit(bootstrap=None), "bootstrap None: expected a whole number from 0 on"),
         (
@@ -145,6 +156,37 @@ def fit(**given: Any) -> Any:
 def test_what_it_cannot_be_is_named(call: Callable[[], Any], said: str) -> None:
     with pytest.raises(dpg.UsageError, match=f"^{said}"):
         call()
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        *("40", "40,0", b"40", bytearray(b"40"), memoryview(b"40"), iter("40")),
+        *(("1_0", "0"), ("40", "0"), {40, 0}, {40: 1, 0: 1}, (True, False), (1j, 0)),
+        *((40,), (40, 0, 0), (40, np.nan), (np.nan, 40), (10**400, 0)),
+        *(pd.DataFrame([[40, 0]]), np.array([[40, 0]]), np.array(["4", "0"])),
+    ],
+)
+@pytest.mark.parametrize("field", ["at", "first_station", "tip_offset"])
+def test_a_place_is_two_numbers(field: str, place: Any) -> None:
+    with pytest.raises(dpg.UsageError, match=f"(?s)^{field} .*: expected two numbers in mm"):
+        if field == "at":
+            dpg.grasp(GRIPPER, object="disc:20", at=place)
+        else:
+            dpg.compare(BASE, TIPS, **{field: place})
+
+
+@pytest.mark.parametrize(
+    "place", [(30, 0), [30.0, 0.0], np.array([30, 0]), pd.Series([30.0, 0.0]), range(30, -1, -30)]
+)
+def test_a_place_may_be_any_two_numbers_in_an_order(place: Any) -> None:
+    assert point("at", place) == (30.0, 0.0)
+
+
+@pytest.mark.parametrize("text", ["disc:4_0", "disc:４０", "disc:nan", "disc:"])
+def test_a_diameter_is_a_number(text: str) -> None:
+    with pytest.raises(dpg.UsageError, match=f"^object {text}: expected disc and its diameter"):
+        dpg.grasp(GRIPPER, object=text, at=(40, 0))
 
 
 ITSELF: list[Any] = []
@@ -287,22 +329,45 @@ def test_a_data_frame_is_an_axis() -> None:
     assert frame.designs["n_states"].tolist() == [2, 4]
 
 
+WRONG = [None, "3", b"1", np.nan, -1.0, [3.0], np.array([3.0, 4.0]), 1j, pd.NA, 10**400, -math.inf]
+
+
+@pytest.mark.parametrize("value", WRONG, ids=lambda value: str(value)[:20])
+@pytest.mark.parametrize("name", ["n_units", *STUDY, "linear_stiffness"])
+def test_no_finger_has_such_a_value(name: str, value: Any) -> None:
+    with pytest.raises(dpg.UsageError, match=f"^{name} .*: expected a (whole )?number"):
+        dpg.uniform_finger(**{"n_units": 2, **STUDY, name: value})
+
+
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("name", "value"),
+    [("n_units", value) for value in (0, 65, 2.5, 3.0, True, 10**6, Decimal(3))]
+    + [(name, math.inf) for name in STUDY]
+    + [(name, value) for name in (*STUDY, "linear_stiffness") for value in (1e300, True)]
+    + [(name, 0.0) for name in STUDY if name not in ("force_linearity", "hinge_stiffness")]
+    + [("linear_stiffness", 0.0), ("linear_stiffness", 2e18), ("force_linearity", 1.1)],
+)
+def test_no_finger_is_beyond_what_a_spec_can_have(name: str, value: Any) -> None:
+    with pytest.raises(dpg.UsageError, match=f"^{name} .*: expected a (whole )?number"):
+        dpg.uniform_finger(**{"n_units": 2, **STUDY, name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
     [
-        ({"stroke": -3.5}, "stroke -3.5: expected"),
-        ({"segment_length": np.nan}, "segment_length nan: expected"),
-        ({"hinge_stiffness": -1.0}, "hinge_stiffness -1.0: expected"),
-        ({"n_units": 0}, "n_units 0: expected"),
+        *(("n_units", np.int64(64)), ("stroke", np.float32(2)), ("linear_stiffness", math.inf)),
+        *(("hinge_stiffness", 0), ("force_linearity", 1), ("linear_stiffness", 1e18)),
     ],
 )
-def test_no_finger_has_such_values(values: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        uniform_finger(**{"n_units": 2, **STUDY, **values})
+def test_numbers_of_any_kind_are_values_of_a_finger(name: str, value: Any) -> None:
+    finger = dpg.uniform_finger(**{"n_units": 2, **STUDY, name: value})
+    found = finger.n_units if name == "n_units" else getattr(finger, name).item()
+    assert found == value
 
 
-def test_hinges_may_have_no_stiffness() -> None:
-    assert uniform_finger(2, **{**STUDY, "hinge_stiffness": 0.0}).n_units == 2
+def test_a_finger_that_is_handed_in_has_no_more_units_than_a_spec() -> None:
+    with pytest.raises(dpg.UsageError, match=r"^spec of 65 units: expected at most 64"):
+        dpg.predict(uniform_finger(65, **STUDY), patterns="1*")
 
 
 def test_a_calibration_is_a_name_a_path_or_a_value() -> None:

@@ -89,6 +89,8 @@ def test_states_that_do_not_exist_are_said(call: Any, arguments: tuple[str, ...]
     [
         (("--tip-offset", "5"), "--tip-offset 5: expected two numbers in mm"),
         (("--first-station", "a,b"), "--first-station a,b: expected two numbers in mm"),
+        (("--first-station", "1_0,0"), "--first-station 1_0,0: expected two numbers in mm"),
+        (("--tip-offset", "１,0"), "--tip-offset １,0: expected two numbers in mm"),
         (("--first-station", "nan,0"), "--first-station nan,0: expected two numbers in mm"),
         (("--plot", "c.pdf"), "expected a name that ends in .svg or .png"),
         (("--plot", "none/c.svg"), "cannot write none/c.svg"),

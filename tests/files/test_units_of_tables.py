@@ -167,6 +167,68 @@ def test_another_unit_is_refused_wherever_the_file_says_it(
 
 
 @pytest.mark.parametrize(("reader", "name", "end"), COLUMNS)
+def test_a_row_of_units_counts_wherever_it_stands(
+    tmp_path: Path, reader: str, name: str, end: str
+) -> None:
+    """With the 1 of no unit beside it, above another row, against another one, and in words."""
+    read, table = READERS[reader]
+    unit, _ = OTHER[end]
+    if reader == "designs":  # the first row is the header, whatever it says
+        return
+    path = written(tmp_path / "t.csv", table)
+    head, *rows = path.read_text().splitlines(keepends=True)
+
+    def row(cell: str, other: str = "") -> str:
+        return ",".join(cell if key == name else other for key in table) + "\n"
+
+    own = end.replace("_per_", "/").replace("_", " ").strip()
+    own = {"seconds": "s", "force linearity": "-"}.get(own, own)
+    ones, text = row(unit, "1"), row("all of it", "text")
+    for lines, said in (
+        ([ones, head, *rows], unit),
+        ([ones, text, head, *rows], unit),
+        ([row(unit), text, "Lot,7\n", head, *rows], unit),
+        ([row(own), row(unit), head, *rows], unit),
+        ([row(unit), head, row(own), *rows], unit),
+        ([row("Quadratzoll", "-"), head, *rows], "Quadratzoll"),
+        ([row("centimeters", "newtons"), head, *rows], "centimeters"),
+        ([row("KN"), head, *rows], "KN"),
+    ):
+        path.write_text("".join(lines))
+        assert is_refused(read, path, said), lines
+
+
+def test_the_1_of_no_unit_below_the_header_is_no_point_of_a_curve(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("moment_N_mm,x,rotation_rad\nN mm,1,rad\n1,0,0.1\n5,0,0.4\n")
+    assert read_moments(path).moment.tolist() == [1.0, 5.0]
+    path.write_text("side,moment_N_mm,rotation_rad\nL,1,1\nL,5,1.4\nh,6,1.5\n")
+    assert read_moments(path).moment.tolist() == [1.0, 5.0, 6.0]
+
+
+@pytest.mark.parametrize("text", ["Gauge length,1,mm", "Operator,Min,Max", "Load cell,5 kN,"])
+def test_what_is_said_of_a_machine_is_no_row_of_units(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(f"{text}\nmoment_N_mm,rotation_rad,n\n1,0.1,1\n5,0.4,2\n")
+    assert read_moments(path).moment.tolist() == [1.0, 5.0]
+
+
+@pytest.mark.parametrize("reader", [key for key in READERS if key != "designs"])
+def test_the_own_units_above_a_header_change_nothing(tmp_path: Path, reader: str) -> None:
+    read, table = READERS[reader]
+    own = {
+        name: {"_s": "s", "seconds": "s", "force_linearity": "1"}.get(end, end)
+        for _, name, end in COLUMNS
+        if name in table
+    }
+    units = [own.get(name, "-").replace("_per_", "/").replace("_", " ").strip() for name in table]
+    path = written(tmp_path / "t.csv", table)
+    expected = read(path)
+    path.write_text(f"{','.join(units)}\nof a test\n{path.read_text()}")
+    assert are_same(read(path), expected)
+
+
+@pytest.mark.parametrize(("reader", "name", "end"), COLUMNS)
 def test_the_own_unit_changes_nothing(tmp_path: Path, reader: str, name: str, end: str) -> None:
     read, table = READERS[reader]
     own = end.replace("_per_", "/").replace("_", " ").strip()
@@ -194,7 +256,7 @@ def test_a_name_with_another_unit_is_no_column_that_is_left_out(
         read, written(tmp_path / "t.csv", renamed(table, name, other)), other.split(".")[-1]
     )
     if reader not in ("designs", "history"):
-        for title in (f"{name}<x>", name.replace(name[0], name[0].upper(), 1)):
+        for title in (f"{name}~x", name.replace(name[0], name[0].upper(), 1)):
             path = written(tmp_path / "t.csv", renamed(table, name, title))
             assert is_refused(read, path, f"expected {name}, in "), title
 
@@ -222,6 +284,58 @@ def test_a_frame_in_another_unit(tmp_path: Path) -> None:
             read_states(path, 2)
 
 
+OWN_FRAME = "# first_station_mm: 5.375, 0.75"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(
+            "# first_station_mm [cm]: 0.5375, 0.075",
+            "# First_station_mm: 5, 0",
+            "# tip offset: 1, 2",
+        ),
+        *("# first_station_mm = 5, 0", "# FIRST-STATION 5 0", "first_station_mm: 5, 0"),
+        *("first_station_mm;5;0", "// first_station_mm: 5, 0", '"first_station_mm","5","0"'),
+        *(
+            "# first_station_mm (mm): 5, 0",
+            "#% first_station_mm: 5, 0",
+            "# first_stations_mm: 5, 0",
+        ),
+    ],
+)
+def test_what_may_be_a_frame_is_no_remark_that_is_left_out(tmp_path: Path, line: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    path.write_text(f"{line}\n{path.read_text()}")
+    with pytest.raises(SpecError, match=r"1: comment: .*first_station_mm or tip_offset_mm, in mm"):
+        read_states(path, 2)
+
+
+@pytest.mark.parametrize("other", ["5.375, -0.75", "0.5375, 0.075 cm", "5.375; 0.75", "5.375", ""])
+def test_a_frame_is_one(tmp_path: Path, other: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    table = path.read_text()
+    again = f"# first_station_mm: {other}\n"
+    for text in (f"{OWN_FRAME}\n{again}{table}", f"{OWN_FRAME}\n{table}{again}"):
+        path.write_text(text)
+        with pytest.raises(SpecError, match=r"first_station_mm: expected (each point|two numbers)"):
+            read_states(path, 2)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"{OWN_FRAME}\n{OWN_FRAME}\n{{}}", f"{OWN_FRAME},,\n{{}}", f'"{OWN_FRAME}",,\n{{}}'),
+        *(f"{{}}{OWN_FRAME}\n", "#first_station_mm:[5.375,0.75]\n{}"),
+        f"# The first station, 2: at\n# first station\n{OWN_FRAME}\n{{}}",
+    ],
+)
+def test_a_frame_that_is_one_is_taken(tmp_path: Path, text: str) -> None:
+    path = written(tmp_path / "t.csv", STATES)
+    path.write_text(text.format(path.read_text()))
+    assert read_states(path, 2).first_station == (5.375, 0.75)
+
+
 def test_a_chosen_column_has_the_unit_that_the_file_says(tmp_path: Path) -> None:
     """Whatever stands in brackets behind another title."""
     from dpgcli.files.csv_file import Choice
@@ -233,6 +347,109 @@ def test_a_chosen_column_has_the_unit_that_the_file_says(tmp_path: Path) -> None
     assert found.curve.force is not None
     assert found.curve.force.tolist() == [0.0, 9.0]
     assert found.ignored == ("force_N (raw)",)
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        "Moment_Nm",
+        "moment_N_m",
+        "M Nm",
+        "M, Nm",
+        "M {Nm}",
+        "M <Nm>",
+        "M [Nm] x",
+        "M\nNm",
+        "M\n(Nm)",
+        "M/Nm",
+        "M-Nm",
+        "momentNm",
+        "Nm",
+        "M: N m",
+        "M N·m, raw",
+        "M （Nm）",
+        "Nm of M",
+    ],
+)
+@pytest.mark.parametrize("is_by_place", [False, True])
+def test_a_unit_anywhere_in_the_title_of_a_chosen_column_counts(
+    tmp_path: Path, title: str, *, is_by_place: bool
+) -> None:
+    from dpgcli.files.csv_file import Choice
+
+    path = tmp_path / "t.csv"
+    path.write_text(f'"{title}",phi\n0.001,0.1\n0.004,0.4\n')
+    source = "1" if is_by_place else " ".join(title.split())
+    choice = Choice(columns={"moment_N_mm": source, "rotation_rad": "phi"})
+    found = read_moments(path, choice=choice)
+    assert found.moment.tolist() == pytest.approx([1.0, 4.0], rel=1e-15)
+    assert len(found.notes) == 1
+    assert found.notes[0].endswith("times 1000 is moment_N_mm")
+
+
+@pytest.mark.parametrize(
+    ("column", "title", "factor"),
+    [
+        ("travel_mm", "disp_in", 25.4),
+        ("travel_mm", "travel_cm", 10.0),
+        ("travel_mm", "w_mm", 1.0),
+        ("force_N", "load_gf", 0.00980665),
+        ("force_N", "load_lbf", 4.4482216152605),
+        ("force_N", "loadkN", 1000.0),
+        ("travel_mm", "Disp_in (in)", 25.4),
+        ("force_N", "F_max", 1.0),
+        ("travel_mm", "Weg in [mm]", 1.0),
+        ("force_N", "Load min [N]", 1.0),
+        ("travel_mm", "s", 1.0),
+        ("force_N", "Form", 1.0),
+        ("force_N", "force_N", 1.0),
+        ("travel_mm", "Travel (inch)", 25.4),
+    ],
+)
+def test_titles_with_units_and_without(
+    tmp_path: Path, column: str, title: str, factor: float
+) -> None:
+    from dpgcli.files.csv_file import Choice
+
+    table = {title: [0.0, 9.0 / factor], "energy_mJ": [0.0, 90.0], "time_s": [0.0, 1.0]}
+    if column != "travel_mm":
+        table["travel_mm"] = [0.0, 14.0]
+    geometry = {"dome_height_mm": 2.5, "dome_thickness_mm": 0.5, "elastic_modulus_MPa": 1e3}
+    path = written(tmp_path / "t.csv", table)
+    curve = read_curve(path, geometry, Choice(columns={column: title})).curve
+    found = curve.travel if column == "travel_mm" else curve.force
+    assert found is not None
+    assert found.tolist() == [0.0, pytest.approx(9.0)]
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        "load_lb",
+        "LOAD_KN",
+        "Load newtons",
+        "load_kg",
+        "Load %",
+        "Load V",
+        "Load_kN (N)",
+        "Load s",
+        "Load N, kN",
+        "Last Grad",
+        "Load (raw)",
+        "Load kilogramme-force",
+    ],
+)
+def test_a_unit_that_is_none_of_the_quantity_is_asked_about(tmp_path: Path, title: str) -> None:
+    from dpgcli.files.csv_file import Choice
+
+    path = tmp_path / "t.csv"
+    path.write_text(f'"{title}",travel_mm\n0,0\n9,14\n')
+    columns = {"force_N": title}
+    with pytest.raises(SpecError, match="a unit of force"):
+        read_curve(path, choice=Choice(columns=columns))
+    said = read_curve(path, choice=Choice(columns=columns, units={"force": "N"}))
+    assert said.curve.force is not None
+    assert said.curve.force.tolist() == [0.0, 9.0]
 
 
 def test_two_columns_of_a_name_are_told_apart_by_what_is_behind_it(tmp_path: Path) -> None:

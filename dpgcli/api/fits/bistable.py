@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from dpgcli.api.inputs import (
     check_resampling,
     chosen,
     files_of,
+    is_number,
     table_choice,
 )
 from dpgcli.calibration import bistable
@@ -152,7 +152,7 @@ def _held(fix: Mapping[str, float] | None, free: Sequence[str] | None) -> dict[s
                 raise UsageError(Field(field), f" {key}: no value of the law ({hint})")
     for key, value in fix.items():
         low, high = limits_of(key)
-        if not (isinstance(value, Real) and low <= value <= high):
+        if not (is_number(value) and low <= value <= high):
             shown = f"{value:g}" if isinstance(value, float) else quoted(value)
             what = f" {key}={shown}: expected a number from {low:g} to {high:g}"
             raise UsageError(Field("fix"), what)

@@ -36,6 +36,7 @@ from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.reports.comparison import draw_fitted
 from dpgcli.reports.fits import finger_summary, value_rows
+from dpgcli.text import number_in
 
 
 def fit_finger(
@@ -114,10 +115,7 @@ def errors_of(error: str | Sequence[str], targets: Sequence[Target]) -> dict[Tar
     for text in as_texts("error", error):
         name, _, number = text.partition("=")
         target = chosen(Target, "error", name)
-        try:
-            errors[target] = float(number)
-        except ValueError:
-            errors[target] = 0.0
+        errors[target] = number_in(number)
         if not 0.0 < errors[target] < np.inf:
             raise UsageError(Field("error"), f" {text!r}: expected a number > 0, as in pushes=0.05")
         if target not in targets:

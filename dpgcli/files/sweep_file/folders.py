@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from dpgcli.files.layout import NUMBER
+from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.tables import NoTableError
 
 SUFFIXES = (".parquet", ".csv")
@@ -15,7 +16,7 @@ def parts_of(folder: Path) -> tuple[list[Path], list[Path]]:
     """The files of a table that is a folder, by name, and the folders where they were looked for.
 
     Those that begin with . or _ are no parts. Raises NoTableError where there is none, or what may
-    be one and lies elsewhere, or more than MOST_PARTS of them all.
+    be one, as it lies elsewhere or has another name, or more than MOST_PARTS of them all.
     """
     folders: list[Path] = [folder]
     files: list[Path] = []
@@ -28,10 +29,14 @@ def parts_of(folder: Path) -> tuple[list[Path], list[Path]]:
             (folders if path.is_dir() else files).append(path)
             if len(folders) + len(files) > MOST_PARTS:
                 raise NoTableError(f"a folder of more than {MOST_PARTS:,} files", "join them")
-    found = sorted(path for path in files if path.suffix in SUFFIXES)
+    found = sorted(path for path in files if path.suffix.lower() in SUFFIXES)
     if not found:
         raise NoTableError("a folder without any .parquet or .csv file")
-    if len({path.suffix for path in found}) > 1:
+    if others := sorted({*files} - {*found}):
+        more = f" and {len(others) - 1:,} more" if len(others) > 1 else ""
+        name = shown(others[0].relative_to(folder).as_posix())
+        raise NoTableError(f"{name}{more} beside its parts", "take out what is no part")
+    if len({path.suffix.lower() for path in found}) > 1:
         raise NoTableError("a folder with .parquet and .csv files", "keep one kind of them")
     return found, sorted(folders)
 

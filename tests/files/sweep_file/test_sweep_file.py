@@ -618,6 +618,21 @@ def test_a_folder_is_the_table_of_its_parts(read: Read, folder: Path) -> None:
     assert more.digests != sweep.digests
 
 
+def test_no_part_of_a_folder_is_lost_by_its_name(read: Read, tmp_path: Path) -> None:
+    parts = tmp_path / "d"
+    (parts / "e").mkdir(parents=True)
+    for name, height in (("p1.csv", 6.0), ("p2.CSV", 6.5), ("e/p3.Csv", 7.0)):
+        (parts / name).write_text(f"{HEIGHT}\n{height}\n")
+    assert designs(read("table: d")) == {HEIGHT: [7, 6, 6.5]}
+    for name in ("e/p4.csv.gz", "p4.tsv", "p4", "p4.parquet.tmp"):
+        (parts / name).write_text(f"{HEIGHT}\n8\n")
+        (problem,) = problems(read, "table: d")
+        assert f'found "{name}" beside its parts (take out what is no part)' in problem
+        (parts / name).unlink()
+    (parts / "p5.PARQUET").write_text("")
+    assert "keep one kind of them" in problems(read, "table: d")[0]
+
+
 def test_values_in_the_names_of_folders_are_columns(read: Read, tmp_path: Path) -> None:
     for height in (6.5, 7.0):
         part = tmp_path / "d" / f"{HEIGHT}={height}" / "finger.units=3"
