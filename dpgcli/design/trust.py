@@ -67,7 +67,7 @@ def warnings_of(case: DesignCase) -> tuple[str, ...]:
     """
     used = {value.file for each in case.values.values() for value in each}
     said = tuple(
-        f"{file.file}: {warning}"
+        f"{_name(file)}: {warning}"
         for place, file in enumerate(case.design.calibrations)
         if isinstance(file, Calibration) and (place in used or file is case.domes.calibration)
         for warning in file.warnings
@@ -75,7 +75,12 @@ def warnings_of(case: DesignCase) -> tuple[str, ...]:
     curve, calibration = case.domes.law.curve, case.domes.calibration
     if curve is None or calibration is None or curve.rest == 0.0:
         return said
-    return (*said, f"{calibration.file}: {BENDS_DOWN}")
+    return (*said, f"{_name(calibration)}: {BENDS_DOWN}")
+
+
+def _name(calibration: Calibration) -> str:
+    """The file of a calibration, or where one stands that has none."""
+    return calibration.file or "finger.calibration"
 
 
 def _shapes(case: DesignCase) -> Trust:

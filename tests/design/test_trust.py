@@ -687,6 +687,9 @@ def test_a_curve_that_bends_down_at_rest_is_warned_of(law: str | None, second: f
     few = replace(dome(), curve=DomeCurve(travel, energy, 0.35, ()))
     found = resolve(replace(PUSHED, calibrations=(few, PUBLISHED), law=law)).warnings
     warns = law is not None and second < 0.1
+    alone = replace(PUSHED, calibrations=(replace(few, file=None), PUBLISHED), law=law)
+    said = resolve(alone).warnings
+    assert [warning.split(": ")[0] for warning in said] == ["finger.calibration"] * warns
     assert [warning.split(" at travel")[0] for warning in found] == (
         ["dome.yaml: the curve's spline bends down"] if warns else []
     )
