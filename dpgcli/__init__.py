@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
     from dpgcli.api.grasp import grasp
+    from dpgcli.api.jaws import jaws
     from dpgcli.api.landscape import landscape
     from dpgcli.api.lookup import lookup
     from dpgcli.api.predict import predict
@@ -70,6 +71,7 @@ __all__ = [
     "fit_hinge",
     "fit_unit",
     "grasp",
+    "jaws",
     "landscape",
     "lookup",
     "merge",
@@ -96,6 +98,7 @@ _HOMES = {
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
     "grasp": "api.grasp",
+    "jaws": "api.jaws",
     "landscape": "api.landscape",
     "lookup": "api.lookup",
     "merge": "api.sweep",

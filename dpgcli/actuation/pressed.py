@@ -29,7 +29,7 @@ from dpgcli.mechanics.curve import Spline
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
-from dpgcli.mechanics.terms import chain_potential
+from dpgcli.mechanics.terms import chain_potential, springs_merged
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 
@@ -149,7 +149,8 @@ class Pressed:
         return limits(self.finger, self.volumes)
 
     def take_lanes(self, index: Indices) -> "Pressed":
-        """The fingers of some lanes."""
+        """The fingers of some lanes; what paths need of designs is found once, before."""
+        _ = self.units.holding_stiffness
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
         if self.limits is not None:
             taken.__dict__["limits"] = DomeLimits(
@@ -162,7 +163,7 @@ class Pressed:
         """The energy without domes."""
         whole = chain_potential(self.finger)
         others = tuple(term for term in whole.terms if term.kind != "bistable")
-        return Potential(whole.coordinates, others)
+        return Potential(whole.coordinates, springs_merged(whole.coordinates, others))
 
     def family(
         self, shapes: Shapes, target: Array
@@ -290,10 +291,11 @@ class Pressed:
         self, family: LoadedPotential[FingerCoordinates, PressedDomes], ends: Ends
     ) -> Flags:
         """Domes that meet or leave their neighbors where one does, within `TIE` of the pressure."""
-        law, measured = family.law, family.followed(ends.coordinates)
-        margin = law.margin(measured, ends.load)
-        if margin is None or law.touching is None:
-            return np.zeros(measured.value.shape, bool)
+        law = family.law
+        if law.touching is None:
+            return np.zeros((self.finger.n_units, len(ends.load)), bool)
+        margin = law.margin(family.followed(ends.coordinates), ends.load)
+        assert margin is not None, "domes that touch can be apart"
         push = np.abs(law.pressures(ends.load)) * self.volumes.area / self.finger.force_scale
         is_alike = law.touching == law.touching[ends.cell, np.arange(len(ends.cell))]
         near = np.abs(margin) <= TIE * push + LARGEST_RESIDUAL

@@ -18,23 +18,25 @@ from dpgcli.states.settle import lanes_at_once
 
 @dataclass(frozen=True)
 class Ranges(SideBySide):
-    """Sizes of peaks, MPa, that lead a draw from the source of a pulse to its target, (range,).
+    """Sizes of peaks, MPa, that lead a draw from the source of a pulse to `after`, (range,).
 
-    Up to below `high`, which is infinite where no event ends the range.
+    Up to below `high`, which is infinite where no event ends the range. `after` are codes of
+    certified states, −1 where there is none.
     """
 
     pulse: Indices
     draw: Indices
     low: Array
     high: Array
+    after: Indices
 
 
 def ranges_of(pressed: Pressed, line_of: Indices, reach: float, pulses: Sequence[Pulse]) -> Ranges:
     """The ranges of draws for pulses; of those whose source is no stable state there are none."""
     n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
     pulse = np.arange(len(pulses)).repeat(n_draws)
-    columns = [(one.source, one.target, one.line, np.sign(one.peak)) for one in pulses]
-    source, target, line, sign = np.array(columns, np.int64)[pulse].T
+    columns = [(one.source, one.line, np.sign(one.peak)) for one in pulses]
+    source, line, sign = np.array(columns, np.int64)[pulse].T
     draws = Directions(
         np.tile(np.arange(n_draws), len(pulses)), source.astype(np.uint64), line, sign
     )
@@ -48,14 +50,14 @@ def ranges_of(pressed: Pressed, line_of: Indices, reach: float, pulses: Sequence
         lane = lanes[found.lane]
         high = np.abs(found.high)
         high = np.where(high >= (1.0 - WHOLE) * reach, np.inf, high)
-        own = Ranges(pulse[lane], draws.design[lane], np.abs(found.low), high)
-        parts.append(own.take(np.flatnonzero(found.after == target[lane])))
+        size_low = np.abs(found.low)
+        parts.append(Ranges(pulse[lane], draws.design[lane], size_low, high, found.after))
     return Ranges.joined(parts)
 
 
 def _no_ranges() -> Ranges:
     places, free = np.zeros(0, np.int64), np.zeros(0)
-    return Ranges(places, places, free, free)
+    return Ranges(places, places, free, free, places)
 
 
 def _are_stable(pressed: Pressed, draws: Directions) -> Flags:
@@ -91,25 +93,32 @@ def window(low: Array, high: Array, n_needed: float) -> tuple[float, float]:
 def are_led(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges: Ranges) -> Flags:
     """Which draws are in the target of each pulse after all up to it, (pulse, draw).
 
-    Those in which a pulse before the last does not lead from its source to its target are followed:
-    a later one may make up for it.
+    Those in which a pulse before the last does not lead from its source to its target are followed
+    from what it leads to: a later one may make up for it.
     """
-    does = np.zeros((len(pulses), pressed.finger.n_designs), bool)
     peak = np.abs([pulse.peak for pulse in pulses])[ranges.pulse]
-    is_inside = (ranges.low <= peak) & (peak < ranges.high)
-    does[ranges.pulse[is_inside], ranges.draw[is_inside]] = True
-    others = np.flatnonzero(~does[:-1].all(axis=0))
-    if len(others):
-        does[:, others] = followed(pressed.take_lanes(others), line_of, pulses)
-    return does
+    inside = ranges.take(np.flatnonzero((ranges.low <= peak) & (peak < ranges.high)))
+    after = np.full((len(pulses), pressed.finger.n_designs), -1)
+    after[inside.pulse, inside.draw] = inside.after
+    does = after == np.array([[pulse.target] for pulse in pulses])
+    strays = ~does[:-1]
+    for place in np.flatnonzero(strays.any(axis=1)).tolist():
+        draws = np.flatnonzero(strays[place] & ~strays[:place].any(axis=0))
+        known = after[place, draws]
+        for which, begin in ((known < 0, place), (known >= 0, place + 1)):
+            few = draws[which]
+            if len(few):
+                code = np.where(known < 0, pulses[place].source, known)[which]
+                own = pressed.take_lanes(few)
+                does[begin:, few] = followed(own, line_of, pulses[begin:], code)
+    return np.asarray(does)
 
 
-def followed(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse]) -> Flags:
-    """The same, by following all draws from rest through the pulses, there and back."""
+def followed(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], start: Indices) -> Flags:
+    """The same, by following draws from states, codes (draw,), through pulses, there and back."""
     n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
     found = np.zeros((len(pulses), n_draws), bool)
-    start = inverted_units(np.full(n_draws, pulses[0].source, np.uint64), n_units)
-    shapes, settled = at_rest(pressed, start)
+    shapes, settled = at_rest(pressed, inverted_units(start.astype(np.uint64), n_units))
     draws = np.flatnonzero(settled.status == Status.STABLE)
     own, shapes = pressed.take_lanes(draws), shapes.take_lanes(draws)
     for place, pulse in enumerate(pulses if len(draws) else ()):
@@ -156,7 +165,8 @@ def reliability(
         parts.append(replace(found, draw=draws[found.draw]))
     ranges = Ranges.joined(parts)
     windows = []
-    for place in range(len(pulses)):
-        own = ranges.take(np.flatnonzero(ranges.pulse == place))
+    for place, pulse in enumerate(pulses):
+        leads = (ranges.pulse == place) & (ranges.after == pulse.target)
+        own = ranges.take(np.flatnonzero(leads))
         windows.append(window(own.low, own.high, share * n_draws))
     return Reliability(n_draws, does.sum(axis=1), np.array(windows).reshape(-1, 2))

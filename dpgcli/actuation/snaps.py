@@ -26,6 +26,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.newton import minimize
 
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
+AHEAD = 20.0  # times as far from folds: by Newton's steps that would take seven of them
 NEAR_FOLD = 0.005  # of the stiffness in play; within `TIE` of a fold 0.002 or less is left
 
 
@@ -92,7 +93,8 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
     Those that go at pressures larger by `TIE`, or smaller, and not at the others.
     """
     units = np.arange(pressed.finger.n_units)[:, None]
-    rest = _relaxed(pressed, start, np.zeros(halted.tied.shape, bool))
+    ahead = replace(start, coordinates=_ahead(halted, start.coordinates))
+    rest = _relaxed(pressed, ahead, np.zeros(halted.tied.shape, bool))
     others = (rest.shapes.inverted ^ halted.shapes.inverted) & ~halted.tied & (units != halted.unit)
     is_clear = rest.is_there & ~others.any(axis=0) & (rest.curvature >= NEAR_FOLD)
     doubtful, undecided = np.flatnonzero(~is_clear), np.zeros(halted.tied.shape, bool)
@@ -106,6 +108,12 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
         undecided[:, doubtful] = (above ^ here) | (below ^ here)
         rest.put(doubtful, again, np.arange(n))
     return rest, undecided & (units != halted.unit)
+
+
+def _ahead(halted: Halted, start: Array) -> Array:
+    """Further along the way on from folds, where no other unit leaves its place there."""
+    from_fold = np.where(halted.tied.any(axis=0), 0.0, start - halted.shapes.coordinates)
+    return np.asarray(start + (AHEAD - 1.0) * from_fold)
 
 
 def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:

@@ -19,14 +19,12 @@ class Events:
     """Events of some lanes, one each, at the same count on their ways.
 
     `lanes` are places in the batch; `halted` is where each stopped, `after` the shape that it took
-    at the same pressure, and `released` the energy that it lost, mJ. `is_fine` is false where no
-    equilibrium was found after it.
+    at the same pressure. `is_fine` is false where no equilibrium was found after it.
     """
 
     lanes: Indices
     halted: Halted
     after: Shapes
-    released: Array
     is_fine: Flags
 
     def take(self, which: Indices) -> "Events":
@@ -35,7 +33,6 @@ class Events:
             self.lanes[which],
             self.halted.take_lanes(which),
             self.after.take_lanes(which),
-            self.released[which],
             self.is_fine[which],
         )
 
@@ -85,12 +82,11 @@ class Journey:
         own, halted, lanes = own.take_lanes(met), halted.take_lanes(met), lanes[met]
         halted, shapes, ending = after(own, halted)
         is_fine = ending == Halt.ARRIVED
-        released = own.energy(halted.shapes) - own.energy(shapes)
         self.reason[lanes] = np.where(is_fine, halted.reason, ending)
         self.ending.put(lanes, shapes)
         self._own, self._lanes, self._shapes = own, lanes, shapes
         self.go_on(is_fine)
-        return own, Events(lanes, halted, shapes, released, is_fine)
+        return own, Events(lanes, halted, shapes, is_fine)
 
     def go_on(self, which: Flags) -> None:
         """Leave all others where they are, by the lanes of the last events or of what is left."""

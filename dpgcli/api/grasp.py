@@ -1,31 +1,30 @@
 """`grasp`: what the fingers of a gripper do with a body between them, state by state."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.api.bodies import check_body, with_body
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
     SpecInput,
     as_texts,
     check_flags,
-    check_texts,
     chosen,
     figure_path,
     path_of,
-    point,
     scene_input,
     table_path,
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Scene
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
@@ -33,14 +32,13 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import select
-from dpgcli.text import counted, number_in, shortened
+from dpgcli.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_ROWS, MOST_LANES = 2**20, 2**14
 MOST_DRAWN = 64
-SMALLEST_DISC, LARGEST_DISC = 1e-3, 1e4  # mm
 
 
 @dataclass(frozen=True)
@@ -152,8 +150,9 @@ def grasp(
 ) -> GraspResult:
     """What the fingers of a spec do with a body in their way.
 
-    `object` is such as "disc:40", a disc of 40 mm, and `at` its place (mm) in the gripper's frame;
-    those of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
+    `object` is such as "disc:40", a disc of 40 mm, "jaws:30x40", two plates of 40 mm with a gap of
+    30 mm, or the name of a YAML file; `at` is its place (mm) in the gripper's frame. They are those
+    of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
     for the upper and the lower finger, "111*/11100"; with `both` every pattern meets every other.
     With the `approach` "place" the body grows from nothing at its place, with "insert" it comes in
     along −x from beyond the fingers; then it is let go of, if the spec says that it is not fixed.
@@ -171,73 +170,20 @@ def grasp(
     check_flags(both=both)
     given = scene_input(spec, settings)
     way = chosen(Way, "approach", approach)
-    body = disc_of(given.scene, object, at)
-    return grasp_of(given, body, as_texts("patterns", patterns), both, way)
-
-
-def disc_of(scene: Scene, body: str | None, at: Sequence[float] | None) -> Disc:
-    """The body of these arguments, or of the scene. Raises UsageError for what is none."""
-    check_texts(object=body)
-    known = scene.body
-    if body is None and known is None:
-        raise UsageError(
-            Field("object"), ": expected a body such as disc:40, here or as object in the spec"
-        )
-    radius = known.radius if body is None and known is not None else 0.5 * _diameter(str(body))
-    if at is not None:
-        return Disc(np.array(point("at", at)), radius)
-    if known is None:
-        raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
-    return Disc(known.center, radius)
-
-
-def _diameter(text: str) -> float:
-    kind, _, size = text.partition(":")
-    diameter = number_in(size)
-    if kind != "disc" or not SMALLEST_DISC <= diameter <= LARGEST_DISC:
-        raise UsageError(
-            Field("object"),
-            f" {shortened(text)}: expected disc and its diameter in mm, from {SMALLEST_DISC:g} to "
-            f"{LARGEST_DISC:g}, such as disc:40",
-        )
-    return diameter
+    with_it = with_body(given, object, at)
+    return grasp_of(with_it, as_texts("patterns", patterns), both, way)
 
 
 def grasp_of(
-    given: SceneInput,
-    body: Disc,
-    patterns: Sequence[str],
-    both: bool = False,
-    way: Way = Way.PLACE,
+    given: SceneInput, patterns: Sequence[str], both: bool = False, way: Way = Way.PLACE
 ) -> GraspResult:
-    """The same, of what was read before."""
+    """The same, of a scene with a body that was read before."""
     scene = given.scene
-    check_body(scene, body)
+    assert scene.body is not None, "a scene with a body"
+    check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
     keep_freed_memory()
-    found = grasps(replace(scene, body=body), chain_potential, body, pairs, way)
-    return GraspResult(given, found)
-
-
-def check_body(scene: Scene, body: Disc) -> None:
-    """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
-    from dpgcli.grasping.frames import frames
-
-    if scene.layer_thickness is None:
-        raise UsageError(
-            "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
-            "half of it inside the lattice"
-        )
-    height = float(np.max(scene.finger.segment_height))
-    for frame in frames(scene.gripper):
-        x, y = frame.inside(body.center)
-        beside = max(-0.5 * float(np.squeeze(scene.layer_thickness)) - y, y - height, 0.0)
-        if np.hypot(x, beside) < body.radius and x < body.radius:
-            raise UsageError(
-                Field("at"),
-                f" {body.center[0]:g},{body.center[1]:g}: a disc of {2.0 * body.radius:g} mm there "
-                "begins in the base of a finger: move it along x, or take a smaller one",
-            )
+    return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way))
 
 
 def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, ...]:

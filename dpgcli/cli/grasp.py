@@ -3,7 +3,7 @@
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,9 +21,12 @@ from dpgcli.cli.printing import ROWS_SHOWN, Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
 
+if TYPE_CHECKING:
+    from dpgcli.api.inputs import SceneInput
+
 Body = Annotated[
     str | None,
-    typer.Option("--object", metavar="BODY", help="Body to grasp: disc:40, of 40 mm"),
+    typer.Option("--object", metavar="BODY", help="Body: disc:40, jaws:30x40 or a YAML file"),
 ]
 Place = Annotated[
     str | None,
@@ -31,6 +34,12 @@ Place = Annotated[
 ]
 Both = Annotated[
     bool, typer.Option("--both", help="All pairs of states, of the upper and the lower finger")
+]
+JawGaps = Annotated[
+    str | None,
+    typer.Option(
+        "--jaws", metavar="FROM:TO", help="Open jaws from one aperture to another, and back: 10:60"
+    ),
 ]
 
 
@@ -61,6 +70,7 @@ def grasp(
     patterns: Patterns = None,
     both: Both = False,
     approach: Coming = ApproachName.PLACE,
+    jaws: JawGaps = None,
     settings: Settings = None,
     printed_as: Annotated[
         Format | None, typer.Option("--format", help="How to print the grasps")
@@ -70,7 +80,8 @@ def grasp(
     quiet: Quiet = False,
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
-    from dpgcli.api.grasp import check_drawable, disc_of, grasp_of, pairs_of
+    from dpgcli.api.bodies import with_body
+    from dpgcli.api.grasp import check_drawable, grasp_of, pairs_of
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.grasping.approach import Way
@@ -79,13 +90,17 @@ def grasp(
         check_plot(plot)
     check_table_name(output)
     given = scene_input(spec, settings or ())
-    disc = disc_of(given.scene, body, point("--at", at))
+    if jaws is not None:
+        _check_alone(body, both, approach)
+        _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
+        return
+    given = with_body(given, body, point("--at", at))
     chosen = tuple(patterns or ("*",))
     if plot is not None:
         check_drawable(len(pairs_of(chosen, given.scene, both)[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, disc, chosen, both, Way(approach.value))
+        found = grasp_of(given, chosen, both, Way(approach.value))
     if output is not None:
         found.save(output)
     if plot is not None:
@@ -96,3 +111,59 @@ def grasp(
     if not quiet:
         for line in found.summary:
             say(line)
+
+
+def _check_alone(body: str | None, both: bool, approach: ApproachName) -> None:
+    """Raise UsageError for options that jaws have no use for."""
+    from dpgcli.errors import UsageError
+
+    given = {
+        "--object": body is not None,
+        "--both": both,
+        "--approach": approach is not ApproachName.PLACE,
+    }
+    if idle := [option for option, is_given in given.items() if is_given]:
+        raise UsageError(
+            f"--jaws goes without {' and '.join(idle)}: they grow at their place, and "
+            "both fingers are in the same state"
+        )
+
+
+def _open_jaws(
+    given: "SceneInput",
+    jaws: str,
+    at: tuple[float, float] | None,
+    patterns: list[str] | None,
+    printed_as: Format | None,
+    output: Path | None,
+    plot: Path | None,
+    quiet: bool,
+) -> None:
+    """Force by the aperture of jaws, for each state."""
+    from dpgcli.api.jaws import jaws_of
+    from dpgcli.files.output import Mark, check_outputs
+    from dpgcli.grasping.jaw_table import COLUMNS
+
+    check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
+    with under_way("opening the jaws", quiet=quiet):
+        found = jaws_of(given, _gaps(jaws), at, tuple(patterns or ("*",)))
+    if output is not None:
+        found.save(output)
+    if plot is not None:
+        found.draw(plot)
+    print_rows(COLUMNS, found.rows, printed_as or Format.TABLE)
+    sys.stdout.flush()
+    if not quiet:
+        for line in found.summary:
+            say(line)
+
+
+def _gaps(text: str) -> tuple[float, float]:
+    """Two apertures in mm. Raises UsageError for a text that is no such two."""
+    from dpgcli.errors import UsageError
+
+    try:
+        first, last = map(float, text.split(":"))
+    except ValueError:
+        raise UsageError(f"--jaws {text}: expected two apertures in mm, such as 10:60") from None
+    return first, last

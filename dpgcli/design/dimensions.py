@@ -12,10 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.bodies import PLACES, Body
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.geometry import chamber_width
 from dpgcli.design.loads import FORCES, MASS, MOMENT, GivenLoads
 from dpgcli.design.problems import Issue, Problems, number, of_design
+from dpgcli.design.scene import Held
 from dpgcli.text import KeyPath, dotted
 
 UNITS = "finger.units"
@@ -33,7 +35,7 @@ BOUNDS = {  # where they are not those of a length
     WALL_COMPLIANCE: (0.0, LARGEST),
     HINGE_COUPLING: (-LARGEST, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
-    **dict.fromkeys((*FORCES, MOMENT), (-LARGEST, LARGEST)),
+    **dict.fromkeys((*FORCES, MOMENT, *PLACES), (-LARGEST, LARGEST)),
     MASS: (0.0, LARGEST),
 }
 SUFFIXES = {  # units in the names of keys
@@ -110,7 +112,8 @@ class Design:
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
     `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
-    `pressure` and `loads` are None where the spec says nothing of them.
+    `pressure`, `loads` and `body` are None where the spec says nothing of them; the body is `held`
+    so.
     """
 
     units: int
@@ -126,6 +129,8 @@ class Design:
     pressure: GivenPressure | None = None
     hinge_coupling: Array | None = None
     loads: GivenLoads | None = None
+    body: Body | None = None
+    held: Held = Held.FIXED
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -149,6 +154,9 @@ class Design:
             return replace(self, pressure=given.with_value(path[1:], column))
         if parents == ["loads"]:
             return replace(self, loads=(self.loads or GivenLoads()).with_value(key, column))
+        if parents[0] == "object":
+            assert self.body is not None, "keys of a base that has one"
+            return replace(self, body=self.body.with_value(".".join(path[1:]), column))
         if path == ["finger", LINEAR_STIFFNESS]:
             return replace(self, linear_stiffness=column)
         if path == ["finger", HINGE_COUPLING]:

@@ -171,7 +171,9 @@ class Resolution:
         layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
         thickness = None if layer is None else _picked(layer, designs)
         gripper, pressure = self._gripper(designs), self._pressure(designs)
-        return Scene(finger, (), gripper, thickness, pressure=pressure)
+        body = self.design.body and self.design.body.take_lanes(designs)
+        held = self.design.held
+        return Scene(finger, (), gripper, thickness, pressure=pressure, body=body, held=held)
 
     def _loads(self, designs: Indices) -> dict[str, Array]:
         """The dead loads by name; none where the spec says nothing of them."""

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.design.bodies import Body
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
@@ -135,14 +136,6 @@ class Held(StrEnum):
 
 
 @dataclass(frozen=True)
-class Disc:
-    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
-
-    center: Array
-    radius: float
-
-
-@dataclass(frozen=True)
 class Chambers:
     """Sizes (mm) of a finger's chambers that its lattice does not have, NaN where none is known.
 
@@ -176,7 +169,7 @@ class Scene:
     trusts: tuple[Trust, ...] = ()
     warnings: tuple[str, ...] = ()
     pressure: Pressure | None = None
-    body: Disc | None = None
+    body: Body | None = None
     held: Held = Held.FIXED
 
     def take_lanes(self, index: Indices) -> "Scene":
@@ -186,4 +179,13 @@ class Scene:
             gripper = Gripper(*(np.take(values, index) for values in vars(gripper).values()))
         layer = None if thickness is None else np.take(thickness, index)
         pressure = self.pressure and self.pressure.take_lanes(index)
-        return Scene(self.finger.take_lanes(index), (), gripper, layer, pressure=pressure)
+        body = self.body and self.body.take_lanes(index)
+        return Scene(
+            self.finger.take_lanes(index),
+            (),
+            gripper,
+            layer,
+            pressure=pressure,
+            body=body,
+            held=self.held,
+        )

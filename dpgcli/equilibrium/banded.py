@@ -14,6 +14,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 
+WIDE, SMALL = 8, 2**14  # of bands: depth; numbers in a column of all lanes
+
 in_lanes = np.errstate(
     divide="ignore", invalid="ignore", over="ignore"
 )  # one lane's division by zero is its own
@@ -46,14 +48,48 @@ def factorize(band: Array, column_depths: tuple[int, ...]) -> Factorization:
     >>> factorize(band, (1, 0)).pivots.ravel()
     array([4., 2.])
     """
+    if _is_wide(band.shape):
+        return _factorize_wide(band, column_depths)
     for column, depth in enumerate(column_depths):
         if depth == 0:
             continue
         below = band[1 : depth + 1, column].copy()
         factors = np.divide(below, band[0, column], out=band[1 : depth + 1, column])
-        for k in range(depth):
-            band[: depth - k, column + 1 + k] -= below[k:] * factors[k]
+        for k in range(depth):  # along diagonals: rows side by side in memory
+            updated = band[k, column + 1 : column + 1 + depth - k]
+            updated -= below[k:] * factors[: depth - k]
     return Factorization(band[1:], band[0], column_depths)
+
+
+def _is_wide(shape: tuple[int, ...]) -> bool:
+    """Whether so many small steps would take longer than to work on halves that are not needed."""
+    depth, _, batch = shape
+    return depth > WIDE + 1 and depth * batch <= SMALL
+
+
+def _factorize_wide(band: Array, column_depths: tuple[int, ...]) -> Factorization:
+    """The same by whole squares, A[r, c] at once for r < c, too: these are in rows before the band.
+
+    Lanes have the same bits as one by one.
+    """
+    padded = np.concatenate((np.zeros_like(band), band))
+    own = padded[len(band) :]
+    square = _square(own)
+    for column, depth in enumerate(column_depths):
+        if depth == 0:
+            continue
+        below = own[1 : depth + 1, column].copy()
+        factors = np.divide(below, own[0, column], out=own[1 : depth + 1, column])
+        beyond = slice(column + 1, column + 1 + depth)
+        square[beyond, beyond] -= below[:, None] * factors
+    return Factorization(own[1:], own[0], column_depths)
+
+
+def _square(own: Array) -> Array:
+    """A[r, c], (size, size, batch), as a view of its band: only within the band is it there."""
+    by_depth, by_column, by_lane = own.strides
+    shape, strides = (own.shape[1], *own.shape[1:]), (by_depth, by_column - by_depth, by_lane)
+    return np.lib.stride_tricks.as_strided(own, shape, strides)
 
 
 @in_lanes
@@ -85,7 +121,21 @@ def backward(factorization: Factorization, y: Array) -> Array:
     array([1., 2.])
     """
     lower = factorization.lower
+    if len(lower) > WIDE:  # whatever the batch: the order of sums is another
+        return _backward_wide(factorization, y)
     for column in range(len(factorization.column_depths) - 1, -1, -1):
         for k in range(factorization.column_depths[column]):
             y[column] -= lower[k, column] * y[column + 1 + k]
+    return y
+
+
+def _backward_wide(factorization: Factorization, y: Array) -> Array:
+    """The same, each unknown taken out of all equations before it at once: Lᵀ by columns."""
+    below = _square(factorization.lower)  # L from its second row on
+    for row in range(len(y) - 1, 0, -1):
+        before = slice(max(0, row - len(factorization.lower)), row)
+        factors = below[row - 1, before]
+        if y.ndim == 3:
+            factors = factors[:, None]
+        y[before] -= factors * y[row]
     return y

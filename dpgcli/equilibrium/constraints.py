@@ -19,7 +19,7 @@ from typing import Generic, Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import (
     Coordinates,
     Measured,
@@ -127,10 +127,14 @@ class Extended(Generic[System]):
 
 @dataclass(frozen=True)
 class Slack:
-    """g − y of every constraint, with g by the first `size` coordinates and y behind them."""
+    """g − y of every constraint, with g by the first `size` coordinates and y behind them.
+
+    Lane by lane y are those of the constraints in `multiplied`, and 0 of the others.
+    """
 
     gaps: WideMeasure
     size: int
+    multiplied: "Multiplied"
 
     @property
     def n_cells(self) -> int:
@@ -140,25 +144,70 @@ class Slack:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """Those of the gaps and of the multipliers."""
-        return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.n_cells)))
+        return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.multiplied.n)))
 
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − y with its derivatives, (cell, batch)."""
         gaps = self.gaps(coordinates[: self.size])
-        n, n_rows, batch = self.n_cells, len(self.gaps.rows), coordinates.shape[1]
-        own = np.broadcast_to(-np.eye(n)[..., None], (n, n, batch))
+        n, n_rows, batch = self.multiplied.n, len(self.gaps.rows), coordinates.shape[1]
+        own = -self.multiplied.are_of(self.n_cells).astype(float)
+        own = np.broadcast_to(own, (n, self.n_cells, batch))
 
         def bent(force: Array) -> Array:
             whole = np.zeros((n_rows + n, n_rows + n, batch))
             whole[:n_rows, :n_rows] = gaps.bent(force)
             return whole
 
-        value = gaps.value - coordinates[self.size :]
+        value = gaps.value - self.multiplied.spread(coordinates[self.size :], self.n_cells)
         return WideMeasured(value, np.concatenate((gaps.gradient, own)), bent, gaps.place)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same measure for some lanes of the batch."""
-        return replace(self, gaps=self.gaps.take_lanes(index))
+        gaps, multiplied = self.gaps.take_lanes(index), self.multiplied.take_lanes(index)
+        return replace(self, gaps=gaps, multiplied=multiplied)
+
+
+@dataclass(frozen=True)
+class Multiplied:
+    """The constraints that have multipliers: by `cells` (multiplier, batch), −1 for none.
+
+    There are as many multipliers as the lane with most active constraints needs, at least one.
+
+    >>> own = Multiplied.of(np.array([[False, True], [True, False], [True, False]]))
+    >>> own.cells.tolist(), own.spread(np.array([[5.0, 6.0], [7.0, 0.0]]), 3).tolist()
+    ([[1, 0], [2, -1]], [[0.0, 6.0], [5.0, 0.0], [7.0, 0.0]])
+    """
+
+    cells: Indices
+
+    @classmethod
+    def of(cls, active: Flags) -> Self:
+        """Those that are active, (cell, batch)."""
+        n = max(1, int(active.sum(axis=0).max(initial=0)))
+        first = np.argsort(~active, axis=0, kind="stable")[:n]
+        return cls(np.where(np.take_along_axis(active, first, axis=0), first, -1))
+
+    @property
+    def n(self) -> int:
+        """Number of multipliers."""
+        return len(self.cells)
+
+    def are_of(self, n_cells: int) -> Flags:
+        """Which constraint each is of, (multiplier, cell, batch)."""
+        return np.asarray(self.cells[:, None] == np.arange(n_cells)[:, None])
+
+    def spread(self, values: Array, n_cells: int) -> Array:
+        """Values by multiplier, (multiplier, batch), as those of constraints, (cell, batch)."""
+        return total(np.where(self.are_of(n_cells), values[:, None], 0.0))
+
+    def taken(self, values: Array) -> Array:
+        """Values of constraints, (cell, batch), by multiplier."""
+        found = np.take_along_axis(values, np.maximum(self.cells, 0), axis=0)
+        return np.where(self.cells >= 0, found, 0.0)
+
+    def take_lanes(self, index: Indices) -> Self:
+        """Those of some lanes."""
+        return type(self)(take_lanes(self.cells, index))
 
 
 @dataclass(frozen=True)

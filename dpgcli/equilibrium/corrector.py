@@ -71,10 +71,12 @@ def corrected(
     cell: Indices,
     target: Array,
     depth: int,
+    fewest: int = 0,
 ) -> Corrected:
     """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1.
 
-    Lanes that have ended are put aside where they are many.
+    By so many steps at the `fewest`: each squares what is left, and loads at folds need more digits
+    than the balance does. Lanes that have ended are put aside where they are many.
     """
     n, lanes, own = len(load), np.arange(len(load)), family
     chosen = np.arange(family.followed.n_cells)[:, None] == cell
@@ -84,7 +86,7 @@ def corrected(
     loads, is_fine = np.zeros(n), np.zeros(n, bool)
     for count in range(MAX_CORRECTIONS + 1):
         look = _look(own, here, depth)
-        ended = look.is_there | (count == MAX_CORRECTIONS)
+        ended = (look.is_there & (count >= fewest)) | (count == MAX_CORRECTIONS)
         rest = np.flatnonzero(~ended)
         is_crowded = ended.mean() > COMPACTING_SHARE
         if is_crowded:

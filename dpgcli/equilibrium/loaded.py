@@ -6,6 +6,7 @@ followed where the load turns back: those of the measure.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
@@ -181,7 +182,7 @@ class LoadedPotential(Generic[System, Law]):
     def _grown(self, load: Array) -> tuple[Term, ...]:
         return tuple(replace(term, law=ShareOfLaw(term.law, load)) for term in self.growing)
 
-    @property
+    @cached_property
     def column_depths(self) -> tuple[int, ...]:
         """The depth to which each column of the Hessian may be nonzero."""
         return self.at(np.zeros(1)).column_depths

@@ -25,7 +25,7 @@ LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 1.6, 0.35
 FURTHEST = 2.5  # steps: what else moves further may have left its branch
 FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
-KINK = 1e-4  # of the scale: a contact that slides over a corner moves other cells than before
+KINK = 1e-2  # of the scale: a contact that slides over a corner moves other cells than before
 AT_KINK = 1e-6  # of the load: as near a path comes to a kink beyond which nothing is found
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
 AWAY = 1e-9  # of the forces in play: what is nearer to an event may be at it, rounding aside
@@ -68,9 +68,10 @@ class _Walk:
 
     `cell` is followed in the direction `sign`; per step of one scale the coordinates move by
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
-    one before and `last_slope` the slope there, NaN if another cell was followed. Where nothing
-    moves `cell` is −1, and steps are of the load itself. `is_beyond` says that the last step that
-    was tried led beyond an event.
+    one before and `last_slope` the slope there, NaN if another cell was followed; `bend` is how
+    `onward` changes per step since then, zero if that is not known. Where nothing moves `cell` is
+    −1, and steps are of the load itself. `is_beyond` says that the last step that was tried led
+    beyond an event.
     """
 
     coordinates: Array
@@ -83,6 +84,7 @@ class _Walk:
     step: Array
     last: Array
     last_slope: Array
+    bend: Array
     margin: Array
     is_beyond: Flags
 
@@ -162,7 +164,7 @@ def _begin(
     walk = _Walk(
         here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
-        margin, np.zeros(n, bool),
+        np.zeros_like(coordinates), margin, np.zeros(n, bool),
     )  # fmt: skip
     _turn(family, walk, here, nothing, towards)
     return walk, here.is_fine
@@ -254,6 +256,7 @@ def _go_by_load(walk: _Walk, which: Flags) -> None:
     walk.onward, walk.slope = walk.onward / slope, walk.slope / slope
     walk.step = np.where(which, walk.step * slope, walk.step)
     walk.last_slope = np.where(which, np.nan, walk.last_slope)
+    walk.bend = np.where(which, 0.0, walk.bend)
 
 
 def _tried(
@@ -269,17 +272,32 @@ def _tried(
     is_last = to_end <= step
     step = np.where(is_last, to_end, step)
     cell = np.where(is_last, -1, walk.cell)
-    guess = family.coordinates.moved(walk.coordinates, walk.onward * step)
-    load = np.where(is_last, end, walk.load + towards * walk.slope * step)
+    way = np.where(is_last, _along_bend(walk, (end - walk.load) * towards), step)
+    guess = family.coordinates.moved(walk.coordinates, (walk.onward + 0.5 * way * walk.bend) * way)
+    rise = (walk.slope + 0.5 * way * _slope_bend(walk)) * way
+    load = np.where(is_last, end, walk.load + towards * rise)
     place = np.maximum(walk.cell, 0), np.arange(len(end))
     scale = np.broadcast_to(family.scale, walk.values.shape)
     target = walk.values[place] + walk.sign * step * scale[place]
-    there = corrected(family, guess, load, cell, target, depth)
+    there = corrected(family, guess, load, cell, target, depth, fewest=1)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
     nearest = KINK if family.n_multipliers else FOLD_DISTANCE
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)
+
+
+def _slope_bend(walk: _Walk) -> Array:
+    """How the slope changes per step since the last point, zero if that is not known."""
+    bend = (walk.slope - walk.last_slope) / walk.last
+    return np.where(np.isfinite(bend), bend, 0.0)
+
+
+def _along_bend(walk: _Walk, rise: Array) -> Array:
+    """Steps to where the load has risen by so much: τ dλ/dτ + ½ τ² d²λ/dτ², or the first alone."""
+    square = walk.slope**2 + 2.0 * _slope_bend(walk) * rise
+    rate = np.where(square > 0.0, 0.5 * (walk.slope + np.sqrt(np.abs(square))), walk.slope)
+    return np.where(rate > 0.0, rise / rate, 0.0)
 
 
 def _move(
@@ -301,6 +319,8 @@ def _move(
         margin=trial.margin,
     )
     _turn(family, new, there, trial.cell, towards)
+    is_known = np.isfinite(new.last_slope) & (new.sign == walk.sign) & family.law.is_smooth
+    new.bend = np.where(is_known, (new.onward - walk.onward) / trial.step, 0.0)
     walk.put(np.flatnonzero(which), new, which)
 
 

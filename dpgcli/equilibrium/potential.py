@@ -159,11 +159,18 @@ def _assemble_wide(
     gradient[places] += widely(q, response.force)
     bend = q.bent(response.force)
     for slope, stiffness in zip(np.moveaxis(q.gradient, 1, 0), response.stiffness, strict=True):
-        bend += (stiffness * slope)[:, None] * slope
-    first, second = np.triu_indices(len(places))
-    low = np.minimum(places[first], places[second])
-    depth = np.abs(places[second] - places[first])
+        if stiffness.any():
+            bend += (stiffness * slope)[:, None] * slope
+    first, second, low, depth = _pairs(tuple(places.tolist()))
     hessian[depth, low] += bend[first, second]
+
+
+@cache  # the same few for every batch
+def _pairs(places: tuple[int, ...]) -> tuple[Indices, Indices, Indices, Indices]:
+    """All pairs of places by their numbers, and where a band has each: column and depth."""
+    first, second = np.triu_indices(len(places))
+    own, other = np.array(places)[first], np.array(places)[second]
+    return first, second, np.minimum(own, other), np.abs(other - own)
 
 
 def widely(q: WideMeasured, weights: Array) -> Array:
@@ -185,9 +192,11 @@ def _assemble_load(
 
 def add(target: Array, row: Row, values: Array) -> None:
     """Add one value per cell, (cell, batch), to a row each; a clamped cell has none."""
-    clamped = 1 if row.offset < 0 else 0
-    first = row.offset + clamped * row.stride
-    target[first :: row.stride][: len(values) - clamped] += values[clamped:]
+    first, stride = row.offset, row.stride
+    if first < 0:
+        first, values = first + stride, values[1:]
+    rows = target[first : first + stride * len(values) : stride]
+    rows += values
 
 
 def _rows_by_cell(rows: tuple[Row, ...], n_cells: int) -> list[list[int]]:

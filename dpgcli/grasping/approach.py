@@ -5,7 +5,7 @@ unit resets (or snaps), exactly at the fold, and the finger goes downhill with t
 there; then the body goes on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -22,11 +22,15 @@ LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: befo
 
 @dataclass(frozen=True)
 class Reset:
-    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,)."""
+    """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,).
+
+    `push` (cell, lane) are the pushes, N, at the fold.
+    """
 
     lanes: Indices
     load: Array
     flipped: Flags
+    push: Array
 
 
 @dataclass(frozen=True)
@@ -87,30 +91,41 @@ def approach(
         own = obstructed.take_lanes(lanes)
         few = own.relabeled(shapes.take_lanes(lanes))
         family = own.family(few.inverted, few.active)
-        ends = follow(family, own.stacked(few), here[lanes], end[lanes])
-        moved, flipped = _gone_on(own, few, ends, end[lanes])
+        ends = _told(own, few, follow(family, own.stacked(few), here[lanes], end[lanes]))
+        moved, flipped, push = _gone_on(own, few, ends, end[lanes])
         here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
         changed = np.flatnonzero(flipped.any(axis=0))
         if len(changed):
-            resets.append(Reset(lanes[changed], ends.load[changed], flipped[:, changed]))
+            which = flipped[:, changed], push[:, changed]
+            resets.append(Reset(lanes[changed], ends.load[changed], *which))
         goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     return Approach(shapes, here, tuple(resets))
 
 
+def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
+    """The ends of paths: where a gap closes that is another one's it has jumped, as at a kink."""
+    place = own.gaps()(ends.coordinates[: len(before.coordinates)]).place
+    cell, lanes = np.maximum(ends.cell, 0), np.arange(len(ends.cell))
+    is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
+    is_jump &= ends.outcome == PathEnd.EVENT
+    return replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
+
+
 def _gone_on(
     own: Obstructed, before: ContactShapes, ends: Ends, end: Array
-) -> tuple[ContactShapes, Flags]:
-    """The shapes with which paths go on from where they ended, and units that flipped there."""
+) -> tuple[ContactShapes, Flags, Array]:
+    """The shapes with which paths go on, units that flipped where they ended, and pushes there."""
     size = len(before.coordinates)
     coordinates, y = ends.coordinates[:size], ends.coordinates[size:]
     active, n = before.active.copy(), len(ends.load)
     events = np.flatnonzero(ends.outcome == PathEnd.EVENT)
     active[ends.cell[events], events] ^= True
-    push = y * own.stiffness
+    push = own.pushes(before.active, y)
     push = np.where(own.are_kept, push, np.where(active, np.maximum(push, 0.0), 0.0))
+    at_fold = push.copy()
     moved = ContactShapes(
         coordinates.copy(), push, active, before.inverted.copy(), np.ones(n, bool)
     )
@@ -122,9 +137,14 @@ def _gone_on(
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
         beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
         there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
+        lost = np.flatnonzero(~there.is_there)
+        if len(lost):  # pushes of contacts that the fall has left lead nowhere
+            own_, anew = few.take_lanes(lost), there.take_lanes(lost)
+            args = anew.coordinates, anew.inverted, 0.0 * anew.push, beyond[lost]
+            there.put(lost, own_.relaxed(*args))
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
-    return moved, flipped
+    return moved, flipped, at_fold
 
 
 def _beyond(ends: Ends) -> Array:

@@ -14,6 +14,7 @@ from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
     Extended,
+    Multiplied,
     Slack,
     multiplier_term,
 )
@@ -43,6 +44,7 @@ STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has
 TOLERANCE = 1e-12  # of the forces in play
 CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
 MOST_UPDATES, MOST_STEPS = 30, 120  # of multipliers; of a descent
+STUCK, MOST_STUCK = 1e-8, 4  # of the forces in play; descents that end in a corner
 SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 
 Constrained = Extended[Coordinates]
@@ -276,8 +278,8 @@ class Obstructed:
         own = self.potentials(inverted)
         size, finger, n = self.n_own, self.units.finger, self.n_fingers
         frame = self.bare(inverted, np.zeros(1)).coordinates
-        gaps = self.gaps()
-        system = Extended(frame, gaps.n_cells, self.large, self.stiffness)
+        gaps, multiplied = self.gaps(), Multiplied.of(active)
+        system = Extended(frame, multiplied.n, self.large, self.stiffness)
         law = ActiveConstraints(active, self.stiffness, self._deep, self.large[0], self.are_kept)
         terms = (*self._terms_of(own), multiplier_term(system))
         domes = tuple(
@@ -288,7 +290,7 @@ class Obstructed:
             self._by_finger(finger.stroke),
             self._by_finger(self.units.holding_stiffness),
         )
-        slack = Slack(gaps, frame.size)
+        slack = Slack(gaps, frame.size, multiplied)
         return LoadedPotential(
             system,
             terms,
@@ -298,7 +300,7 @@ class Obstructed:
             scale,
             stiffness,
             self._growing,
-            n_multipliers=gaps.n_cells,
+            n_multipliers=multiplied.n,
         )
 
     def _by_finger(self, values: Array) -> Array:
@@ -330,7 +332,12 @@ class Obstructed:
 
     def stacked(self, shapes: ContactShapes) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
-        return np.concatenate((shapes.coordinates, shapes.push / self.stiffness))
+        y = Multiplied.of(shapes.active).taken(shapes.push / self.stiffness)
+        return np.concatenate((shapes.coordinates, y))
+
+    def pushes(self, active: Flags, multipliers: Array) -> Array:
+        """The pushes of contacts, (cell, batch), that have these multipliers, N."""
+        return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
 
     def relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Go downhill from coordinates at some loads to the next minima, by short steps.
@@ -363,7 +370,9 @@ class Obstructed:
 
     def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         here, push, lanes = start.copy(), push.copy(), np.arange(start.shape[1])
-        for _ in range(MOST_UPDATES):
+        found = ContactShapes(here.copy(), push.copy(), push > 0.0, inverted.copy(), lanes < 0)
+        n_stuck = np.zeros(len(lanes), int)
+        for count in range(MOST_UPDATES):
             own = self.take_lanes(lanes)
             potential = own.pressed(inverted[:, lanes], push[:, lanes], load[lanes])
             there = minimize(
@@ -372,23 +381,28 @@ class Obstructed:
             contact = potential.terms[-1]
             assert isinstance(contact.law, AugmentedContact), "the last term"
             pushed = contact.law.pushes(contact.measure(there.coordinates).value)
-            change = np.abs(pushed - push[:, lanes]).max(axis=0) / (own.stiffness * own.large)[0]
             here[:, lanes], push[:, lanes] = there.coordinates, pushed
-            lanes = lanes[change > CLOSE]
+            near = own.finished(there.coordinates, inverted[:, lanes], pushed, load[lanes])
+            away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
+            is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
+            n_stuck = n_stuck + (there.relative_residual > STUCK)
+            goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
+            found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
+            lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
             if not len(lanes):
                 break
-        return self.finished(here, inverted, push, load)
+        return found
 
     def finished(self, near: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
         """Equilibria with the active set that pushes say, (cell, batch), from nearby."""
         active = (push > 0.0) | self.are_kept
         family, n = self.family(inverted, active), len(load)
         nothing, free = np.full(n, -1), np.zeros(n)
-        guess = np.concatenate((near, push / self.stiffness))
+        begun = ContactShapes(near, push, active, inverted.copy(), np.ones(n, bool))
+        guess = self.stacked(begun)
         there = corrected(family, guess, load, nothing, free, max(family.column_depths))
-        size = len(near)
-        y = there.coordinates[size:]
         margin = family.law.margin(there.loaded, load)
         is_there = there.is_fine & (margin >= -CLOSE).all(axis=0)
-        pushes = np.where(active, y * self.stiffness, 0.0)
-        return ContactShapes(there.coordinates[:size], pushes, active, inverted.copy(), is_there)
+        found, y = there.coordinates[: len(near)], there.coordinates[len(near) :]
+        pushes = self.pushes(active, y)
+        return replace(begun, coordinates=found, push=pushes, is_there=is_there)

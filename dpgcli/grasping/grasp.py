@@ -7,16 +7,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Codes, Flags, total
-from dpgcli.design.scene import Disc, Scene
+from dpgcli.arrays import Array, Codes, Flags, Indices, total
+from dpgcli.design.bodies import Body
+from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
 from dpgcli.grasping.contact import Motion, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
-from dpgcli.mechanics.gaps import nearest
-from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.gaps import FaceGaps, Touches
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -34,16 +34,18 @@ class Grasped:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
 
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
-    (side, batch) N is by phalanx along `normal`, `force` (2, batch) N, `gap` (batch,) mm the
-    smallest, `margin` what more of the load the next unit bears. `nodes`, and `face` (2, node,
-    batch), in mm. `residual` N and `error` mm are those of the tip. `resets` say what happened.
+    (cell, batch) N is that at each of the places that `touches` are, on `phalanges` (cell,),
+    `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin` what more of the load the next
+    unit bears. `nodes`, and `face` (2, node, batch), in mm. `residual` N and `error` mm are those
+    of the tip. `resets` say what happened.
     """
 
     code: Codes
     after: Codes
     status: NDArray[np.uint8]
     push: Array
-    normal: Array
+    touches: Touches
+    phalanges: Indices
     force: Array
     gap: Array
     margin: Array
@@ -62,18 +64,24 @@ class Grasped:
         """Those of several batches as one."""
         arrays = {
             name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
-            for name in (*cls.BY_LANE, "normal", "face")
+            for name in (*cls.BY_LANE, "face")
         }
-        nodes = (
-            np.concatenate(values, axis=-1)
-            for values in zip(*(p.nodes for p in parts), strict=True)
+        nodes, touches = (
+            [np.concatenate(v, axis=-1) for v in zip(*values, strict=True)]
+            for values in ([p.nodes for p in parts], [p.touches for p in parts])
         )
         resets: list[Reset] = []
         before = 0
         for part in parts:
             resets += [replace(reset, lanes=reset.lanes + before) for reset in part.resets]
             before += len(part.code)
-        return cls(**arrays, nodes=Stations(*nodes), resets=tuple(resets))
+        return cls(
+            **arrays,
+            touches=Touches(*touches),
+            phalanges=parts[0].phalanges,
+            nodes=Stations(*nodes),
+            resets=tuple(resets),
+        )
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class Placed:
 def placed(
     scene: Scene,
     formulate: Formulate,
-    disc: Disc,
+    body: Body,
     frame: FingerFrame,
     codes: Codes,
     way: Way = Way.PLACE,
@@ -100,23 +108,37 @@ def placed(
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
-    units = UnitSolutions.of(scene.finger)
-    pattern = inverted_units(codes, scene.finger.n_units)
+    thickness = np.reshape(scene.layer_thickness, -1)
+    return met(UnitSolutions.of(scene.finger), formulate, thickness, body, frame, codes, way)
+
+
+def met(
+    units: UnitSolutions,
+    formulate: Formulate,
+    thickness: Array,
+    body: Body,
+    frame: FingerFrame,
+    codes: Codes,
+    way: Way = Way.PLACE,
+) -> Placed:
+    """The same of units and layers of some thickness, mm, (1,) or (batch,).
+
+    They, the body and the frame are one for all states, or one for each.
+    """
+    pattern = inverted_units(codes, units.finger.n_units)
     free = settle(units, formulate, pattern, DEFAULT_TOLERANCE)
-    body = Obstacle(frame.inside(disc.center)[:, None, None], np.full((1, 1), disc.radius))
-    thickness = np.full((1, 1), float(np.squeeze(scene.layer_thickness)))
-    bare = Obstructed(units, formulate, thickness, (body,), np.zeros(1))
+    bare = Obstructed(units, formulate, thickness[None], (frame.obstacle(body),), np.zeros(1))
     x = free.equilibrium.coordinates
-    depth = np.maximum(disc.radius, -bare.gaps()(x).value.min(axis=0))
+    depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
     is_stable = np.asarray(free.status == Status.STABLE)
-    came = (_grown if way is Way.PLACE else _inserted)(own, disc, frame, x, pattern, is_stable)
+    came = (_grown if way is Way.PLACE else _inserted)(own, body, frame, x, pattern, is_stable)
     is_lost = is_stable & ~came.shapes.is_there
     return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
 
 
 def _grown(
-    own: Obstructed, disc: Disc, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
 ) -> Approach:
     """How fingers in free states, coordinates (size, batch), meet a body that grows."""
     begin = np.zeros(x.shape[1])
@@ -126,12 +148,12 @@ def _grown(
 
 
 def _inserted(
-    own: Obstructed, disc: Disc, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
 ) -> Approach:
     """The same of a body that comes in along −x, from beyond where the fingers could reach."""
     finger, begin = own.units.finger, np.zeros(x.shape[1])
-    furthest = finger.straight_length + finger.segment_height[0] + own.thickness[0] + disc.radius
-    from_there = np.maximum(furthest - disc.center[0], 0.0)[None]
+    furthest = finger.straight_length + finger.segment_height[0] + own.thickness[0]
+    from_there = np.maximum(furthest - body.nearest_x, 0.0)[None]
     along = frame.along(np.array([1.0, 0.0]))[:, None, None]
     motion = Motion((along,), travel=-from_there)
     coming = replace(own, depth=np.zeros(1), motion=motion)
@@ -143,9 +165,17 @@ def _inserted(
 
 
 def described(
-    own: Obstructed, codes: Sequence[Codes], grown: Approach, status: NDArray[np.uint8]
+    own: Obstructed,
+    codes: Sequence[Codes],
+    grown: Approach,
+    status: NDArray[np.uint8],
+    *,
+    with_margins: bool = True,
 ) -> tuple[Grasped, ...]:
-    """What there is to say of fingers that have come to rest, of each; `status` is that before."""
+    """What there is to say of fingers that have come to rest, of each; `status` is that before.
+
+    Margins, which take as long again as all else, are NaN unless they are wanted.
+    """
     shapes = own.relabeled(grown.shapes)
     potential = own.pressed(grown.shapes.inverted, grown.shapes.push, grown.load)
     there = looked_at(potential, grown.shapes.coordinates)
@@ -153,13 +183,15 @@ def described(
     is_there = status == Status.STABLE
     worst = np.max([state.status for state in settled], axis=0)
     status = np.where(is_there, worst, status)
-    margin = _margins(own, grown, np.asarray(status == Status.STABLE))
+    margin = np.full(len(status), np.nan)
+    if with_margins:
+        margin = _margins(own, grown, np.asarray(status == Status.STABLE))
     gaps = own.gaps()(shapes.coordinates).value
     n_before, found = 0, []
     for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):
-        shape = face.shape(shapes.coordinates)
-        normal = nearest(shape, body.points).normal[:, 0]
-        cells = slice(n_before, n_before + normal.shape[1])
+        bare = FaceGaps(face, body)
+        touches = bare.touches(shapes.coordinates)
+        cells = slice(n_before, n_before + bare.n_cells)
         push, n_before = shapes.push[cells], cells.stop
         rows = slice(finger, own.n_own, own.n_fingers)
         mine = own.of_finger(shapes.coordinates, finger)
@@ -169,8 +201,9 @@ def described(
                 after=codes_of(state.reached),
                 status=status,
                 push=push,
-                normal=normal,
-                force=total(np.moveaxis(normal * push, 1, 0)),
+                touches=touches,
+                phalanges=bare.phalanges,
+                force=total(np.moveaxis(touches.directions * push, 1, 0)),
                 gap=gaps[cells].min(axis=0),
                 margin=margin,
                 residual=there.residual,
@@ -186,7 +219,7 @@ def described(
 def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:
     n = own.units.finger.n_units
     parts = [(reset, reset.flipped[finger * n : (finger + 1) * n]) for reset in resets]
-    return tuple(Reset(r.lanes, r.load, f) for r, f in parts)
+    return tuple(replace(reset, flipped=flipped) for reset, flipped in parts)
 
 
 def _certified(own: Obstructed, grown: Approach, there: Equilibrium, finger: int) -> Settled:

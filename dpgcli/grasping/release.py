@@ -25,27 +25,37 @@ WAYS = {Held.GUIDED: np.array([[1.0], [0.0]]), Held.FREE: np.eye(2)}  # of a bod
 
 def motion_of(held: Held, frames: Sequence[FingerFrame]) -> Motion:
     """How a body may move that is held so, in the frames of its fingers."""
-    return Motion(tuple(frame.along(WAYS[held])[..., None] for frame in frames))
+    ways = WAYS[held][..., None]
+    return Motion(tuple(frame.along(ways) for frame in frames))
 
 
 def let_go(
-    parts: Sequence[Placed], lanes: Sequence[Indices], motion: Motion
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    motion: Motion,
+    *,
+    with_margins: bool = True,
 ) -> tuple[tuple[Grasped, ...], Array]:
     """Fingers at `lanes` of each part with a body between them that is let go of.
 
-    Also how far the bodies have moved, (motion, lane), mm.
+    Also how far the bodies have moved, (motion, lane), mm. The motion is one for all, or by lane.
     """
     n = len(lanes[0])
-    chunks = [
-        _let_go(parts, [index[at : at + LANES] for index in lanes], motion)
-        for at in range(0, max(n, 1), LANES)
-    ]
+    chunks = []
+    for at in range(0, max(n, 1), LANES):
+        some = [index[at : at + LANES] for index in lanes]
+        own = motion.take_lanes(np.arange(at, at + len(some[0])))
+        chunks.append(_let_go(parts, some, own, with_margins=with_margins))
     fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, _ in chunks), strict=True))
     return fingers, np.concatenate([moved for _, moved in chunks], axis=1)
 
 
 def _let_go(
-    parts: Sequence[Placed], lanes: Sequence[Indices], motion: Motion
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    motion: Motion,
+    *,
+    with_margins: bool,
 ) -> tuple[tuple[Grasped, ...], Array]:
     own, start = together(parts, lanes, motion)
     gone = released(own, start)
@@ -54,7 +64,8 @@ def _let_go(
     status = np.max(before, axis=0)
     is_lost = (status == Status.STABLE) & ~_is_held(gone.shapes)
     status = np.where(is_lost, np.uint8(Status.NOT_HELD), status)
-    return described(own, codes, gone, status), gone.shapes.coordinates[own.n_own :]
+    fingers = described(own, codes, gone, status, with_margins=with_margins)
+    return fingers, gone.shapes.coordinates[own.n_own :]
 
 
 def _is_held(shapes: ContactShapes) -> NDArray[np.bool_]:
@@ -67,10 +78,10 @@ def together(
 ) -> tuple[Obstructed, ContactShapes]:
     """The fingers of a lane as one, with a body that may move: those at `lanes` of each part."""
     few = [part.grown.shapes.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
-    depths = [part.own.depth[index] for part, index in zip(parts, lanes, strict=True)]
-    bodies = tuple(part.own.bodies[0] for part in parts)
-    depth = np.max(depths, axis=0)
-    own = replace(parts[0].own, bodies=bodies, depth=depth, motion=motion)
+    alone = [part.own.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
+    bodies = tuple(own.bodies[0] for own in alone)
+    depth = np.max([own.depth for own in alone], axis=0)
+    own = replace(alone[0], bodies=bodies, depth=depth, motion=motion)
     n = len(lanes[0])
     coordinates = np.stack([shapes.coordinates for shapes in few], axis=1).reshape(-1, n)
     shapes = ContactShapes(

@@ -8,8 +8,9 @@ import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, distinct
+from dpgcli.design.bodies import Body
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Disc, Held, Scene
+from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
@@ -54,7 +55,7 @@ class Grasps:
     """
 
     scene: Scene
-    body: Disc
+    body: Body
     frames: tuple[FingerFrame, ...]
     fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
@@ -68,7 +69,7 @@ class Grasps:
 def grasps(
     scene: Scene,
     formulate: Formulate,
-    body: Disc,
+    body: Body,
     pairs: Sequence[Codes],
     way: Way = Way.PLACE,
 ) -> Grasps:
@@ -77,7 +78,7 @@ def grasps(
     Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
     """
     seen_from = frames(scene.gripper)
-    is_alike = body.center[1] == 0.0 and len(seen_from) > 1
+    is_alike = bool(body.is_mirrored) and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
     parts: list[Placed] = []
@@ -134,7 +135,9 @@ def grasp_rows(found: Grasps) -> Columns:
             is_there,
         ),
         "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
-        "touching": _joined([_phalanges(t) for t in touches], is_there),
+        "touching": _joined(
+            [_touching(t, f) for t, f in zip(touches, found.fingers, strict=True)], is_there
+        ),
         "finger_force_x_N": known(_rounded(forces[0][0], most)),
         "finger_force_y_N": known(_rounded(forces[0][1], most)),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
@@ -203,6 +206,7 @@ def _resets(finger: Grasped) -> NDArray[np.str_]:
     return np.array(["; ".join(lane) for lane in words])
 
 
-def _phalanges(touches: NDArray[np.bool_]) -> NDArray[np.str_]:
-    numbers = [",".join(str(k + 1) for k in np.flatnonzero(lane)) for lane in touches.T]
-    return np.array(numbers)
+def _touching(touches: NDArray[np.bool_], finger: Grasped) -> NDArray[np.str_]:
+    """The phalanges that touch the body in each row, from the base: "3,4"."""
+    numbers = [distinct(finger.phalanges[row]) for row in touches.T]
+    return np.array([",".join(str(k + 1) for k in row) for row in numbers])

@@ -22,6 +22,7 @@ from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
 from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.plates import PlateGaps, plate_gaps
 
 FAR = 1e9  # mm: of a gap that is another one's
 
@@ -43,12 +44,20 @@ class Nearest(NamedTuple):
     is_corner: Flags
 
 
+class Touches(NamedTuple):
+    """Where a body would be touched, mm, and the direction of a push on it: (2, cell, batch)."""
+
+    places: Array
+    directions: Array
+
+
 @dataclass(frozen=True)
 class FaceGaps:
     """Gaps of a body, cell by cell: all sides of the face for its first point, then the next.
 
-    With `first` (cell, batch) only one gap of those at one place is there, the others are far away:
-    one of the first, or else that of the side itself.
+    Behind these are those of its plates: all nodes of the face for the first, then the next. With
+    `first` (cell, batch) only one gap of those at one place is there, the others are far away: one
+    of the first, or else that of the cell itself.
     """
 
     face: Face
@@ -57,39 +66,108 @@ class FaceGaps:
 
     @property
     def n_cells(self) -> int:
-        """One for each side and point."""
-        return self.face.n_units * len(self.obstacle.radii)
+        """One for each side and point, and for each node and plate."""
+        n, body = self.face.n_units, self.obstacle
+        return n * len(body.radii) + (n + 1) * len(body.plates)
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """All corners and chords."""
         return tuple(Row(0, int(place)) for place in self.face.places)
 
+    @cached_property
+    def phalanges(self) -> Indices:
+        """The phalanx that each cell is on, the first is 0, (cell,): a node ends its own."""
+        n, body = self.face.n_units, self.obstacle
+        of_nodes = np.maximum(np.arange(n + 1) - 1, 0)
+        return np.append(
+            np.tile(np.arange(n), len(body.radii)), np.tile(of_nodes, len(body.plates))
+        )
+
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − r with its derivatives, (cell, batch)."""
         shape = self.face.shape(coordinates)
         near = nearest(shape, self.obstacle.points)
-        n_points, n, batch = near.place.shape
-        place = (near.place + n * np.arange(n_points)[:, None, None]).reshape(-1, batch)
-        cells = n_points * n
-        own = (near.distance - self.obstacle.radii[:, None]).reshape(cells, batch)
-        value = np.take_along_axis(own, place, axis=0)
         moves = _moves(shape, near)
-        gradient = np.take_along_axis(moves.slope, place[None], axis=1)
+        place, own, slope = self._at_points(near), self._own(near), moves.slope
+        n_points = len(own)
+        pushes = np.zeros((2, len(shape.nodes[0]), 0, coordinates.shape[1]))
+        if len(self.obstacle.plates):
+            plates = plate_gaps(shape, self.obstacle)
+            is_beyond = (plates.depth > 0.0) & (own < -plates.depth)
+            own = np.where(is_beyond, FAR, own)  # the tip comes out on a shorter way
+            place = np.concatenate((place, self._at_plates(plates, place)))
+            own = np.concatenate((own, plates.distance.reshape(-1, coordinates.shape[1])))
+            pushes = _pushed(plates)
+            slope = np.concatenate((slope, shape.pulled(pushes)), axis=1)
+        value = np.take_along_axis(own, place, axis=0)
+        gradient = np.take_along_axis(slope, place[None], axis=1)
         if self.first is not None:
             is_told = _one_at(place, self.first)
-            value, gradient = np.where(is_told, value, FAR), np.where(is_told, gradient, 0.0)
+            value = np.where(is_told, value, FAR)
+        gradient = np.where(value < FAR, gradient, 0.0)
 
         def bent(force: Array) -> Array:
-            is_there = place[:, None] == np.arange(cells)[:, None]
-            return _bent(shape, near, moves, total(np.where(is_there, force[:, None], 0.0)))
+            is_there = place[:, None] == np.arange(len(own))[:, None]
+            by_place = total(np.where(is_there, force[:, None], 0.0))
+            result = _bent(shape, near, moves, by_place[:n_points])
+            if len(own) > n_points:
+                result += shape.bent(total(np.moveaxis(pushes * by_place[n_points:], 2, 0)))
+            return result
 
         return WideMeasured(value, gradient, bent, place)
+
+    def _at_points(self, near: Nearest) -> Indices:
+        """The place of each side and point, (cell, batch)."""
+        n_points, n, batch = near.place.shape
+        before = n * np.arange(n_points)[:, None, None]
+        return np.asarray((near.place + before).reshape(-1, batch))
+
+    def _own(self, near: Nearest) -> Array:
+        """The gap of each side and point, (cell, batch); none where no side can touch."""
+        own = near.distance - self.obstacle.radii[:, None]
+        own = np.where(self.obstacle.is_reentrant[:, None], FAR, own)
+        return np.asarray(own.reshape(-1, own.shape[-1]))
+
+    def _at_plates(self, plates: PlateGaps, at_points: Indices) -> Indices:
+        """The place of each node and plate, (cell, batch): beyond its ends that of the corner."""
+        n = self.face.n_units
+        batch = at_points.shape[1]
+        number = len(at_points) + np.arange(plates.distance[..., 0].size)[:, None]
+        beside = np.minimum(np.arange(n + 1), n - 1)[:, None]
+        at_end = np.take_along_axis(
+            at_points, (n * plates.ends + beside).reshape(-1, batch), axis=0
+        )
+        return np.where(plates.is_over.reshape(-1, batch), number, at_end)
+
+    def touches(self, coordinates: Array) -> Touches:
+        """Where the body is touched in each cell that is at its own place, and which way."""
+        shape, body = self.face.shape(coordinates), self.obstacle
+        near = nearest(shape, body.points)
+        of_points = body.points[:, :, None] - body.radii[:, None] * near.normal
+        places, ways = ([part.reshape(2, -1, part.shape[-1])] for part in (of_points, near.normal))
+        if len(body.plates):
+            normal = plate_gaps(shape, body).normal[:, :, None]
+            nodes = shape.nodes[:, None]
+            shape_of_all = np.broadcast_shapes(normal.shape, nodes.shape)
+            for parts, values in ((places, nodes), (ways, -normal)):
+                whole = np.broadcast_to(values, shape_of_all)
+                parts.append(whole.reshape(2, -1, whole.shape[-1]))
+        return Touches(np.concatenate(places, axis=1), np.concatenate(ways, axis=1))
 
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
         first = None if self.first is None else take_lanes(self.first, index)
         return type(self)(self.face.take_lanes(index), self.obstacle.take_lanes(index), first)
+
+
+def _pushed(plates: PlateGaps) -> Array:
+    """The forces on nodes that make ∇g of each node and plate, (2, node, cell, batch)."""
+    n_plates, n_nodes, batch = plates.distance.shape
+    forces = np.zeros((2, n_nodes, n_plates, n_nodes, batch))
+    nodes = np.arange(n_nodes)
+    forces[:, nodes, :, nodes] = plates.normal
+    return forces.reshape(2, n_nodes, -1, batch)
 
 
 def _one_at(place: Indices, first: Flags) -> Flags:

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, total
-from dpgcli.equilibrium.contracts import Response, Term, take_lanes
+from dpgcli.equilibrium.contracts import OwnCoordinate, Response, Row, Term, take_lanes
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
@@ -121,6 +121,28 @@ def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
             if along.any():
                 loads.append((coordinates.center(axis, shares), whole * along))
     return tuple(Term(LOAD, measure, DeadLoad(force)) for measure, force in loads)
+
+
+def springs_merged(system: FingerCoordinates, terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    """The same energy, with the springs of single coordinates as one term that is ahead of others.
+
+    >>> import numpy as np
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> chain = Chain(uniform_finger(2, **STUDY))
+    >>> [term.kind for term in springs_merged(chain, finger_terms(chain))]
+    ['springs', 'bistable']
+    """
+    stiffness, others = np.zeros((system.size, 1)), []
+    for term in terms:
+        measure, law = term.measure, term.law
+        if isinstance(measure, OwnCoordinate) and isinstance(law, Quadratic):
+            rows = slice(measure.row.offset, None, measure.row.stride)
+            stiffness = stiffness + np.zeros(law.stiffness.shape[1])
+            stiffness[rows][: measure.n_cells] += law.stiffness
+        else:
+            others.append(term)
+    every = OwnCoordinate(Row(1, 0), system.size)
+    return Term("springs", every, Quadratic(stiffness)), *others
 
 
 def chain_potential(finger: Finger) -> FingerPotential:

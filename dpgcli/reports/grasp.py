@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
+from dpgcli.design.bodies import Body, Disc, Jaws
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import TOUCHES, Grasped
 from dpgcli.grasping.table import Grasps
@@ -20,6 +21,7 @@ from dpgcli.states.patterns import inverted_units
 
 BODY = "#DCE9F3"
 LONGEST = 0.2  # of the window: the arrow of the largest force
+PLATE = 1.6  # points: the thickness of a jaw
 SHORTEST = 4.0  # points: an arrow's head
 
 
@@ -28,9 +30,9 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     n = len(rows["pattern"])
     profile = Profile.of(found.scene)
     shapes = [_fingers(found, profile, row, rows) for row in range(n)]
-    circles = [_circle(found, row) for row in range(n)]
+    bodies = [_body(found, row) for row in range(n)]
     drawn = [finger.points for own in shapes for finger in own]
-    window = Window.of(np.concatenate([*circles, *drawn]))
+    window = Window.of(np.concatenate([*bodies, *drawn]))
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
     grid = PanelGrid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
     said = [*notes(found.scene), _said(largest)]
@@ -46,8 +48,7 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
             axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)
             axes.set_title(_title(rows, row), fontsize=TITLE_SIZE, pad=3.0)
-            circle = circles[row]
-            axes.fill(circle.real, circle.imag, facecolor=BODY, edgecolor=EDGE, lw=0.7, zorder=0)
+            _draw_body(axes, found.body, bodies[row])
             for finger in fingers:
                 draw_finger(axes, finger, POINTS / scale)
             if fingers:
@@ -59,16 +60,29 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
         foot.draw(figure, window, grid)
 
 
-def _center(found: Grasps, row: int) -> Array:
-    """Where the body is; where it was placed, if there is no answer."""
-    center = found.centers[:, row]
-    return found.body.center if np.isnan(center).any() else center
+def _moved(found: Grasps, row: int) -> Array:
+    """By how much the body has moved, (2,); not at all, if there is no answer."""
+    moved = found.centers[:, row] - found.body.center
+    return np.asarray(np.where(np.isnan(moved), 0.0, moved))
 
 
-def _circle(found: Grasps, row: int) -> Points:
-    turn = np.linspace(0.0, 2.0 * np.pi, 121)
-    points: Points = complex(*_center(found, row)) + found.body.radius * np.exp(1j * turn)
-    return points
+def _body(found: Grasps, row: int) -> Points:
+    """Points around the body."""
+    body, moved = found.body, complex(*_moved(found, row))
+    if isinstance(body, Disc):
+        turn = np.linspace(0.0, 2.0 * np.pi, 121)
+        circle: Points = complex(*body.center) + body.radius * np.exp(1j * turn) + moved
+        return circle
+    return _complex(body.corners) + moved
+
+
+def _draw_body(axes: Any, body: Body, around: Points) -> None:
+    if isinstance(body, Jaws):
+        axes.fill(around.real, around.imag, facecolor=BODY, lw=0.0, zorder=0)
+        for plate in (around[:2], around[2:]):
+            axes.plot(plate.real, plate.imag, color=EDGE, lw=PLATE, zorder=0)
+    else:
+        axes.fill(around.real, around.imag, facecolor=BODY, edgecolor=EDGE, lw=0.7, zorder=0)
 
 
 def _fingers(found: Grasps, profile: Profile, row: int, rows: Columns) -> tuple[FingerShape, ...]:
@@ -107,10 +121,10 @@ def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
     """Arrows from the places of contact into the body; `scale` in mm per N."""
     for place, frame in enumerate(found.frames):
         own, lane = found.take(place, row)
-        for side in np.flatnonzero(own.push[:, lane] > TOUCHES):
-            way = frame.outside(own.normal[:, side, lane])
-            start = _center(found, row) - found.body.radius * way
-            end = start + scale * own.push[side, lane] * way
+        for cell in np.flatnonzero(own.push[:, lane] > TOUCHES):
+            way = frame.outside(own.touches.directions[:, cell, lane])
+            start = frame.placed(own.touches.places[:, cell, lane]) + _moved(found, row)
+            end = start + scale * own.push[cell, lane] * way
             arrow = {"arrowstyle": "-|>", "color": MEASURE, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
             arrow["mutation_scale"] = SHORTEST * 2.0
             axes.annotate("", end, start, arrowprops=arrow, zorder=5)

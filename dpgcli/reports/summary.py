@@ -30,6 +30,8 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "min_barrier_mJ": True,
     "aperture_max_mm": True,
     "aperture_min_mm": False,
+    "n_grasps": True,
+    "squeeze_max_N": True,
     "n_reachable": True,
     "snap_pressure_max_MPa": False,
     "reset_pressure_min_MPa": False,

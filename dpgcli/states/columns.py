@@ -27,6 +27,7 @@ class Group(StrEnum):
     OPENINGS = "openings"
     BARRIERS = "barriers"
     GRIPPER = "gripper"
+    GRASP = "grasp"
     UNCERTAINTY = "uncertainty"
     SHARES = "uncertainty_shares"
     NODES = "nodes"

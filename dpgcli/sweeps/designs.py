@@ -36,7 +36,7 @@ def design_states(
     exactness: Exactness,
     quantities: tuple[Quantity, ...],
 ) -> Iterator[Block]:
-    """All states of a batch of designs, design by design, in blocks.
+    """All states of a batch of designs, design by design, in blocks; with a body, if there is one.
 
     A block holds up to `ROWS_AT_ONCE` states, of several designs or of one: how long one is cut
     depends on its number of units alone.
@@ -56,7 +56,8 @@ def design_states(
             dropped[lanes],
             has_bars=not exactness.drops_bars,
         )
-        return solved_rows(_designs(units, lanes), inverted, request)
+        found = solved_rows(_designs(units, lanes), inverted, request)
+        return found | _with_body(scene, units, around, lanes, np.tile(codes, len(designs)))
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
@@ -74,6 +75,19 @@ def design_states(
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
             yield Block(designs, rows, metrics.columns() if is_last else None)
+
+
+def _with_body(
+    scene: Scene, units: UnitSolutions, around: Surroundings, lanes: Indices, codes: Codes
+) -> Columns:
+    """What states (lane,) do with the body, none without one."""
+    if scene.body is None:
+        return {}
+    from dpgcli.sweeps.grasps import Encounter, grasp_rows
+
+    layer, gripper = np.asarray(around.layer_thickness), around.gripper
+    body = scene.body.take_lanes(lanes)
+    return grasp_rows(Encounter(_designs(units, lanes), layer, gripper, body, scene.held), codes)
 
 
 def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Columns, Flags, Indices, distinct, keep_freed_memory
 from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.outputs import Trust
-from dpgcli.design.resolve import resolve
+from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import ORIGINS, Scene
 from dpgcli.states.accuracy import exactnesses
 from dpgcli.states.columns import Column, Group, Kind
@@ -61,12 +61,22 @@ class DesignEvaluation:
     @property
     def groups(self) -> frozenset[Group]:
         gripper = {Group.GRIPPER} if self.base.gripper else set()
-        return frozenset({Group.STATES, Group.STIFFNESS, *gripper})
+        grasp = set() if self.base.body is None else {Group.GRASP}
+        return frozenset({Group.STATES, Group.STIFFNESS, *gripper, *grasp})
 
     @property
     def state_columns(self) -> tuple[Column, ...]:
         """Columns of the table of states: the design, its values, what `predict` gives."""
-        return (DESIGN, *self.values.values(), CALIBRATION, *self.quantities)
+        return (DESIGN, *self.values.values(), CALIBRATION, *self.quantities, *self._of_body)
+
+    @property
+    def _of_body(self) -> tuple[Column, ...]:
+        """The columns of states about the body, none without one."""
+        if self.base.body is None:
+            return ()
+        from dpgcli.sweeps.grasps import grasp_columns
+
+        return grasp_columns(is_pair=bool(self.base.gripper))
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -78,7 +88,12 @@ class DesignEvaluation:
     def design_columns(self) -> tuple[Column, ...]:
         """Columns of the table of designs."""
         has_pressure = self.base.pressure is not None
-        every = (c for c in METRICS if c.group in self.groups)
+        of_body = {"", *(column.name for column in self._of_body)}
+        every = (
+            c
+            for c in METRICS
+            if c.group in self.groups and (c.group is not Group.GRASP or c.over in of_body)
+        )
         metrics = (c for c in every if has_pressure or not c.needs_pressure)
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
@@ -126,9 +141,25 @@ class DesignEvaluation:
                 issues = found.problems.of(index)
                 reasons[int(places[index])] = "; ".join(issue.statement for issue in issues)
             right = np.flatnonzero(~found.are_wrong)
+            obstacle = self._reasons_against_bodies(found, right)
+            reasons |= {int(places[index]): why for index, why in obstacle.items()}
+            right = right[~np.isin(right, [*obstacle])]
             origins[places[right]] = found.gravest_origins[right]
             batches += [(places[alike], found.batch(alike)) for alike in found.alike(right)]
         return batches, origins, reasons
+
+    def _reasons_against_bodies(self, found: Resolution, designs: Indices) -> dict[int, str]:
+        """Why fingers of some designs cannot meet their body, by design."""
+        if self.base.body is None or not len(designs):
+            return {}
+        from dpgcli.grasping.frames import begins_in_base
+
+        scene = found.batch(designs)
+        if scene.layer_thickness is None:
+            return dict.fromkeys(designs.tolist(), NO_FACE)
+        assert scene.body is not None, "the base has one"
+        begin = begins_in_base(scene, scene.body)
+        return dict.fromkeys(designs[begin].tolist(), IN_BASE)
 
     def _designs(self, values: DesignValues, places: Indices) -> Iterator[tuple[Indices, Design]]:
         """The designs at some places, by their number of units."""
@@ -181,7 +212,10 @@ class DesignEvaluation:
         allowed = self.allowed(values)
         right = allowed & self._are_possible(values)
         for places, design in self._designs(values, np.flatnonzero(right)):
-            right[places] = ~resolve(design).are_wrong
+            found = resolve(design)
+            possible = ~found.are_wrong
+            possible[[*self._reasons_against_bodies(found, np.flatnonzero(possible))]] = False
+            right[places] = possible
         return allowed, right
 
     def reason(self, values: DesignValues) -> str:
@@ -260,6 +294,12 @@ class DesignEvaluation:
         rows["reason"] = reason
         return {column.name: rows[column.name] for column in self.design_columns}
 
+
+NO_FACE = (
+    "finger.geometry.limiting_layer_thickness_mm: expected a thickness where there is a body: the "
+    "face of a finger is half of it inside the lattice"
+)
+IN_BASE = "object: begins in the base of a finger: move it along x, or take a smaller one"
 
 DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
 CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)

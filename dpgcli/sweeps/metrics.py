@@ -51,7 +51,9 @@ class Metrics:
     n_designs: int
     pressure: Pressure | None = None
     n_stable: Indices = field(init=False)
+    n_grasps: Indices | None = field(init=False, default=None)  # None without bodies
     extremes: dict[str, Array] = field(init=False, default_factory=dict)
+    n_told: dict[str, Indices] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.n_stable = np.zeros(self.n_designs, np.int64)
@@ -67,14 +69,22 @@ class Metrics:
         self.n_stable += stable.sum(axis=1)
         for metric in METRICS:
             if metric.over in block:
-                self._extend(metric, block[metric.over], stable)
+                is_told = stable & self._is_known(metric, block[metric.over])
+                self._extend(metric, block[metric.over], is_told)
+        if "n_contacts" in block:
+            n_before = 0 if self.n_grasps is None else self.n_grasps
+            self.n_grasps = n_before + (stable & (block["n_contacts"] > 0)).sum(axis=1)
         self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
     def columns(self) -> Columns:
         """One row per design; NaN where it has no stable state."""
         known = (m for m in METRICS if not m.over or m.name in self.extremes)
-        has_pressure = self.pressure is not None
-        return {m.name: m.of(self) for m in known if has_pressure or not m.needs_pressure}
+        has_pressure, has_bodies = self.pressure is not None, self.n_grasps is not None
+        return {
+            m.name: m.of(self)
+            for m in known
+            if (has_pressure or not m.needs_pressure) and (has_bodies or m.group is not Group.GRASP)
+        }
 
     @cached_property
     def pressed(self) -> "PressedDesigns":
@@ -86,7 +96,7 @@ class Metrics:
 
     def extreme(self, name: str) -> Array:
         """The extreme of a metric that is one, (design,)."""
-        return np.where(self.n_stable > 0, self.extremes[name], np.nan)
+        return np.where(self.n_told[name] > 0, self.extremes[name], np.nan)
 
     def alike(self, value: int | Array) -> Array | Indices:
         """A value of each design, or one for all, as (design,)."""
@@ -104,7 +114,15 @@ class Metrics:
             area[designs] = np.where(found > rounding, found, 0.0)
         return area
 
+    @staticmethod
+    def _is_known(metric: Metric, values: Array) -> Flags:
+        """Values that count: a state without a grasp has none of that group."""
+        is_of_grasp = metric.group is Group.GRASP
+        return ~np.isnan(values) if is_of_grasp else np.ones(values.shape, bool)
+
     def _extend(self, metric: Metric, values: Array, stable: Flags) -> None:
+        n_before = self.n_told.get(metric.name, 0)
+        self.n_told[metric.name] = n_before + stable.sum(axis=1)
         worst = np.inf if metric.extreme is np.minimum else -np.inf
         found = metric.extreme.reduce(np.where(stable, values, worst), axis=1)
         known = self.extremes.get(metric.name, found)
@@ -126,8 +144,9 @@ def _count(
     description: str,
     of: Callable[[Metrics], Array | Indices],
     outputs: tuple[Output, ...] = (),
+    group: Group = Group.STATES,
 ) -> Metric:
-    return Metric(name, "", description, kind=Kind.COUNT, outputs=outputs, of=of)
+    return Metric(name, "", description, group, Kind.COUNT, outputs=outputs, of=of)
 
 
 def _least(
@@ -284,6 +303,29 @@ METRICS = (
         of=lambda m: m.alike(barriers(m.units.finger, m.units.wells)),
     ),
     *UNDER_PRESSURE,
+    _count(
+        "n_grasps",
+        "states that touch the body, at rest",
+        lambda m: m.alike(0) if m.n_grasps is None else m.n_grasps,
+        (Output.SHAPES, Output.FORCES),
+        Group.GRASP,
+    ),
+    _most(
+        "squeeze_max_N",
+        "N",
+        "largest closing force between the fingers of any state",
+        "squeeze_N",
+        Output.FORCES,
+        group=Group.GRASP,
+    ),
+    _most(
+        "contact_max_N",
+        "N",
+        "largest force at one place of any state",
+        "max_contact_N",
+        Output.FORCES,
+        group=Group.GRASP,
+    ),
     _most("max_residual_N", "N", "largest unbalanced force of any state", "residual_N"),
     _most(
         "max_numerical_error_mm", "mm", "largest numerical error of any tip", "numerical_error_mm"

@@ -46,10 +46,11 @@ def test_draws_in_a_batch_do_what_each_does_by_itself(
 ) -> None:
     """By ranges of peaks, and followed through the pulses: all together, and one by one."""
     pulses, reach = plan
-    together = followed(draws, LINE, pulses)
+    together = followed(draws, LINE, pulses, np.zeros(N, np.int64))
     by_ranges = are_led(draws, LINE, pulses, ranges_of(draws, LINE, reach, pulses))
     some = [0, *np.flatnonzero(together[0] != together[1])[:4], N - 2, N - 1]
-    alone = [followed(draws.take_lanes(np.array([k])), LINE, pulses)[:, 0] for k in some]
+    zero = np.zeros(1, np.int64)
+    alone = [followed(draws.take_lanes(np.array([k])), LINE, pulses, zero)[:, 0] for k in some]
     assert np.array_equal(together, by_ranges)
     assert np.array_equal(together[:, some], np.array(alone).T)
     assert together[:, -2:].tolist() == [[False, False], [True, False]]  # the first is not needed
@@ -69,7 +70,7 @@ def test_a_window_is_where_so_many_draws_do_it(
 
     def done(pulse: Pulse, peak: float) -> int:
         one = Pulse(0, peak, 0.0, 0.0, pulse.source, pulse.target, False)
-        return int(followed(draws, LINE, [one])[0].sum())
+        return int(followed(draws, LINE, [one], np.full(N, pulse.source))[0].sum())
 
     assert done(first, low * (1.0 + 1e-9)) >= 0.6 * N > done(first, low * (1.0 - 1e-6))
     begins, ends = found.windows[1]

@@ -13,6 +13,7 @@ from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
     Extended,
+    Multiplied,
     Slack,
     multiplier_term,
 )
@@ -133,7 +134,7 @@ def lagrangian(
     return LoadedPotential(
         system,
         terms,
-        Slack(gaps, size),
+        Slack(gaps, size, Multiplied.of(np.ones((n, 1), bool))),
         law,
         Each(size),
         np.ones((size, 1)),
@@ -311,7 +312,7 @@ def test_lanes_taken(dense: Callable[[Array], Array]) -> None:
     family = LoadedPotential(
         system,
         (*bare, multiplier_term(system)),
-        Slack(gaps, 4),
+        Slack(gaps, 4, Multiplied.of(np.ones((2, 3), bool))),
         law,
         followed,
         one,

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Codes
-from dpgcli.design.scene import Disc, Gripper, Scene
+from dpgcli.design.bodies import Disc
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import grasp
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, described, placed

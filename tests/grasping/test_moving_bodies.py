@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import minimize
 
 from dpgcli.arrays import Array
-from dpgcli.design.scene import Disc, Gripper, Held, Scene
+from dpgcli.design.bodies import Disc
+from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import frames

@@ -15,6 +15,7 @@ from dpgcli.design import dimensions
 from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
+from dpgcli.design.scene import Held
 from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.loads import LoadsSpec
 from dpgcli.files.scene_file.objects import ObjectSpec
@@ -168,6 +169,8 @@ class Spec(Section):
             pressure=None if self.pressure is None else self.pressure.known,
             hinge_coupling=None if coupling is None else np.array([coupling], float),
             loads=None if self.loads is None else self.loads.known,
+            body=None if self.object is None else self.object.known,
+            held=Held.FIXED if self.object is None else Held(self.object.held),
         )
 
 

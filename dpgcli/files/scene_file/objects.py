@@ -1,19 +1,33 @@
 """The keys of a spec's object, their types and their meaning."""
 
+from collections.abc import Iterator
+from itertools import combinations
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from dpgcli.design.scene import Disc
+from dpgcli.design.bodies import PLACES, Body, Disc, Jaws, Polygon
+from dpgcli.design.problems import Issue
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import Positive, Section
+from dpgcli.text import KeyPath
 
-PLACE = "at_mm"
+PLACE, POLYGON = "at_mm", "polygon"
+KINDS = ("disc", "jaws", POLYGON)
+MOST_CORNERS = 64
 EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
+    **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
+    POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
+LATER = ("compliance", "friction", "mass_g")  # keys of objects that nothing is made of yet
+NOT_YET = "not there yet: leave it out"
+
+Corner = list[float]
+Side = tuple[Corner, Corner]
+TwoNumbers = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
 
 
 class DiscSpec(Section):
@@ -22,13 +36,38 @@ class DiscSpec(Section):
     diameter_mm: Positive = Field(description="Its diameter, in mm.")
 
 
-class ObjectSpec(Section):
-    """A body between the fingers, for dpg grasp."""
+class JawsSpec(Section):
+    """Two flat plates along x, which fingers meet from outside."""
 
-    disc: DiscSpec = Field(description="A round body, such as a can.")
-    at_mm: Annotated[list[Bounded], Field(min_length=2, max_length=2)] = Field(
+    gap_mm: Positive = Field(description="Distance of the plates from each other, in mm.")
+    height_mm: Positive = Field(
+        description="Length of the plates along x, in mm: half of it on either side of at_mm."
+    )
+
+
+class ObjectSpec(Section):
+    """A body between the fingers, for dpg grasp: a disc, jaws or a polygon."""
+
+    disc: DiscSpec | None = Field(default=None, description="A round body, such as a can.")
+    jaws: JawsSpec | None = Field(
+        default=None, description="Two flat plates along x, as those of a mechanism."
+    )
+    polygon: Annotated[list[TwoNumbers], Field(min_length=3, max_length=MOST_CORNERS)] | None = (
+        Field(
+            default=None,
+            description="A body with straight sides: its corners one after the other, x and y in "
+            "mm from at_mm.",
+        )
+    )
+    at_mm: TwoNumbers = Field(
         description="Where its center is in the gripper's frame, in mm: between the bases, x along "
         "the fingers; of a finger alone in its own frame."
+    )
+    at_x_mm: Bounded | None = Field(
+        default=None, description="Its part along x, in mm, instead of that in at_mm."
+    )
+    at_y_mm: Bounded | None = Field(
+        default=None, description="Its part along y, in mm, instead of that in at_mm."
     )
     held: Literal["fixed", "guided", "free"] = Field(
         default="fixed",
@@ -36,6 +75,76 @@ class ObjectSpec(Section):
     )
 
     @property
-    def known(self) -> Disc:
+    def known(self) -> Body:
         """The value that it stands for."""
-        return Disc(np.array(self.at_mm, float), 0.5 * self.disc.diameter_mm)
+        own = (self.at_x_mm, self.at_y_mm)
+        at = [said if part is None else part for said, part in zip(self.at_mm, own, strict=True)]
+        center = np.array(at, float)
+        if self.jaws is not None:
+            return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm)
+        if self.polygon is not None:
+            return Polygon(center, np.array(self.polygon, float).T)
+        assert self.disc is not None, "one of the three"
+        return Disc(center, 0.5 * self.disc.diameter_mm)
+
+    @property
+    def issues(self) -> list[Issue]:
+        """What is wrong between its keys; paths begin with the object's own keys."""
+        said = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(said) != 1:
+            found = " and ".join(said) or "none of them"
+            return [Issue((), "one of disc, jaws and polygon", found)]
+        return list(_wrong_sides(self.polygon or []))
+
+
+def _wrong_sides(corners: list[Corner]) -> Iterator[Issue]:
+    """Sides of a polygon without a length, or if there are none those that cross each other."""
+    sides = list(zip(corners, [*corners[1:], *corners[:1]], strict=True))
+    path: KeyPath = (POLYGON,)
+    is_any = False
+    for number, (start, end) in enumerate(sides):
+        if start == end:
+            is_any = True
+            yield Issue((*path, number), "sides with a length", f"{_side(number, sides)} of 0 mm")
+    for (one, a), (other, b) in combinations(enumerate(sides), 2):
+        are_next = other - one in (1, len(sides) - 1)
+        if not is_any and (_folds_back(a, b) if are_next else _meet(a, b)):
+            found = f"{_side(one, sides)} crosses {_side(other, sides)}"
+            yield Issue(path, "a polygon that does not cross itself", found, "list corners in turn")
+
+
+def _side(number: int, sides: list[Side]) -> str:
+    return f"side {number + 1}-{(number + 1) % len(sides) + 1}"
+
+
+def _meet(one: Side, other: Side) -> bool:
+    """Whether two segments have a point in common."""
+    turns = (
+        [_turn(one, point) for point in other],
+        [_turn(other, point) for point in one],
+    )
+    if all(first * second < 0.0 for first, second in turns):
+        return True
+    ends = [(one, point) for point in other] + [(other, point) for point in one]
+    return any(_turn(side, point) == 0.0 and _is_beside(side, point) for side, point in ends)
+
+
+def _folds_back(one: Side, other: Side) -> bool:
+    """Whether a side lies on its neighbor."""
+    shared = next(point for point in one if point in other)
+    (a,), (b,) = ([p for p in side if p != shared][:1] for side in (one, other))
+    lies_on = _is_beside((shared, b), a) or _is_beside((shared, a), b)
+    return _turn((a, shared), b) == 0.0 and lies_on
+
+
+def _turn(side: Side, point: Corner) -> float:
+    """Twice the area of a triangle, positive where the point is to the left of a side."""
+    (x0, y0), (x1, y1) = side
+    return (x1 - x0) * (point[1] - y0) - (y1 - y0) * (point[0] - x0)
+
+
+def _is_beside(side: Side, point: Corner) -> bool:
+    """Whether a point on the line of a segment is on it."""
+    (x0, y0), (x1, y1) = side
+    is_within = min(x0, x1) <= point[0] <= max(x0, x1)
+    return is_within and min(y0, y1) <= point[1] <= max(y0, y1)

@@ -1,10 +1,12 @@
 """From data to a checked spec: every mistake located, worded and given a hint."""
 
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
 
 from pydantic import ValidationError
 
+from dpgcli.design.bodies import PLACES
 from dpgcli.design.dimensions import (
     LARGEST,
     MAX_UNITS,
@@ -25,7 +27,7 @@ from dpgcli.files.scene_file.models import (
     UnitOverride,
 )
 from dpgcli.files.scene_file.pressure import EXPECTED, PressureSpec, UnitPressure, expected_at
-from dpgcli.files.scene_file.scenes import early_issues
+from dpgcli.files.scene_file.scenes import body_issues, early_issues
 from dpgcli.files.scene_file.tolerances import Tolerances
 from dpgcli.files.sections import (
     Geometry,
@@ -53,6 +55,7 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("loads",): loads.LoadsSpec,
     ("object",): objects.ObjectSpec,
     ("object", "disc"): objects.DiscSpec,
+    ("object", "jaws"): objects.JawsSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -89,12 +92,16 @@ HINTS = {
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
 OBJECT: KeyPath = ("object",)
+LISTS = ((*OBJECT, objects.PLACE), (*OBJECT, objects.POLYGON))
 TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
-PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE, objects.POLYGON)
 MAPPINGS = ("overrides", *EXPECTED)
 MOST_SHOWN = 6  # parts of a list
 WHOLE = (("data",), ("loads",))  # sections whose values may be lists
-BOUNDED = ("units", "force_linearity", "mounting_angle_deg", *loads.LoadsSpec.model_fields)
+BOUNDED = (
+    *("units", "force_linearity", "mounting_angle_deg"),
+    *(*loads.LoadsSpec.model_fields, *PLACES),
+)
 OUT_OF_RANGE = f"from {SMALLEST:g} to {LARGEST:g}; {STIFFEST:g} for the linear stiffness"
 
 
@@ -108,12 +115,32 @@ def checked(document: Document) -> Spec:
     if spec is None or problems:
         found = early_issues(document.data)
     else:
-        found = spec.resolution.problems.of(0)
+        found = [*spec.resolution.problems.of(0), *body_issues(spec.object)]
     problems += [document.problem(*issue) for issue in found]
     if spec is None or problems:
         own_first = sorted(problems, key=lambda problem: problem.file != document.file)
         raise SpecError(in_order(own_first))
     return spec
+
+
+def checked_object(document: Document) -> objects.ObjectSpec:
+    """The body in a document of its own, with the keys of a spec's object. Raises SpecError."""
+    inner = replace(
+        document,
+        data={"object": document.data},
+        places={(*OBJECT, *path): place for path, place in document.places.items()},
+    )
+    problems = list(document.problems)
+    try:
+        found = objects.ObjectSpec.model_validate(document.data)
+        problems += [inner.problem(*issue) for issue in body_issues(found)]
+    except ValidationError as error:
+        told = error.errors(include_url=False)
+        problems += [_problem(inner, {**e, "loc": (*OBJECT, *e["loc"])}) for e in told]
+    if problems:
+        own = [replace(p, key=p.key.removeprefix("object.")) for p in problems]
+        raise SpecError(in_order(own))
+    return found
 
 
 def checked_keys(document: Document) -> Spec:
@@ -146,7 +173,7 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    is_whole = path[:1] in WHOLE or path[:2] == (*OBJECT, objects.PLACE)
+    is_whole = path[:1] in WHOLE or path[:2] in LISTS
     is_said = error["type"] not in ("extra_forbidden", "missing")
     if is_whole and is_said and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
@@ -203,8 +230,6 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
         return "units such as 4 or 4-5", dotted(path), "count from the base"
     if path[:1] == UNCERTAINTY:
         return "a key that designs can differ in", dotted(path), "the tables have no uncertainties"
-    if path[:1] == OBJECT:
-        return "a key that designs can differ in", dotted(path), "sweeps have no body: dpg grasp"
     parent, pattern = _pattern(path[:-1]), _pattern(path)
     if pattern in SECTIONS or str(path[-1]) in (*MAPPINGS, *TEXTS, *PAIRS):
         return "the key of a number", dotted(path), "name the number itself"
@@ -221,6 +246,8 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
 def _unknown(path: KeyPath) -> tuple[str, str, str]:
     """Expected, found and hint for a key that is not known where it stands."""
     key, parent = str(path[-1]), _pattern(path[:-1])
+    if parent == OBJECT and key in objects.LATER:
+        return "a known key", dotted((key,)), objects.NOT_YET
     known = list(SECTIONS[parent].model_fields)
     if "overrides" in parent and key in SHARED:
         why = "segment height is shared by neighboring units: set it for the whole finger"

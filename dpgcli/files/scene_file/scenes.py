@@ -14,6 +14,7 @@ from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import SpecError
 from dpgcli.files.places import Location, located
 from dpgcli.files.scene_file.models import Spec
+from dpgcli.files.scene_file.objects import ObjectSpec
 from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.text import dotted
 
@@ -21,7 +22,7 @@ from dpgcli.text import dotted
 def scene_of(spec: Spec) -> Scene:
     """The scene that a spec describes. Raises SpecError, without lines, if keys disagree."""
     resolution = spec.resolution
-    if found := resolution.problems.of(0):
+    if found := [*resolution.problems.of(0), *body_issues(spec.object)]:
         place = Location("spec")
         raise SpecError(tuple(located(place, dotted(issue.path), *issue[1:]) for issue in found))
     scene = resolution.scene()
@@ -30,18 +31,33 @@ def scene_of(spec: Spec) -> Scene:
     return replace(scene, body=spec.object.known, held=Held(spec.object.held))
 
 
+def body_issues(spec: ObjectSpec | None) -> list[Issue]:
+    """What is wrong between the keys of an object, if there is one."""
+    own = [] if spec is None else spec.issues
+    return [issue._replace(path=("object", *issue.path)) for issue in own]
+
+
 def early_issues(data: Any) -> list[Issue]:
     """Cross-key problems of data whose keys are not all right by themselves."""
-    finger = data.get("finger") if isinstance(data, dict) else None
-    if not isinstance(finger, dict):
+    if not isinstance(data, dict):
         return []
+    of_body = _early_body_issues(data.get("object"))
+    finger = data.get("finger")
+    if not isinstance(finger, dict):
+        return of_body
     overrides, units = finger.get("overrides"), finger.get("units")
     known: int | None = None
     if isinstance(units, int) and not isinstance(units, bool) and 1 <= units <= MAX_UNITS:
         known = units
     largest = known or MAX_UNITS  # the largest allowed one as long as it is not known
     found = range_issues(largest, map(str, overrides)) if isinstance(overrides, dict) else []
-    return [*found, *(_line_issues(data.get("pressure"), known) if known else ())]
+    return [*found, *of_body, *(_line_issues(data.get("pressure"), known) if known else ())]
+
+
+def _early_body_issues(said: Any) -> list[Issue]:
+    with suppress(ValidationError):
+        return [] if said is None else body_issues(ObjectSpec.model_validate(said))
+    return []
 
 
 def _line_issues(pressure: Any, n_units: int) -> Iterator[Issue]:

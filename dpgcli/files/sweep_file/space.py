@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
-OPTIONAL = ("gripper", "loads", "pressure")  # sections that a base may leave out
+OPTIONAL = ("gripper", "loads", "object", "pressure")  # sections that a base may leave out
 ASIDE = ("uncertainty", "model_error")  # sections that a sweep leaves aside
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs, or a folder of such"

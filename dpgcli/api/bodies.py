@@ -1,0 +1,95 @@
+"""Bodies as arguments: texts such as "disc:40", files, places; and which of them can be grasped."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dpgcli.api.inputs import SceneInput, check_texts, path_of, point
+from dpgcli.arrays import Array
+from dpgcli.design.bodies import Body, Disc, Jaws
+from dpgcli.design.scene import Held, Scene
+from dpgcli.errors import Field, UsageError
+from dpgcli.files.scene_file.objects import ObjectSpec
+from dpgcli.files.scene_file.problems import checked_object
+from dpgcli.files.yaml_file import read_document
+from dpgcli.grasping.frames import begins_in_base
+from dpgcli.text import number_in, shortened
+
+SMALLEST, LARGEST = 1e-3, 1e4  # mm: of what a text says
+JAW_HEIGHT = 40.0  # mm, unless the text says it
+SUFFIXES = (".yaml", ".yml")
+KINDS = (
+    "expected disc and its diameter in mm such as disc:40, jaws and their gap such as jaws:30 or "
+    f"jaws:30x40 with their height, each from {SMALLEST:g} to {LARGEST:g}, or a .yaml file"
+)
+
+
+def with_body(given: SceneInput, said: str | None, at: Sequence[float] | None) -> SceneInput:
+    """The same with the body of these arguments, or of its own.
+
+    A text says what it is or names a file of the keys of `object`; `at` is its place. Raises
+    UsageError for what is no body, SpecError for a wrong file.
+    """
+    check_texts(object=said)
+    scene, known = given.scene, given.scene.body
+    if said is None and known is None:
+        raise UsageError(
+            Field("object"), ": expected a body such as disc:40, here or as object in the spec"
+        )
+    place = None if at is None else np.array(point("at", at))
+    if known is not None and said is None:
+        body = known if place is None else replace(known, center=place)
+        return replace(given, scene=replace(scene, body=body))
+    if known is not None and place is None:
+        place = known.center
+    said = str(said)
+    if said.lower().endswith(SUFFIXES):
+        spec, path = _of_file(said, place), Path(said)
+        body = spec.known if at is None else replace(spec.known, center=_known(place))
+        held = Held(spec.held) if "held" in spec.model_fields_set else scene.held
+        files = (*given.files, path.absolute())
+        return replace(given, scene=replace(scene, body=body, held=held), files=files)
+    return replace(given, scene=replace(scene, body=_of_text(said, place)))
+
+
+def _of_file(name: str, place: Array | None) -> ObjectSpec:
+    """The keys in a file, which may leave its place to others."""
+    document = read_document(path_of("object", name))
+    if "at_mm" not in document.data:
+        document = replace(document, data={**document.data, "at_mm": _known(place).tolist()})
+    return checked_object(document)
+
+
+def _known(place: Array | None) -> Array:
+    if place is None:
+        raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
+    return place
+
+
+def _of_text(said: str, place: Array | None) -> Body:
+    kind, _, sizes = said.partition(":")
+    numbers = [number_in(size) for size in sizes.split("x")]
+    is_known = len(numbers) in {"disc": (1,), "jaws": (1, 2)}.get(kind, ())
+    if not is_known or not all(SMALLEST <= size <= LARGEST for size in numbers):
+        raise UsageError(Field("object"), f" {shortened(said)}: {KINDS}")
+    if kind == "disc":
+        return Disc(_known(place), 0.5 * numbers[0])
+    gap, height = (*numbers, JAW_HEIGHT)[:2]
+    return Jaws(_known(place), gap, height)
+
+
+def check_body(scene: Scene, body: Body) -> None:
+    """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
+    if scene.layer_thickness is None:
+        raise UsageError(
+            "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
+            "half of it inside the lattice"
+        )
+    if begins_in_base(scene, body).any():
+        raise UsageError(
+            Field("at"),
+            f" {body.center[0]:g},{body.center[1]:g}: {body.name} there begins in the base of a "
+            "finger: move it along x, or take a smaller one",
+        )

@@ -1,0 +1,226 @@
+"""`jaws`: what the states of a gripper bear as jaws between its fingers open and close."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dpgcli.api.bodies import check_body
+from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    as_texts,
+    check_numbers,
+    figure_path,
+    path_of,
+    point,
+    scene_input,
+    table_path,
+)
+from dpgcli.api.tables import Table
+from dpgcli.arrays import Columns, keep_freed_memory
+from dpgcli.design.bodies import Jaws
+from dpgcli.design.outputs import Output
+from dpgcli.design.scene import Scene
+from dpgcli.errors import Field, UsageError
+from dpgcli.grasping.frames import frames
+from dpgcli.grasping.jaw_table import COLUMNS, PATH_COLUMNS, by_number, jaw_rows, path_rows
+from dpgcli.grasping.jaws import JawPath, jaw_path
+from dpgcli.grasping.mechanism import STUDY, Branch, Mechanism
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import select
+from dpgcli.text import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HEIGHT = 40.0  # mm, of jaws that the spec says nothing of
+NARROWEST, WIDEST = 1e-3, 1e4  # mm
+
+
+@dataclass(frozen=True)
+class JawsResult:
+    """What each state bears as jaws open and close, and its force by their aperture."""
+
+    given: SceneInput
+    jaws: Jaws
+    path: JawPath
+
+    @property
+    def n_units(self) -> int:
+        """Units of a finger."""
+        return self.given.scene.finger.n_units
+
+    @cached_property
+    def rows(self) -> Columns:
+        """A row for each state, by column."""
+        return jaw_rows(self.path, self.n_units)
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each state."""
+        return Table.of(COLUMNS, self.rows)
+
+    @cached_property
+    def curves(self) -> Table:
+        """Force by aperture: a row for each state and step."""
+        return Table.of(PATH_COLUMNS, path_rows(self.path, self.n_units))
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """Force by the number of inverted units, the study's mechanism, what forces rest on."""
+        return tuple(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        n_lost = int((self.rows["status"] != Status.STABLE).sum())
+        for number, n, least, most in by_number(self.rows):
+            held = f"{least:.4g} N" if n == 1 else f"{least:.4g} to {most:.4g} N"
+            yield f"F{number}, {counted(number, 'unit')} inverted: {held} ({counted(n, 'state')})"
+        if n_lost:
+            yield f"{counted(n_lost, 'state')} without an answer: see the column status"
+        yield from self._mechanism()
+        for trust in self.given.scene.trusts:
+            if trust.output is Output.FORCES:
+                yield f"forces: {trust.basis_text}, {trust.source}; error {trust.known_error}"
+                if trust.doubt:
+                    yield f"warning: {trust}"
+        yield from (f"warning: {warning}" for warning in self.given.scene.warnings)
+
+    def _mechanism(self) -> Iterator[str]:
+        """The study's two forces: one fitted, the other predicted, if both states are there."""
+        lanes = {text: lane for lane, text in enumerate(self.rows["pattern"])}
+        if not all(pattern in lanes for pattern in STUDY):
+            return
+        (known, force), (other, measured) = STUDY.items()
+        rest = float(self.jaws.gap)
+        fitted = Mechanism.fitted(Branch.of(self.path, lanes[known]), rest, force)
+        if fitted is None:
+            yield (
+                f"the study's mechanism, at rest at {rest:g} mm: {known} does not hold its "
+                f"{force} N before a unit resets or the mechanism is at rest"
+            )
+            return
+        told = fitted.force(Branch.of(self.path, lanes[other]))
+        said = "no rest before a unit resets"
+        if told is not None:
+            said = f"{told:.3g} N, {100.0 * (told / measured - 1.0):+.0f} %"
+        yield (
+            f"the study's mechanism, at rest at {rest:g} mm (assumed), {fitted.stiffness:.3g} N/mm "
+            f"fitted to the {force} N of {known}: {other} holds {said} (study: {measured} N)"
+        )
+
+    def to_arrow(self) -> Any:
+        """The rows as a `pyarrow.Table`."""
+        return self.table.to_arrow()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The rows as a `pandas.DataFrame`."""
+        return self.table.to_pandas()
+
+    def save(self, path: str | Path) -> None:
+        """Write force by aperture to a Parquet file, the bytes of `dpg grasp --jaws --output`.
+
+        Raises OutputError, and UsageError for a file that was read or a name of another format.
+        """
+        from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_rows import write_scene_rows
+
+        table = path_of("path", path)
+        check_outputs(self.given.files, (table, Mark.TABLE))
+        rows = path_rows(self.path, self.n_units)
+        write_scene_rows(table_path(table), self.given.scene, self.given.json, PATH_COLUMNS, rows)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw force by aperture, and by the number of inverted units, to a .svg or .png file."""
+        from dpgcli.reports.jaws import draw_jaws
+
+        if len(self.path.codes) > MOST_DRAWN:
+            n = len(self.path.codes)
+            what = f" draws at most {MOST_DRAWN} states, not {n:,}: select with "
+            raise UsageError(Field("plot"), what, Field("patterns"))
+        draw_jaws(self.given.scene, self.path, self.rows, figure_path(path))
+
+
+def jaws(
+    spec: SpecInput,
+    *,
+    gaps: Sequence[float],
+    at: Sequence[float] | None = None,
+    patterns: str | Sequence[str] = "*",
+    settings: Settings = (),
+) -> JawsResult:
+    """What the states of a gripper bear as jaws open from one aperture to another, and close again.
+
+    `gaps` are the two apertures in mm, `at` is the middle of the jaws (mm) in the gripper's frame;
+    their height along the fingers and their aperture at rest are those of the spec's object, or
+    40 mm and the wider of the two. Both fingers are in the same state. Raises SpecError for a
+    wrong spec, UsageError for what is no gripper, pattern or aperture.
+
+    >>> from dpgcli.design.scene import Gripper, Scene
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> finger = uniform_finger(3, **STUDY)
+    >>> gripper = Scene(finger, (), Gripper(base_spacing=30.0, mounting_angle=0.0), 1.5)
+    >>> found = jaws(gripper, gaps=(10.0, 26.0), at=(30.0, 0.0), patterns="111")
+    >>> found.table["pattern"].tolist(), len(found.curves["squeeze_N"])
+    (['111'], 101)
+    """
+    return jaws_of(scene_input(spec, settings), gaps, at, as_texts("patterns", patterns))
+
+
+def jaws_of(
+    given: SceneInput,
+    gaps: Sequence[float],
+    at: Sequence[float] | None,
+    patterns: Sequence[str],
+) -> JawsResult:
+    """The same, of what was read before."""
+    scene = given.scene
+    body, (first, last) = body_of(scene, gaps, at)
+    selection = select(patterns, scene.finger.n_units)
+    if len(selection) > MOST_LANES:
+        raise UsageError(
+            Field("patterns"), f": {len(selection):,} states, expected at most {MOST_LANES:,}"
+        )
+    keep_freed_memory()
+    codes = selection.codes(0, len(selection))
+    upper = frames(scene.gripper)[0]
+    return JawsResult(
+        given, body, jaw_path(scene, chain_potential, body, upper, codes, (first, last))
+    )
+
+
+def body_of(
+    scene: Scene, gaps: Sequence[float], at: Sequence[float] | None
+) -> tuple[Jaws, tuple[float, float]]:
+    """The jaws at rest, and the two apertures. Raises UsageError for what is none."""
+    if scene.gripper is None:
+        raise UsageError(Field("gaps"), ": jaws need a gripper in the spec")
+    try:
+        first, last = (float(gap) for gap in gaps)
+    except (TypeError, ValueError):
+        raise UsageError(Field("gaps"), ": expected two apertures in mm, such as 10:60") from None
+    check_numbers(gaps=first)
+    check_numbers(gaps=last)
+    if not (min(first, last) >= NARROWEST and max(first, last) <= WIDEST and first != last):
+        raise UsageError(
+            Field("gaps"),
+            f" {first:g}:{last:g}: expected two apertures from {NARROWEST:g} to {WIDEST:g} mm",
+        )
+    known = scene.body if isinstance(scene.body, Jaws) else None
+    if at is None and scene.body is None:
+        raise UsageError(Field("at"), ": expected the middle of the jaws in mm, such as 40,0")
+    center = scene.body.center if at is None and scene.body is not None else point("at", at or ())
+    height = HEIGHT if known is None else known.height
+    rest = max(first, last) if known is None else known.gap
+    body = Jaws(np.array(center), rest, height)
+    if body.center[1] != 0.0:
+        raise UsageError(Field("at"), ": expected jaws on the axis of the gripper, y of 0")
+    for gap in (first, last):
+        check_body(scene, Jaws(body.center, gap, height))
+    return body, (first, last)

@@ -1,0 +1,192 @@
+"""Bodies that fingers meet: a disc, the jaws of a mechanism, a polygon.
+
+Of a batch of designs centers are (2, design), sizes (design,) and corners (2, corner, design).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+
+DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
+PLACES = "at_x_mm", "at_y_mm"  # these are keys of a spec's object
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A round body: its center (2,) in the gripper's frame, and its radius, mm."""
+
+    center: Array
+    radius: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Disc":
+        """With values of designs, (design,), at a key of a spec's object.
+
+        >>> disc = Disc(np.array([40.0, 0.0]), 20.0).with_value("at_x_mm", np.array([30.0, 50.0]))
+        >>> disc.center.tolist(), disc.radius
+        ([[30.0, 50.0], [0.0, 0.0]], 20.0)
+        """
+        if key == DIAMETER:
+            return Disc(self.center, 0.5 * column)
+        return Disc(_moved(self.center, key, column), self.radius)
+
+    def take_lanes(self, index: Indices) -> "Disc":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        return Disc(_centers(self.center, index), _sizes(self.radius, index))
+
+    @property
+    def name(self) -> str:
+        """What it is, with its size; of a single one."""
+        return f"a disc of {2.0 * self.radius:g} mm"
+
+    @property
+    def inner_radius(self) -> float | Array:
+        """The radius of the largest circle in it, mm."""
+        return self.radius
+
+    @property
+    def nearest_x(self) -> float | Array:
+        """The least x of it, mm."""
+        nearest: float | Array = self.center[0] - self.radius
+        return nearest
+
+    @property
+    def is_mirrored(self) -> Flags:
+        """Whether both fingers of a gripper meet the same, () or (design,)."""
+        return np.asarray(self.center[1] == 0.0)
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A body with straight sides: a reference point (2,), and corners from there, (2, corner), mm.
+
+    >>> wedge = np.array([[0.0, 3.0, 3.0], [0.0, -4.0, 4.0]])
+    >>> bool(Polygon(np.array([40.0, 0.0]), wedge).is_mirrored)
+    True
+    """
+
+    center: Array
+    around: Array
+
+    def with_value(self, key: str, column: Array) -> "Polygon":
+        """With values of designs, (design,), at a key of a spec's object: of its place."""
+        return Polygon(_moved(self.center, key, column), self.around)
+
+    def take_lanes(self, index: Indices) -> "Polygon":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        return Polygon(_centers(self.center, index), self.around)
+
+    @property
+    def name(self) -> str:
+        """What it is, with its size; of a single one."""
+        return f"a polygon of {self.around.shape[1]} corners"
+
+    @cached_property
+    def corners(self) -> Array:
+        """The corners in the gripper's frame, (2, corner), mm."""
+        around = self.around if self.center.ndim == 1 else self.around[..., None]
+        return np.asarray(self.center[:, None] + around)
+
+    @property
+    def nearest_x(self) -> float | Array:
+        """The least x of it, mm."""
+        nearest: float | Array = self.corners[0].min(axis=0)
+        return nearest
+
+    @cached_property
+    def inner_radius(self) -> float:
+        """The radius of the largest circle in it, mm."""
+        import shapely
+
+        return float(shapely.maximum_inscribed_circle(shapely.Polygon(self.around.T)).length)
+
+    @property
+    def is_mirrored(self) -> Flags:
+        """Whether both fingers of a gripper meet the same, () or (design,)."""
+        x, y = self.corners[:, ::-1]
+        mirrored = np.stack((x, -y))
+        turned = (np.roll(mirrored, shift, axis=1) for shift in range(len(x)))
+        are_alike = [(self.corners == other).all(axis=(0, 1)) for other in turned]
+        return np.asarray(np.any(are_alike, axis=0))
+
+
+@dataclass(frozen=True)
+class Jaws:
+    """Two flat plates along x with a gap between them, about a center (2,); mm.
+
+    Fingers meet them from outside, as the sides of a block.
+
+    >>> Jaws(np.array([40.0, 0.0]), gap=30.0, height=40.0).corners.tolist()
+    [[20.0, 60.0, 60.0, 20.0], [-15.0, -15.0, 15.0, 15.0]]
+    """
+
+    center: Array
+    gap: float | Array
+    height: float | Array
+
+    def with_value(self, key: str, column: Array) -> "Jaws":
+        """With values of designs, (design,), at a key of a spec's object."""
+        if key == GAP:
+            return Jaws(self.center, column, self.height)
+        if key == HEIGHT:
+            return Jaws(self.center, self.gap, column)
+        return Jaws(_moved(self.center, key, column), self.gap, self.height)
+
+    def take_lanes(self, index: Indices) -> "Jaws":
+        """Those of some designs of a batch; one that is alike in all is repeated."""
+        gap, height = _sizes(self.gap, index), _sizes(self.height, index)
+        return Jaws(_centers(self.center, index), gap, height)
+
+    @property
+    def name(self) -> str:
+        """What it is, with its size; of a single one."""
+        return f"jaws of {self.gap:g} x {self.height:g} mm"
+
+    @cached_property
+    def corners(self) -> Array:
+        """The ends of the plates in the gripper's frame, the lower one's first, (2, 4), mm."""
+        x, y = 0.5 * self.height, 0.5 * self.gap
+        around = np.array([[-x, x, x, -x], [-y, -y, y, y]])
+        return np.asarray(self.center[:, None] + around)
+
+    @property
+    def nearest_x(self) -> float | Array:
+        """The least x of it, mm."""
+        nearest: float | Array = self.corners[0].min(axis=0)
+        return nearest
+
+    @property
+    def inner_radius(self) -> float | Array:
+        """The radius of the largest circle between them, mm."""
+        radius: float | Array = 0.5 * np.minimum(self.gap, self.height)
+        return radius
+
+    @property
+    def is_mirrored(self) -> Flags:
+        """Whether both fingers of a gripper meet the same, () or (design,)."""
+        return np.asarray(self.center[1] == 0.0)
+
+
+Body = Disc | Jaws | Polygon
+
+
+def _moved(center: Array, key: str, column: Array) -> Array:
+    """Centers with values of designs, (design,), at the key of a part of their place."""
+    x, y = (column if key == own else at for own, at in zip(PLACES, center, strict=True))
+    return np.stack(np.broadcast_arrays(x, y))
+
+
+def _centers(center: Array, index: Indices) -> Array:
+    """Centers of some designs, (2, design); one for all as many times."""
+    return _taken(center.reshape(2, -1), index)
+
+
+def _sizes(size: float | Array, index: Indices) -> Array:
+    """Sizes of some designs, (design,); one for all as many times."""
+    return _taken(np.reshape(size, -1), index)
+
+
+def _taken(values: Array, index: Indices) -> Array:
+    return np.take(values, 0 * index if values.shape[-1] == 1 else index, axis=-1)

@@ -1,0 +1,138 @@
+"""Jaws that open and close between fingers: force by aperture, with every unit that resets.
+
+Each plate moves half of the way, along y. The fingers meet the jaws at the first aperture, where
+these grow from nothing as any body; then the aperture goes to the last one and back. What it takes
+to keep the jaws apart is a multiplier: the squeeze of the fingers, to the last digit, and its
+slope by the aperture is that of the path.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Codes, Flags
+from dpgcli.design.bodies import Jaws
+from dpgcli.design.scene import Scene
+from dpgcli.equilibrium.corrector import corrected
+from dpgcli.grasping.approach import Approach, approach
+from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
+from dpgcli.grasping.frames import FingerFrame
+from dpgcli.grasping.grasp import described, placed
+from dpgcli.mechanics.terms import Formulate
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import codes_of
+
+STEPS = 50  # of the aperture, each way
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Units of a `lane` that left their wells, (unit,), at an aperture (mm) and a squeeze (N).
+
+    `step` is the first one after it.
+    """
+
+    lane: int
+    step: int
+    gap: float
+    squeeze: float
+    flipped: Flags
+
+
+@dataclass(frozen=True)
+class JawPath:
+    """What fingers, (lane,), bear as jaws open and close through apertures `gap`, (step,), mm.
+
+    `squeeze` N and `stiffness` N/mm, (step, lane), are those of two such fingers, `code` is the
+    state there; NaN from where no rest was found. `status` (lane,) is that at the beginning.
+    """
+
+    codes: Codes
+    gap: Array
+    squeeze: Array
+    stiffness: Array
+    code: Codes
+    status: NDArray[np.uint8]
+    halts: tuple[Halt, ...]
+
+
+def jaw_path(
+    scene: Scene,
+    formulate: Formulate,
+    jaws: Jaws,
+    frame: FingerFrame,
+    codes: Codes,
+    gaps: tuple[float, float],
+    n_steps: int = STEPS,
+) -> JawPath:
+    """Fingers in these states at jaws that go from the first aperture to the last, and back."""
+    begun = placed(scene, formulate, replace(jaws, gap=gaps[0]), frame, codes)
+    shapes = begun.grown.shapes
+    (finger,) = described(begun.own, [codes], begun.grown, begun.status, with_margins=False)
+    is_other = (finger.status == Status.STABLE) & (finger.after != codes)
+    status = np.where(is_other, np.uint8(Status.ANOTHER_PATTERN), finger.status)
+    is_stable = np.asarray(status == Status.STABLE)
+    shapes = replace(shapes, is_there=shapes.is_there & is_stable)
+    share, halts = np.arange(n_steps + 1) / n_steps, list[Halt]()
+    told: list[tuple[float, Array, Array, Codes]] = []
+    for begin, end in (gaps, gaps[::-1]):
+        own = _with_jaws(begun.own, jaws, frame, begin, end)
+        shapes = _with_motion(own, shapes)
+        if not told:
+            told.append((begin, *_told(own, shapes, 0.0, end - begin)))
+        for before, load in pairwise(share):
+            at = np.full(len(codes), before)
+            came = approach(own, shapes, at, np.full(len(codes), load))
+            halts += _halts(came, len(told), begin, end)
+            shapes = came.shapes
+            told.append((begin + load * (end - begin), *_told(own, shapes, load, end - begin)))
+        shapes = own.at_rest(shapes)
+    gap, squeeze, stiffness, code = (np.array(values) for values in zip(*told, strict=True))
+    return JawPath(codes, gap, squeeze, stiffness, code, status, tuple(halts))
+
+
+def _with_jaws(
+    own: Obstructed, jaws: Jaws, frame: FingerFrame, begin: float, end: float
+) -> Obstructed:
+    """Fingers at jaws that open or close, up to the end."""
+    along = frame.along(np.array([0.0, 0.5 * frame.side]))[:, None, None]
+    motion = Motion((along,), travel=np.full((1, 1), end - begin))
+    body = frame.obstacle(replace(jaws, gap=end))
+    return replace(own, bodies=(body,), depth=np.zeros(1), motion=motion)
+
+
+def _with_motion(own: Obstructed, shapes: ContactShapes) -> ContactShapes:
+    """Shapes at jaws that stand still, as those of jaws that begin to move; at rest once more."""
+    assert own.motion is not None and own.motion.travel is not None, "they move"
+    n = shapes.coordinates.shape[1]
+    from_there = np.broadcast_to(-own.motion.travel, (1, n))
+    coordinates = np.concatenate((shapes.coordinates, from_there))
+    push = np.concatenate((shapes.push, np.ones((1, n))))
+    begun = own.finished(coordinates, shapes.inverted, push, np.zeros(n))
+    return replace(begun, is_there=begun.is_there & shapes.is_there)
+
+
+def _halts(came: Approach, step: int, begin: float, end: float) -> Iterator[Halt]:
+    for reset in came.resets:
+        for place, lane in enumerate(reset.lanes):
+            gap = begin + reset.load[place] * (end - begin)
+            squeeze = 2.0 * reset.push[-1, place]
+            yield Halt(int(lane), step, float(gap), float(squeeze), reset.flipped[:, place])
+
+
+def _told(
+    own: Obstructed, shapes: ContactShapes, load: float, travel: float
+) -> tuple[Array, Array, Codes]:
+    """Squeeze, its slope by the aperture, and the states, (lane,)."""
+    here, n = own.relabeled(shapes), len(shapes.is_there)
+    family = own.family(here.inverted, here.active)
+    nothing, free = np.full(n, -1), np.zeros(n)
+    depth = max(family.column_depths)
+    there = corrected(family, own.stacked(here), np.full(n, load), nothing, free, depth)
+    slope = there.along_load[-1] * own.stiffness[0] / travel
+    squeeze = np.where(shapes.is_there, shapes.push[-1], np.nan)
+    stiffness = np.where(shapes.is_there, slope, np.nan)
+    return 2.0 * squeeze, 2.0 * stiffness, codes_of(own.is_open(shapes))

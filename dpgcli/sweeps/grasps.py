@@ -1,0 +1,168 @@
+"""What the fingers of many designs do with a body in their way: columns of their states."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dpgcli.arrays import Array, Codes, Columns, Indices
+from dpgcli.design.bodies import Body
+from dpgcli.design.scene import Gripper, Held
+from dpgcli.equilibrium.contracts import LaneArray
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
+from dpgcli.grasping.release import WAYS, let_go, motion_of
+from dpgcli.grasping.table import COLUMNS, OF_PAIRS
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
+from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.states.patterns import inverted_units, texts
+from dpgcli.states.units import UnitSolutions
+
+NAMES = (
+    *("pattern_after", "n_contacts", "finger_force_x_N", "finger_force_y_N", "squeeze_N"),
+    *("max_contact_N", "object_x_mm", "object_y_mm", "penetration_mm"),
+)
+
+
+def grasp_columns(*, is_pair: bool) -> tuple[Column, ...]:
+    """The columns of states about a body: those of `dpg grasp`, and what became of the grasp.
+
+    >>> [column.name for column in grasp_columns(is_pair=False)][:3]
+    ['grasp_status', 'pattern_after', 'n_contacts']
+    """
+    known = {column.name: column for column in COLUMNS}
+    told = [known[name] for name in NAMES if is_pair or name not in OF_PAIRS]
+    return (
+        Column("grasp_status", "", "status with the body there", Group.GRASP, Kind.STATUS),
+        *(
+            Column(c.name, c.unit, c.description, Group.GRASP, c.kind, outputs=c.outputs)
+            for c in told
+        ),
+    )
+
+
+class Encounter(NamedTuple):
+    """Units, layers (mm), grippers if any, and bodies that meet, each by lane; how bodies are held.
+
+    A lane is a state of a design.
+    """
+
+    units: UnitSolutions
+    layer: Array
+    gripper: Gripper | None
+    body: Body
+    held: Held
+
+
+def grasp_rows(own: Encounter, codes: Codes) -> Columns:
+    """The columns of states (lane,): both fingers of a gripper are in the same one."""
+    seen_from = frames(own.gripper)
+    parts = [_met(own, frame, codes) for frame in seen_from[:1]]
+    if own.held is Held.FIXED:
+        fingers = [_told(parts[0])]
+        fingers += [_lower(own, frame, codes, fingers[0]) for frame in seen_from[1:]]
+        moved = np.zeros((2, len(codes)))
+    else:
+        parts += [_met(own, frame, codes) for frame in seen_from[1:]]
+        every, motion = np.arange(len(codes)), motion_of(own.held, seen_from)
+        found, by = let_go(parts, [every] * len(parts), motion, with_margins=False)
+        fingers = [_Finger.of(finger) for finger in found]
+        is_held = fingers[0].status == Status.STABLE
+        moved = np.where(is_held, WAYS[own.held] @ by + 0.0, np.nan)
+    return _rows(own, seen_from, fingers, moved)
+
+
+class _Finger(NamedTuple):
+    """What is told of a finger, by lane: forces in its own frame."""
+
+    status: NDArray[np.uint8]
+    after: Codes
+    n_contacts: Indices
+    force: Array
+    largest: Array
+    gap: Array
+
+    @classmethod
+    def of(cls, told: Grasped) -> "_Finger":
+        n_contacts = np.asarray((told.push > TOUCHES).sum(axis=0))
+        return cls(told.status, told.after, n_contacts, told.force, told.push.max(axis=0), told.gap)
+
+    def with_lanes(self, index: Indices, others: "_Finger") -> "_Finger":
+        """With those at `index` replaced."""
+        return _Finger(
+            _put(self.status, index, others.status),
+            _put(self.after, index, others.after),
+            _put(self.n_contacts, index, others.n_contacts),
+            _put(self.force, index, others.force),
+            _put(self.largest, index, others.largest),
+            _put(self.gap, index, others.gap),
+        )
+
+
+def _put(values: LaneArray, index: Indices, others: LaneArray) -> LaneArray:
+    changed = values.copy()
+    changed[..., index] = others
+    return changed
+
+
+def _met(own: Encounter, frame: FingerFrame, codes: Codes) -> Placed:
+    return met(own.units, chain_potential, own.layer, own.body, frame, codes)
+
+
+def _told(part: Placed) -> _Finger:
+    (told,) = described(part.own, [part.codes], part.grown, part.status, with_margins=False)
+    return _Finger.of(told)
+
+
+def _lower(own: Encounter, frame: FingerFrame, codes: Codes, upper: _Finger) -> _Finger:
+    """The lower finger: the upper one's mirror image where the body is on the axis."""
+    off = np.flatnonzero(~own.body.is_mirrored)
+    if not len(off):
+        return upper
+    angle, offset = (np.broadcast_to(part, len(codes))[off] for part in frame[:2])
+    few = own._replace(
+        units=own.units.take_lanes(off), layer=own.layer[off], body=own.body.take_lanes(off)
+    )
+    part = _met(few, FingerFrame(angle, offset, frame.side), codes[off])
+    return upper.with_lanes(off, _told(part))
+
+
+def _rows(
+    own: Encounter,
+    seen_from: Sequence[FingerFrame],
+    fingers: Sequence[_Finger],
+    moved: Array,
+) -> Columns:
+    status = np.max([finger.status for finger in fingers], axis=0)
+    is_there = status == Status.STABLE
+    forces = [frame.outside(f.force) for frame, f in zip(seen_from, fingers, strict=True)]
+
+    def known(values: Array) -> Array:
+        return np.where(is_there, values + 0.0, np.nan)  # no negative zero
+
+    n_units = own.units.finger.n_units
+    place = own.body.center + moved
+    rows: Columns = {
+        "grasp_status": status,
+        "pattern_after": np.where(is_there, _after(fingers, n_units), b""),
+        "n_contacts": np.where(is_there, sum(finger.n_contacts for finger in fingers), 0),
+        "finger_force_x_N": known(forces[0][0]),
+        "finger_force_y_N": known(forces[0][1]),
+        "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
+        "max_contact_N": known(np.max([finger.largest for finger in fingers], axis=0)),
+        "object_x_mm": place[0],
+        "object_y_mm": place[1],
+        "penetration_mm": known(np.max([np.maximum(0.0, -f.gap) for f in fingers], axis=0)),
+    }
+    return {column.name: rows[column.name] for column in grasp_columns(is_pair=len(fingers) > 1)}
+
+
+def _after(fingers: Sequence[_Finger], n_units: int) -> NDArray[np.bytes_]:
+    """Patterns, upper/lower where they differ."""
+    upper, *others = (texts(inverted_units(finger.after, n_units)) for finger in fingers)
+    for lower in others:
+        both = np.char.add(np.char.add(upper, b"/"), lower)
+        return np.where(upper == lower, upper, both)
+    return upper

@@ -1,0 +1,73 @@
+"""Bodies by design: each is what it is by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dpgcli.design.bodies import GAP, HEIGHT, PLACES, Body, Disc, Jaws, Polygon
+from dpgcli.design.scene import Gripper, Held, Scene
+from dpgcli.grasping.table import grasp_rows as rows_of
+from dpgcli.grasping.table import grasps
+from dpgcli.mechanics.finger import STUDY, uniform_finger
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.units import UnitSolutions
+from dpgcli.sweeps.grasps import Encounter, grasp_columns, grasp_rows
+
+FINGER = uniform_finger(3, **STUDY)
+SCENE = Scene(FINGER, (), Gripper(base_spacing=30.0, mounting_angle=0.1), 1.5)
+CENTER = np.array([32.0, 0.0])
+WEDGE = np.array([[-8.0, 8.0, 8.0], [0.0, -10.0, 10.0]])
+CODES = np.arange(8, dtype=np.uint64)
+
+
+@pytest.mark.parametrize(
+    ("body", "key", "column"),
+    [
+        (Jaws(CENTER, 18.0, 12.0), GAP, [14.0, 18.0, 22.0]),
+        (Jaws(CENTER, 20.0, 12.0), HEIGHT, [8.0, 16.0]),
+        (Jaws(CENTER, 20.0, 12.0), PLACES[1], [0.0, 1.0]),
+        (Polygon(CENTER, WEDGE), PLACES[0], [28.0, 33.0]),
+        (Polygon(CENTER, WEDGE), PLACES[1], [0.0, -1.5]),
+        (Disc(CENTER, 10.0), PLACES[1], [0.0, -1.5]),
+    ],
+)
+def test_bodies_by_design(body: Body, key: str, column: list[float]) -> None:
+    designs = np.repeat(np.arange(len(column)), len(CODES))
+    many = body.with_value(key, np.array(column)).take_lanes(designs)
+    layer = np.full(len(designs), 1.5)
+    angle, spacing = np.full(len(designs), 0.1), np.full(len(designs), 30.0)
+    own = Encounter(UnitSolutions.of(FINGER), layer, Gripper(spacing, angle), many, Held.FIXED)
+    found = grasp_rows(own, np.tile(CODES, len(column)))
+    n_touching = 0
+    for place, value in enumerate(column):
+        one = body.with_value(key, np.array([value])).take_lanes(np.zeros(1, int))
+        alone = _single(one)
+        rows = rows_of(grasps(replace(SCENE, body=alone), chain_potential, alone, (CODES, CODES)))
+        lanes = slice(place * len(CODES), (place + 1) * len(CODES))
+        for column_ in grasp_columns(is_pair=True)[1:]:
+            expected, said = rows[column_.name], found[column_.name][lanes]
+            if expected.dtype.kind == "f":
+                assert said == pytest.approx(expected, abs=1e-9, nan_ok=True), column_.name
+            else:
+                assert said.astype(expected.dtype).tolist() == expected.tolist(), column_.name
+        n_touching += int((rows["n_contacts"] > 0).sum())
+    assert n_touching > 0
+
+
+def _single(body: Body) -> Body:
+    """A batch of one as no batch."""
+    center = body.center[:, 0]
+    if isinstance(body, Disc):
+        return Disc(center, np.asarray(body.radius).item())
+    if isinstance(body, Polygon):
+        return Polygon(center, body.around)
+    return Jaws(center, np.asarray(body.gap).item(), np.asarray(body.height).item())
+
+
+def test_two_designs_are_not_the_parts_of_a_place() -> None:
+    """A size of two designs has the shape of a center."""
+    disc = Disc(CENTER, 10.0).with_value("disc.diameter_mm", np.array([10.0, 30.0]))
+    found = disc.take_lanes(np.array([1, 0, 1]))
+    assert np.asarray(found.radius).tolist() == [15.0, 5.0, 15.0]
+    assert found.center.tolist() == [[32.0] * 3, [0.0] * 3]
