@@ -161,9 +161,9 @@ def _open_jaws(
 def _gaps(text: str) -> tuple[float, float]:
     """Two apertures in mm. Raises UsageError for a text that is no such two."""
     from dpgcli.errors import UsageError
+    from dpgcli.text import number_in
 
-    try:
-        first, last = map(float, text.split(":"))
-    except ValueError:
-        raise UsageError(f"--jaws {text}: expected two apertures in mm, such as 10:60") from None
-    return first, last
+    numbers = [number_in(part) for part in text.split(":")]
+    if len(numbers) != 2 or any(number != number for number in numbers):
+        raise UsageError(f"--jaws {text}: expected two apertures in mm, such as 10:60")
+    return numbers[0], numbers[1]

@@ -3,7 +3,7 @@
 Of a batch of designs centers are (2, design), sizes (design,) and corners (2, corner, design).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 
 DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
+COMPLIANCE = "compliance.stiffness_N_per_mm"
 PLACES = "at_x_mm", "at_y_mm"  # these are keys of a spec's object
 
 
@@ -116,7 +117,8 @@ class Polygon:
 class Jaws:
     """Two flat plates along x with a gap between them, about a center (2,); mm.
 
-    Fingers meet them from outside, as the sides of a block.
+    Fingers meet them from outside, as the sides of a block. With a `stiffness` k (N/mm) they move
+    against a force k (a_0 − a) that keeps their aperture a at the gap a_0; without they are rigid.
 
     >>> Jaws(np.array([40.0, 0.0]), gap=30.0, height=40.0).corners.tolist()
     [[20.0, 60.0, 60.0, 20.0], [-15.0, -15.0, 15.0, 15.0]]
@@ -125,19 +127,20 @@ class Jaws:
     center: Array
     gap: float | Array
     height: float | Array
+    stiffness: float | Array | None = None
 
     def with_value(self, key: str, column: Array) -> "Jaws":
         """With values of designs, (design,), at a key of a spec's object."""
-        if key == GAP:
-            return Jaws(self.center, column, self.height)
-        if key == HEIGHT:
-            return Jaws(self.center, self.gap, column)
-        return Jaws(_moved(self.center, key, column), self.gap, self.height)
+        sizes = {GAP: "gap", HEIGHT: "height", COMPLIANCE: "stiffness"}
+        if key in sizes:
+            return replace(self, **{sizes[key]: column})
+        return replace(self, center=_moved(self.center, key, column))
 
     def take_lanes(self, index: Indices) -> "Jaws":
         """Those of some designs of a batch; one that is alike in all is repeated."""
         gap, height = _sizes(self.gap, index), _sizes(self.height, index)
-        return Jaws(_centers(self.center, index), gap, height)
+        stiffness = None if self.stiffness is None else _sizes(self.stiffness, index)
+        return Jaws(_centers(self.center, index), gap, height, stiffness)
 
     @property
     def name(self) -> str:

@@ -167,7 +167,7 @@ class Resolution:
         """
         arrays = {name: _picked(values, designs) for name, values in self.lattice.items()}
         arrays |= self._loads(designs)
-        finger = Finger(self.design.units, **arrays, law=self.domes.law)
+        finger = Finger(self.design.units, **arrays, law=self.domes.law)  # type: ignore[arg-type]
         layer = self.design.finger.geometry.get("limiting_layer_thickness_mm")
         thickness = None if layer is None else _picked(layer, designs)
         gripper, pressure = self._gripper(designs), self._pressure(designs)

@@ -79,8 +79,8 @@ class Motion:
     """How a body may move, by q, (motion, batch) in mm.
 
     `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
-    `resistance` is the law of q, if any. `hold` (motion, batch) N keeps it where it is at a load
-    of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move by
+    `resistance` is the law of the last q, if any. `hold` (motion, batch) N keeps it where it is at
+    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move by
     itself: q is (λ − 1) D.
     """
 
@@ -253,7 +253,8 @@ class Obstructed:
         n, size = len(own), self.n_own
         terms = [terms_of_part(alone.terms, finger, n, size) for finger, alone in enumerate(own)]
         resistance = None if self.motion is None else self.motion.resistance
-        resisting = () if resistance is None else (Term("body", self._motions, resistance),)
+        last = OwnCoordinate(Row(1, size + self._n_motions - 1), 1)
+        resisting = () if resistance is None else (Term("body", last, resistance),)
         hold = None if self.motion is None else self.motion.hold
         holding = () if hold is None else (Term("hold", self._motions, DeadLoad(hold)),)
         return (*(term for part in terms for term in part), *resisting, *holding)

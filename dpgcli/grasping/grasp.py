@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Flags, Indices, total
@@ -17,6 +18,8 @@ from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps, Touches
+from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
@@ -183,6 +186,9 @@ def described(
     is_there = status == Status.STABLE
     worst = np.max([state.status for state in settled], axis=0)
     status = np.where(is_there, worst, status)
+    for face, body in zip(own.faces, own.bodies, strict=True):
+        is_cut = is_there & _is_entered(face.shape(shapes.coordinates).nodes, body)
+        status = np.where(is_cut, np.uint8(Status.NOT_CONVERGED), status)
     margin = np.full(len(status), np.nan)
     if with_margins:
         margin = _margins(own, grown, np.asarray(status == Status.STABLE))
@@ -214,6 +220,15 @@ def described(
             )
         )
     return tuple(found)
+
+
+def _is_entered(nodes: Array, body: Obstacle) -> Flags:
+    """Whether a face, nodes (2, node, batch), runs into a polygon: one whose gaps do not tell."""
+    if not len(body.plates):
+        return np.zeros(nodes.shape[2], bool)
+    area = shapely.polygons(body.points.transpose(2, 1, 0))
+    inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
+    return np.asarray(shapely.intersects(shapely.linestrings(nodes.transpose(2, 1, 0)), inner))
 
 
 def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:

@@ -132,7 +132,8 @@ def _told(
     nothing, free = np.full(n, -1), np.zeros(n)
     depth = max(family.column_depths)
     there = corrected(family, own.stacked(here), np.full(n, load), nothing, free, depth)
-    slope = there.along_load[-1] * own.stiffness[0] / travel
+    slopes = own.pushes(here.active, there.along_load[len(here.coordinates) :])
+    slope = slopes[-1] / travel
     squeeze = np.where(shapes.is_there, shapes.push[-1], np.nan)
     stiffness = np.where(shapes.is_there, slope, np.nan)
     return 2.0 * squeeze, 2.0 * stiffness, codes_of(own.is_open(shapes))

@@ -12,40 +12,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.design.bodies import Body, Jaws
 from dpgcli.design.scene import Held
 from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described
+from dpgcli.mechanics.terms import Quadratic
 from dpgcli.states.certify import Status
 
 LANES = 1024  # at a time: each takes the squares of its coordinates a few times over
-WAYS = {Held.GUIDED: np.array([[1.0], [0.0]]), Held.FREE: np.eye(2)}  # of a body's motions
+WAYS = {  # of a body's motions
+    Held.FIXED: np.zeros((2, 0)),
+    Held.GUIDED: np.array([[1.0], [0.0]]),
+    Held.FREE: np.eye(2),
+}
 
 
-def motion_of(held: Held, frames: Sequence[FingerFrame]) -> Motion:
-    """How a body may move that is held so, in the frames of its fingers."""
-    ways = WAYS[held][..., None]
-    return Motion(tuple(frame.along(ways) for frame in frames))
+def motion_of(body: Body, held: Held, frames: Sequence[FingerFrame]) -> Motion | None:
+    """How a body may move that is held so, in the frames of its fingers; None if it may not.
+
+    The aperture of jaws that give way is the last of the motions: each plate goes half of it.
+    """
+    ways, resistance = WAYS[held][..., None], None
+    apart = np.zeros((2, 0, 1))
+    if isinstance(body, Jaws) and body.stiffness is not None:
+        apart = np.array([0.0, 0.5])[:, None, None]
+        resistance = Quadratic(np.reshape(body.stiffness, (1, -1)))
+    if not ways.size and not apart.size:
+        return None
+    along = (np.concatenate((ways, frame.side * apart), axis=1) for frame in frames)
+    told = zip(frames, along, strict=True)
+    return Motion(tuple(frame.along(own) for frame, own in told), resistance)
+
+
+def moved_by(held: Held, motions: Array) -> Array:
+    """How far bodies have moved, (2, lane), by their motions, (motion, lane); mm."""
+    ways = WAYS[held]
+    return np.asarray(ways @ motions[: ways.shape[1]])
 
 
 def let_go(
     parts: Sequence[Placed],
     lanes: Sequence[Indices],
     motion: Motion,
+    held: Held,
     *,
     with_margins: bool = True,
 ) -> tuple[tuple[Grasped, ...], Array]:
     """Fingers at `lanes` of each part with a body between them that is let go of.
 
     Also how far the bodies have moved, (motion, lane), mm. The motion is one for all, or by lane.
+    A body that is not fixed, and that nothing touches, is not held.
     """
     n = len(lanes[0])
     chunks = []
     for at in range(0, max(n, 1), LANES):
         some = [index[at : at + LANES] for index in lanes]
         own = motion.take_lanes(np.arange(at, at + len(some[0])))
-        chunks.append(_let_go(parts, some, own, with_margins=with_margins))
+        chunks.append(_let_go(parts, some, own, held, with_margins=with_margins))
     fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, _ in chunks), strict=True))
     return fingers, np.concatenate([moved for _, moved in chunks], axis=1)
 
@@ -54,6 +79,7 @@ def _let_go(
     parts: Sequence[Placed],
     lanes: Sequence[Indices],
     motion: Motion,
+    held: Held,
     *,
     with_margins: bool,
 ) -> tuple[tuple[Grasped, ...], Array]:
@@ -62,8 +88,11 @@ def _let_go(
     codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
     before = [part.status[index] for part, index in zip(parts, lanes, strict=True)]
     status = np.max(before, axis=0)
-    is_lost = (status == Status.STABLE) & ~_is_held(gone.shapes)
-    status = np.where(is_lost, np.uint8(Status.NOT_HELD), status)
+    is_there, lost = gone.shapes.is_there, Status.NOT_CONVERGED
+    if held is not Held.FIXED:
+        is_there, lost = _is_held(gone.shapes), Status.NOT_HELD
+    is_lost = (status == Status.STABLE) & ~is_there
+    status = np.where(is_lost, np.uint8(lost), status)
     fingers = described(own, codes, gone, status, with_margins=with_margins)
     return fingers, gone.shapes.coordinates[own.n_own :]
 

@@ -8,13 +8,13 @@ import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, distinct
-from dpgcli.design.bodies import Body
+from dpgcli.design.bodies import Body, Jaws
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Held, Scene
+from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
-from dpgcli.grasping.release import WAYS, let_go, motion_of
+from dpgcli.grasping.release import let_go, motion_of, moved_by
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -38,11 +38,13 @@ COLUMNS = (
     Column("overlaps", "", "whether the fingers overlap each other", kind=Kind.FLAG),
     Column("object_x_mm", "mm", "x of the body's reference point"),
     Column("object_y_mm", "mm", "y of the body's reference point"),
+    Column("jaw_gap_mm", "mm", "aperture of the jaws"),
     Column("penetration_mm", "mm", "largest depth of the body in a face"),
     Column("margin", "", "how much more of the load before a next unit resets", outputs=FORCES),
     Column("residual_N", "N", "largest force out of balance"),
     Column("numerical_error_mm", "mm", "error of the tip by solving the equations"),
 )
+JAW_GAP = "jaw_gap_mm"
 OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
 
 
@@ -51,7 +53,7 @@ class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
     `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
-    is, mm.
+    is, and by so much jaws have `opened`, (row,), mm.
     """
 
     scene: Scene
@@ -60,6 +62,7 @@ class Grasps:
     fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
     centers: Array
+    opened: Array | float = 0.0
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
@@ -89,23 +92,27 @@ def grasps(
             parts.append(placed(scene, formulate, body, frame, codes, way))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
-    if scene.held is Held.FIXED:
+    motion = motion_of(body, scene.held, seen_from)
+    if motion is None:
         different = parts[:1] if is_alike else parts
         told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
         fingers = [finger for (finger,) in told] * (len(parts) // len(told))
         return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
-    found, moved = let_go(parts, lanes, motion_of(scene.held, seen_from))
+    found, moved = let_go(parts, lanes, motion, scene.held)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
-    away = _rounded(WAYS[scene.held] @ moved, scene.finger.straight_length)
+    away = _rounded(moved_by(scene.held, moved), scene.finger.straight_length)
     centers = np.where(is_there, centers + away, np.nan)
-    return Grasps(scene, body, seen_from, found, rows, centers)
+    opened = np.where(is_there, moved[-1], np.nan)
+    return Grasps(scene, body, seen_from, found, rows, centers, opened)
 
 
 def columns_of(scene: Scene) -> tuple[Column, ...]:
     """The columns of a gripper, or those of a finger alone."""
-    is_pair = scene.gripper is not None
-    return tuple(column for column in COLUMNS if is_pair or column.name not in OF_PAIRS)
+    left_out = set() if scene.gripper is not None else set(OF_PAIRS)
+    if not isinstance(scene.body, Jaws):
+        left_out.add(JAW_GAP)
+    return tuple(column for column in COLUMNS if column.name not in left_out)
 
 
 def grasp_rows(found: Grasps) -> Columns:
@@ -149,6 +156,8 @@ def grasp_rows(found: Grasps) -> Columns:
         "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),
         "numerical_error_mm": known(np.max([own["error"] for own in of_fingers], axis=0)),
     }
+    if isinstance(found.body, Jaws):
+        rows[JAW_GAP] = found.body.gap + found.opened + np.zeros(len(status))
     if found.scene.gripper is not None:
         rows.update(_between(found, is_there))
     return {column.name: rows[column.name] for column in columns_of(found.scene)}

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,7 +23,9 @@ ARRAYS = (
     "hinge_coupling",
 )
 SHARED = ("segment_height", "linear_stiffness", "hinge_coupling")  # by all units of a finger
-LOADS = ("end_moment", "tip_force_x", "tip_force_y", "unit_weight")  # none where all are zero
+LOADS = ("end_moment", "tip_force_x", "tip_force_y", "unit_weight")
+GRAVITY = ("gravity_x", "gravity_y")
+OPTIONAL = ("hinge_stiffness", "wall_compliance", "hinge_coupling", *LOADS, *GRAVITY)  # if not zero
 
 KEYS = {  # names with units, as files say them
     "segment_length_mm": "segment_length",
@@ -63,6 +66,8 @@ class Finger:
     Dead loads: `end_moment` (1, design), N mm, is a couple on the end phalanx, a positive one opens
     the gaps; `tip_force_x` and `tip_force_y` (1, design), N, act on the tip; `unit_weight` (unit,
     design), N, acts on each unit's chamber along `gravity_x` and `gravity_y` (1, design).
+
+    `kept` are parts of the energy that the batch has which this finger is taken from; see `parts`.
     """
 
     n_units: int
@@ -85,6 +90,7 @@ class Finger:
     gravity_x: Array = field(default_factory=lambda: np.zeros((1, 1)))
     gravity_y: Array = field(default_factory=lambda: np.zeros((1, 1)))
     law: DomeLaw = PUBLISHED
+    kept: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         for name, values in self.arrays().items():
@@ -102,13 +108,30 @@ class Finger:
 
     def conditions(self) -> dict[str, Array]:
         """What a finger of these arrays is under, by name."""
-        names = ("acting", "branch", *LOADS, "gravity_x", "gravity_y")
+        names = ("acting", "branch", *LOADS, *GRAVITY)
         return {name: getattr(self, name) for name in names}
+
+    @cached_property
+    def parts(self) -> frozenset[str]:
+        """Arrays whose part of the energy is there: not zero throughout, or bars not all rigid.
+
+        Coordinates and terms are laid out by these. Designs and units taken from a batch keep what
+        the batch has, though theirs be zero: their coordinates are those of the batch.
+
+        >>> unit = uniform_finger(1, **STUDY)
+        >>> both = unit.changed(wall_compliance=np.array([[0.1, 0.0]]))
+        >>> sorted(both.take_lanes(np.array([1])).parts)
+        ['hinge_stiffness', 'wall_compliance']
+        """
+        own = {name for name in OPTIONAL if getattr(self, name).any()}
+        if np.isfinite(self.linear_stiffness).any():
+            own.add("linear_stiffness")
+        return self.kept | own
 
     @property
     def is_loaded(self) -> bool:
         """Whether any dead load acts."""
-        return any(getattr(self, name).any() for name in LOADS)
+        return not self.parts.isdisjoint(LOADS)
 
     @property
     def unloaded(self) -> "Finger":
@@ -127,17 +150,17 @@ class Finger:
     @property
     def is_rigid(self) -> bool:
         """Whether all bars are rigid, k_L infinite."""
-        return bool(np.isinf(self.linear_stiffness).all())
+        return "linear_stiffness" not in self.parts
 
     @property
     def has_walls(self) -> bool:
         """Whether any unit's walls give way."""
-        return bool(self.wall_compliance.any())
+        return "wall_compliance" in self.parts
 
     @property
     def is_coupled(self) -> bool:
         """Whether any hinge turns its neighbors."""
-        return self.n_units > 1 and bool(self.hinge_coupling.any())
+        return self.n_units > 1 and "hinge_coupling" in self.parts
 
     @property
     def wall_ratio(self) -> Array:
@@ -188,11 +211,11 @@ class Finger:
         return self.law.response(extension, self.domes)
 
     def changed(self, **arrays: Array) -> "Finger":
-        """The finger with other arrays, by the names of its fields.
+        """The finger with other arrays, by the names of its fields, whose parts they decide.
 
         Raises ValueError for shapes that do not fit.
         """
-        return replace(self, **arrays)  # type: ignore[arg-type]  # all arrays
+        return replace(self, kept=self.kept - arrays.keys(), **arrays)  # type: ignore[arg-type]
 
     def with_values(self, values: Mapping[str, float]) -> "Finger":
         """The finger with other values, the same in all units, by the names in `KEYS`."""
@@ -206,7 +229,7 @@ class Finger:
         """
         arrays = {**self.arrays(), **self.conditions()}.items()
         picked = {k: v if len(v) == 1 else v[list(places)] for k, v in arrays}
-        return replace(self, n_units=len(places), **picked)  # type: ignore[arg-type]  # all arrays
+        return replace(self, n_units=len(places), kept=self.parts, **picked)  # type: ignore[arg-type]
 
     def with_bars(self, stiffness: float) -> "Finger":
         """The finger with bars of another stiffness k_L (N/mm); infinite makes them rigid."""
@@ -233,7 +256,8 @@ class Finger:
     def take_lanes(self, index: Indices) -> "Finger":
         """The designs at `index`, in its order; a design may repeat."""
         arrays = {**self.arrays(), **self.conditions()}.items()
-        return self.changed(**{k: take_lanes(v, index) for k, v in arrays})
+        taken = {k: take_lanes(v, index) for k, v in arrays}
+        return replace(self, kept=self.parts, **taken)  # type: ignore[arg-type]  # all arrays
 
     def section(self, first: int, stop: int) -> "Finger":
         """The finger cut down to units first+1 … stop, counted from the base."""

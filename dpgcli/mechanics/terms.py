@@ -12,7 +12,7 @@ from dpgcli.equilibrium.potential import Potential
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
-from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.finger import GRAVITY, Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.neighbors import NeighborTurns
 from dpgcli.mechanics.walls import Walled
@@ -79,7 +79,7 @@ def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     """
     finger = coordinates.finger
     corner, bar = Quadratic(2.0 * finger.hinge_stiffness), Quadratic(finger.linear_stiffness)
-    hinges = coordinates.corners if finger.hinge_stiffness.any() else ()
+    hinges = coordinates.corners if "hinge_stiffness" in finger.parts else ()
     domes, wall = DomeSprings(finger.law, finger.domes), Quadratic(finger.bistable_stiffness)
     return (
         Term("bistable", coordinates.dome, domes),
@@ -107,19 +107,19 @@ def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     """
     finger = coordinates.finger
     moment = finger.end_moment
-    turning = coordinates.corners if moment.any() else ()
+    turning = coordinates.corners if "end_moment" in finger.parts else ()
     loads = [(angle, moment) for angle in turning]
-    for axis, force in enumerate((finger.tip_force_x, finger.tip_force_y)):
-        if force.any():
-            loads.append((coordinates.position(axis), force))
-    if finger.unit_weight.any():
+    for axis, name in enumerate(("tip_force_x", "tip_force_y")):
+        if name in finger.parts:
+            loads.append((coordinates.position(axis), getattr(finger, name)))
+    if "unit_weight" in finger.parts:
         shape = (finger.n_units, finger.unit_weight.shape[1])
         weights = np.broadcast_to(finger.unit_weight, shape)
         whole = total(weights)[None]
         shares = weights / np.where(whole != 0.0, whole, 1.0)
-        for axis, along in enumerate((finger.gravity_x, finger.gravity_y)):
-            if along.any():
-                loads.append((coordinates.center(axis, shares), whole * along))
+        for axis, name in enumerate(GRAVITY):
+            if name in finger.parts:
+                loads.append((coordinates.center(axis, shares), whole * getattr(finger, name)))
     return tuple(Term(LOAD, measure, DeadLoad(force)) for measure, force in loads)
 
 

@@ -277,8 +277,6 @@ def _split(
     n_units = units.finger.n_units
     if not (is_whole and fits and 2**n_units >= FEWEST_PAIRED_STATES):
         return None
-    if units.finger.has_walls and not units.finger.wall_compliance.all():
-        return None  # a half may have no walls, and other coordinates then
     n_inner = n_units // 2
     cut = n_inner * potential.coordinates.size // n_units
     shared = slice(cut if units.finger.is_rigid else cut - 1, cut)  # a strut

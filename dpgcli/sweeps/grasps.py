@@ -12,7 +12,7 @@ from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
-from dpgcli.grasping.release import WAYS, let_go, motion_of
+from dpgcli.grasping.release import let_go, motion_of, moved_by
 from dpgcli.grasping.table import COLUMNS, OF_PAIRS
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
@@ -60,17 +60,18 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
     """The columns of states (lane,): both fingers of a gripper are in the same one."""
     seen_from = frames(own.gripper)
     parts = [_met(own, frame, codes) for frame in seen_from[:1]]
-    if own.held is Held.FIXED:
+    motion = motion_of(own.body, own.held, seen_from)
+    if motion is None:
         fingers = [_told(parts[0])]
         fingers += [_lower(own, frame, codes, fingers[0]) for frame in seen_from[1:]]
         moved = np.zeros((2, len(codes)))
     else:
         parts += [_met(own, frame, codes) for frame in seen_from[1:]]
-        every, motion = np.arange(len(codes)), motion_of(own.held, seen_from)
-        found, by = let_go(parts, [every] * len(parts), motion, with_margins=False)
+        every = np.arange(len(codes))
+        found, by = let_go(parts, [every] * len(parts), motion, own.held, with_margins=False)
         fingers = [_Finger.of(finger) for finger in found]
         is_held = fingers[0].status == Status.STABLE
-        moved = np.where(is_held, WAYS[own.held] @ by + 0.0, np.nan)
+        moved = np.where(is_held, moved_by(own.held, by) + 0.0, np.nan)
     return _rows(own, seen_from, fingers, moved)
 
 

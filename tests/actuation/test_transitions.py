@@ -261,3 +261,20 @@ def test_whole_staircases_are_climbed_only_where_states_are_missing(
     monkeypatch.setattr(graph, "_pulses", None)  # not asked
     all_known = np.zeros(7, np.int64), np.arange(1, 8)
     assert reached_from_rest(own, line, reach, is_stable, all_known).is_reached.all()
+
+
+@pytest.mark.parametrize("rigid", [0, 1])
+def test_units_whose_walls_are_rigid_stand_beside_others(
+    study: Study, pressed: Made, rigid: int
+) -> None:
+    """Thresholds of each by itself; those of the rigid one, in doubt, are searched on their own."""
+    soft, stiff = study(1).changed(wall_compliance=np.array([[0.1]])), study(1)
+    stiff = stiff.changed(bistable_stiffness=np.array([[20.0]]), hinge_stiffness=np.array([[1.3]]))
+    units = [stiff, soft] if rigid == 0 else [soft, stiff]
+    names = ("bistable_stiffness", "hinge_stiffness", "wall_compliance")
+    by_unit = {name: np.concatenate([getattr(unit, name) for unit in units]) for name in names}
+    found = thresholds_alone(pressed(study(2).changed(**by_unit)))
+    each = [thresholds_alone(pressed(unit)) for unit in units]
+    for name in ("snap", "reset"):
+        expected = np.concatenate([getattr(one, name) for one in each])
+        assert getattr(found, name) == pytest.approx(expected, rel=1e-9)

@@ -247,3 +247,13 @@ def test_a_long_graded_finger_is_the_same_in_pairs_and_directly(
     error = direct["numerical_error_mm"] + rows["numerical_error_mm"][sample]
     for name in ("tip_x_mm", "tip_y_mm"):
         assert (np.abs(direct[name] - rows[name][sample]) <= error).all()
+
+
+@pytest.mark.parametrize("soft", [[0, 1, 2], [3, 4, 5], [0, 2, 4], [5]])
+def test_a_half_may_have_only_rigid_walls(
+    reference_finger: Fingers, all_patterns: Patterns, soft: list[int]
+) -> None:
+    walls = np.zeros((6, 1))
+    walls[soft] = 0.1
+    units = UnitSolutions.of(reference_finger(6, 1e4).changed(wall_compliance=walls))
+    assert assert_like_direct(Split(units, 3, 2, 1e-12), all_patterns(6), 1e-9) == 1.0

@@ -169,7 +169,7 @@ class Spec(Section):
             pressure=None if self.pressure is None else self.pressure.known,
             hinge_coupling=None if coupling is None else np.array([coupling], float),
             loads=None if self.loads is None else self.loads.known,
-            body=None if self.object is None else self.object.known,
+            body=None if self.object is None or self.object.issues else self.object.known,
             held=Held.FIXED if self.object is None else Held(self.object.held),
         )
 

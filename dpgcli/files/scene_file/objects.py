@@ -22,7 +22,7 @@ EXPECTED = {
     "held": '"fixed", "guided" (moves along x) or "free"',
     POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
-LATER = ("compliance", "friction", "mass_g")  # keys of objects that nothing is made of yet
+LATER = ("friction", "mass_g")  # keys of objects that nothing is made of yet
 NOT_YET = "not there yet: leave it out"
 
 Corner = list[float]
@@ -42,6 +42,14 @@ class JawsSpec(Section):
     gap_mm: Positive = Field(description="Distance of the plates from each other, in mm.")
     height_mm: Positive = Field(
         description="Length of the plates along x, in mm: half of it on either side of at_mm."
+    )
+
+
+class ComplianceSpec(Section):
+    """What keeps jaws apart: a linear force against closing, none at their gap."""
+
+    stiffness_N_per_mm: Positive = Field(
+        description="Force against closing per mm that the jaws are closer than their gap, N/mm."
     )
 
 
@@ -74,6 +82,10 @@ class ObjectSpec(Section):
         description="How it is held: fixed, guided (it moves along x only), or free.",
     )
 
+    compliance: ComplianceSpec | None = Field(
+        default=None, description="Jaws only: what keeps them apart; without it they are rigid."
+    )
+
     @property
     def known(self) -> Body:
         """The value that it stands for."""
@@ -81,7 +93,8 @@ class ObjectSpec(Section):
         at = [said if part is None else part for said, part in zip(self.at_mm, own, strict=True)]
         center = np.array(at, float)
         if self.jaws is not None:
-            return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm)
+            k = None if self.compliance is None else self.compliance.stiffness_N_per_mm
+            return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm, k)
         if self.polygon is not None:
             return Polygon(center, np.array(self.polygon, float).T)
         assert self.disc is not None, "one of the three"
@@ -94,6 +107,8 @@ class ObjectSpec(Section):
         if len(said) != 1:
             found = " and ".join(said) or "none of them"
             return [Issue((), "one of disc, jaws and polygon", found)]
+        if self.compliance is not None and self.jaws is None:
+            return [Issue(("compliance",), "jaws, which only give way", said[0])]
         return list(_wrong_sides(self.polygon or []))
 
 

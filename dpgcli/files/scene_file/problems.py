@@ -56,6 +56,7 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("object",): objects.ObjectSpec,
     ("object", "disc"): objects.DiscSpec,
     ("object", "jaws"): objects.JawsSpec,
+    ("object", "compliance"): objects.ComplianceSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }

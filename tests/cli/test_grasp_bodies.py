@@ -1,0 +1,113 @@
+"""`dpg grasp` with jaws, polygons and files of bodies: rows, refusals."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dpgcli.cli.exits import ExitCode
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+RIGID = ("--set", "finger.linear_stiffness_N_per_mm=.inf")
+WEDGE = "polygon: [[-20, -16], [20, -6], [20, 6], [-20, 16]]"
+
+
+@pytest.fixture
+def gripper(folder: Path) -> str:
+    (folder / "gripper.yaml").write_bytes((CONFIGS / "gripper.yaml").read_bytes())
+    return "gripper.yaml"
+
+
+def rows_of(call: Any, *arguments: str) -> list[dict[str, Any]]:
+    result = call("grasp", *arguments, *RIGID, "-q", "--format", "json")
+    assert (result.exit_code, result.stderr) == (ExitCode.DONE, "")
+    rows: list[dict[str, Any]] = json.loads(result.stdout)
+    return rows
+
+
+def with_object(folder: Path, gripper: str, said: str) -> str:
+    text = (folder / gripper).read_text(encoding="utf-8")
+    (folder / "own.yaml").write_text(f"{text}\nobject:\n{said}\n", encoding="utf-8")
+    return "own.yaml"
+
+
+def test_jaws_said_in_three_ways_are_the_same(call: Any, folder: Path, gripper: str) -> None:
+    chosen = ("--pattern", "01010", "--pattern", "10000")
+    rows = rows_of(call, gripper, "--object", "jaws:30x40", "--at", "40,0", *chosen)
+    assert rows[0]["touching"] == "5" and rows[0]["squeeze_N"] > 0.1
+    assert all(row["penetration_mm"] <= 1e-9 for row in rows)
+    assert rows == rows_of(call, gripper, "--object", "jaws:30", "--at", "40,0", *chosen)
+    spec = with_object(folder, gripper, "  jaws: {gap_mm: 30, height_mm: 40}\n  at_mm: [40, 0]")
+    assert rows == rows_of(call, spec, *chosen)
+    (folder / "jaws.yaml").write_text("jaws: {gap_mm: 30, height_mm: 40}\n", encoding="utf-8")
+    assert rows == rows_of(call, gripper, "--object", "jaws.yaml", "--at", "40,0", *chosen)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_polygons_go_either_way_round(call: Any, folder: Path, gripper: str, order: int) -> None:
+    """A rectangle is the block that jaws are."""
+    corners = [[-20, -15], [20, -15], [20, 15], [-20, 15]][::order]
+    spec = with_object(folder, gripper, f"  polygon: {corners}\n  at_mm: [40, 0]")
+    (row,) = rows_of(call, spec, "--pattern", "01010")
+    jaws = ("--object", "jaws:30", "--at", "40,0", "--pattern", "01010")
+    (expected,) = rows_of(call, gripper, *jaws)
+    assert row["squeeze_N"] == pytest.approx(expected["squeeze_N"], rel=1e-9)
+
+
+def test_figures_have_plates(call: Any, folder: Path, gripper: str) -> None:
+    for body, name in (("jaws:30", "j.svg"), (str(CONFIGS / "objects/wedge.yaml"), "w.svg")):
+        arguments = ("--object", body, "--at", "40,0", "--pattern", "10000", "--plot", name, "-q")
+        assert call("grasp", gripper, *arguments, *RIGID).exit_code == ExitCode.DONE
+    assert "10000: 2 contacts" in (folder / "j.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["can_66mm", "ball_40mm", "wedge"])
+def test_bodies_that_are_there(call: Any, gripper: str, name: str) -> None:
+    file = str(CONFIGS / "objects" / f"{name}.yaml")
+    (row,) = rows_of(call, gripper, "--object", file, "--at", "60,0", "--pattern", "00000")
+    assert row["status"] == "stable"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("jaws:-3",), "--object jaws:-3: expected disc and its diameter"),
+        (("jaws:30x",), "--object jaws:30x: expected disc and its diameter"),
+        (("jaws:30x40x2",), "--object jaws:30x40x2: expected disc"),
+        (("disc:30x40",), "--object disc:30x40: expected disc"),
+        (("can",), "--object can: expected disc"),
+        (("none.yaml",), "none.yaml"),
+        (("jaws:30",), "--at: expected the place of the body in mm, such as 40,0"),
+        (("jaws:70", "--at", "10,0"), "jaws of 70 x 40 mm there begins in the base of a finger"),
+    ],
+)
+def test_refusals(call: Any, gripper: str, arguments: tuple[str, ...], said: str) -> None:
+    result = call("grasp", gripper, "--object", *arguments)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr and not result.stdout
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("", "expected one of disc, jaws and polygon, found none of them"),
+        (f"jaws: {{gap_mm: 3, height_mm: 4}}\n{WEDGE}", "found jaws and polygon"),
+        ("polygon: [[0, 0], [9, 9], [9, 0], [0, 9]]", "found side 1-2 crosses side 3-4"),
+        ("polygon: [[0, 0], [9, 0], [4, 0], [4, 5]]", "found side 1-2 crosses side 2-3"),
+        ("polygon: [[0, 0], [9, 0], [9, 0], [0, 9]]", "found side 2-3 of 0 mm"),
+        ("polygon: [[0, 0], [9, 0]]", "polygon: expected three to 64 corners in mm"),
+        ("polygon: [[0, 0], [9], [9, 0]]", "polygon: expected three to 64 corners in mm"),
+        ("jaws: {gap_mm: 0, height_mm: 4}", "jaws.gap_mm: expected a length > 0 in mm, found 0"),
+        ("jaws: {gap_mm: 3}", "jaws.height_mm: expected a length > 0 in mm, found nothing"),
+        ("disc: {diameter_mm: 9}\nmass_g: 300", "mass_g: expected a known key"),
+    ],
+)
+def test_wrong_files(call: Any, folder: Path, gripper: str, keys: str, said: str) -> None:
+    (folder / "body.yaml").write_text(f"at_mm: [40, 0]\n{keys}\n", encoding="utf-8")
+    result = call("grasp", gripper, "--object", "body.yaml")
+    assert result.exit_code == ExitCode.USAGE
+    assert "body.yaml:" in result.stderr and said in result.stderr
+    indented = "\n".join(f"  {line}" for line in ("at_mm: [40, 0]", *keys.splitlines()))
+    in_spec = call("grasp", with_object(folder, gripper, indented))
+    assert in_spec.exit_code == ExitCode.USAGE and said in in_spec.stderr
