@@ -80,8 +80,8 @@ class Motion:
 
     `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
     `resistance` is the law of the last q, if any. `hold` (motion, batch) N keeps it where it is at
-    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move by
-    itself: q is (λ − 1) D.
+    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move
+    by itself: q is (λ − 1) D.
     """
 
     directions: tuple[Array, ...]

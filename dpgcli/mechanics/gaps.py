@@ -94,8 +94,6 @@ class FaceGaps:
         pushes = np.zeros((2, len(shape.nodes[0]), 0, coordinates.shape[1]))
         if len(self.obstacle.plates):
             plates = plate_gaps(shape, self.obstacle)
-            is_beyond = (plates.depth > 0.0) & (own < -plates.depth)
-            own = np.where(is_beyond, FAR, own)  # the tip comes out on a shorter way
             place = np.concatenate((place, self._at_plates(plates, place)))
             own = np.concatenate((own, plates.distance.reshape(-1, coordinates.shape[1])))
             pushes = _pushed(plates)
@@ -224,31 +222,43 @@ def _followed(raw: Array) -> Indices:
 
 
 class _Moves(NamedTuple):
-    """∇g, w and τ of every side and body by the coordinates, (row, cell, batch).
+    """∇g of every side and body by the coordinates, (row, cell, batch).
 
-    `push` (2, node, cell, batch) are the forces on nodes of which ∇g is made.
+    `push` (2, node, cell, batch) are the forces on nodes of which it is made.
     """
 
     slope: Array
-    turn: Array
-    slide: Array
     push: Array
 
 
 def _moves(shape: FaceShape, near: Nearest) -> _Moves:
     _, n_bodies, n, batch = near.normal.shape
-    rest = 1.0 - near.share
-    per_length = np.where(near.is_corner, 0.0, 1.0 / near.length)
-    at_start = (-rest * near.normal, per_length * near.normal, -rest * near.along)
-    at_end = (-near.share * near.normal, -per_length * near.normal, -near.share * near.along)
-    forces = np.zeros((2, n + 1, 3, n_bodies, n, batch))
-    sides = np.arange(n)
-    forces[:, sides, :, :, sides] = np.moveaxis(np.stack(at_start, axis=1), 3, 0)
-    forces[:, sides + 1, :, :, sides] += np.moveaxis(np.stack(at_end, axis=1), 3, 0)
-    flat = forces.reshape(2, n + 1, 3 * n_bodies * n, batch)
-    pulled = shape.pulled(flat).reshape(-1, 3, n_bodies * n, batch)
-    slope, turn, slide = np.moveaxis(pulled, 1, 0)
-    return _Moves(slope, turn, slide, flat[:, :, : n_bodies * n])
+    normal, share = near.normal.reshape(2, -1, batch), near.share.reshape(-1, batch)
+    sides = np.tile(np.arange(n), n_bodies)
+    push = _at_ends((share - 1.0) * normal, -share * normal, sides, n)
+    return _Moves(shape.pulled(push), push)
+
+
+def _turned(shape: FaceShape, near: Nearest, cells: Indices) -> tuple[Array, Array]:
+    """The w and the τ of some sides and bodies by the coordinates, (row, cell, batch)."""
+    _, _, n, batch = near.normal.shape
+    normal, along = (v.reshape(2, -1, batch)[:, cells] for v in (near.normal, near.along))
+    share, length = (v.reshape(-1, batch)[cells] for v in (near.share, near.length))
+    is_corner = near.is_corner.reshape(-1, batch)[cells]
+    turn = np.where(is_corner, 0.0, 1.0 / length) * normal
+    start = np.concatenate((turn, (share - 1.0) * along), axis=1)
+    end = np.concatenate((-turn, -share * along), axis=1)
+    pulled = shape.pulled(_at_ends(start, end, np.tile(cells % n, 2), n))
+    return pulled[:, : len(cells)], pulled[:, len(cells) :]
+
+
+def _at_ends(start: Array, end: Array, sides: Indices, n_sides: int) -> Array:
+    """Forces on nodes, (2, node, cell, batch), by those at both ends of a side each."""
+    forces = np.zeros((2, n_sides + 1, *start.shape[1:]))
+    cells = np.arange(len(sides))
+    forces[:, sides, cells] = start
+    forces[:, sides + 1, cells] = end
+    return forces
 
 
 def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array:
@@ -258,10 +268,10 @@ def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array
     distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
     safe = np.where(distance != 0.0, distance, 1.0)
     around = np.where(is_corner & (distance != 0.0), force / safe, 0.0)
-    for cell in range(len(force)):
-        if not force[cell].any():
-            continue
-        w, tau, f = moves.turn[:, cell], moves.slide[:, cell], force[cell]
+    cells = np.flatnonzero(force.any(axis=1))
+    turn, slide = _turned(shape, near, cells)
+    for place, cell in enumerate(cells):
+        w, tau, f = turn[:, place], slide[:, place], force[cell]
         mixed = (f * w)[:, None] * tau
         result += mixed + np.swapaxes(mixed, 0, 1)
         result += (around[cell] * tau)[:, None] * tau - (f * distance[cell] * w)[:, None] * w

@@ -21,18 +21,16 @@ SIDEWAYS = -0.25  # of n_x + n_y: a plate with more faces up, or away from the b
 
 
 class PlateGaps(NamedTuple):
-    """Of plates and nodes: n · (F − P), whether one is over a plate, n, and how deep the tip is.
+    """Of each plate and node: n · (F − P), whether it is over the plate, and n.
 
     `distance`, `is_over` and `ends`, the number of the point at the nearer end of the plate, are
-    (plate, node, batch); `normal` is (2, plate, 1 or batch), `depth` (batch,) of the tip, in mm, is
-    0 outside.
+    (plate, node, batch); `normal` is (2, plate, 1 or batch).
     """
 
     distance: Array
     is_over: Flags
     ends: Indices
     normal: Array
-    depth: Array
 
 
 def plate_gaps(shape: FaceShape, body: Obstacle) -> PlateGaps:
@@ -55,9 +53,7 @@ def plate_gaps(shape: FaceShape, body: Obstacle) -> PlateGaps:
     nearest = _nearest_facing(share, distance, length, normal)
     is_over = np.where(is_inside, nearest, is_over)
     first, last = body.plates[:, 0, None, None], body.plates[:, 1, None, None]
-    deep = total(np.where(is_over, -distance, 0.0)[:, -1])
-    ends, depth = np.where(share < 0.5, first, last), np.where(is_inside[-1], deep, 0.0)
-    return PlateGaps(distance, is_over, ends, normal, depth)
+    return PlateGaps(distance, is_over, np.where(share < 0.5, first, last), normal)
 
 
 def _is_inside(nodes: Array, start: Array, end: Array) -> Flags:
