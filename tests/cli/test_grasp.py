@@ -61,6 +61,23 @@ def test_a_body_in_the_spec_is_the_same(call: Any, folder: Path, gripper: str) -
     assert call("predict", "own.yaml", "-q").exit_code == ExitCode.DONE
 
 
+def test_long_work_is_said_before(call: Any, gripper: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ("grasp", gripper, *DISC, *RIGID, "--pattern", "0111?")
+    said = "2 grasps of 4 states: about "
+    assert said not in call(*arguments).stderr
+    monkeypatch.setattr("dpgcli.cli.grasp.LONG", 0.0)
+    first = call(*arguments).stderr.splitlines()[0]
+    assert first.startswith(said)
+    assert first.endswith(" MiB of memory (rough)")
+    assert call(*arguments, "-q").stderr == ""
+
+
+def test_grasps_that_take_too_much_are_refused(call: Any, gripper: str) -> None:
+    result = call("grasp", gripper, *DISC, "--set", "finger.units=10", "--both")
+    assert result.exit_code == ExitCode.USAGE
+    assert "GiB of memory: expected at most 1.0: select with --pattern" in result.stderr
+
+
 def test_pairs_of_states(call: Any, gripper: str) -> None:
     """What one finger does against a body that does not move is not the other one's business."""
     own = rows_of(call, "grasp", gripper, *DISC, "--pattern", "0110?")
