@@ -22,11 +22,12 @@ from dpgcli.api.inputs import (
     table_path,
 )
 from dpgcli.api.tables import Table
-from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
 from dpgcli.design.outputs import Output
-from dpgcli.design.scene import Scene
+from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
+from dpgcli.grasping.costs import Work
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
@@ -37,7 +38,7 @@ from dpgcli.text import counted
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_ROWS, MOST_LANES = 2**20, 2**14
+MOST_ROWS, MOST_LANES, MOST_BYTES = 2**20, 2**14, 2**30
 MOST_DRAWN = 64
 
 
@@ -182,8 +183,27 @@ def grasp_of(
     assert scene.body is not None, "a scene with a body"
     check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
+    check_work(work_of(scene, pairs, way))
     keep_freed_memory()
     return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way))
+
+
+def work_of(scene: Scene, pairs: Sequence[Codes], way: Way = Way.PLACE) -> Work:
+    """What pairs of states will take."""
+    n_states = sum(len(distinct(codes)) for codes in pairs)
+    is_moving = scene.held is not Held.FIXED
+    return Work(n_states, len(pairs[0]), scene.finger.n_units, len(pairs), is_moving, way)
+
+
+def check_work(work: Work) -> None:
+    """Raise UsageError for grasps that take more memory than MOST_BYTES."""
+    if work.peak_bytes > MOST_BYTES:
+        what = f"{work.n_rows:,} grasps of {work.n_units} units take about"
+        raise UsageError(
+            f"{what} {work.peak_bytes / 2**30:.1f} GiB of memory: expected at most "
+            f"{MOST_BYTES / 2**30:.1f}: select with ",
+            Field("patterns"),
+        )
 
 
 def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, ...]:

@@ -161,8 +161,9 @@ def _problems(text: str, own: str) -> Iterator[Problem]:
         number = own.strip()
         hint = f"0:{number} goes there from 0, 0:{number}:0 back as well"
         yield _problem(text, f"{FEWEST_ROWS} or more {RAMP}", "one", hint)
-    elif any(abs(value) > LARGEST for value in ramp(own)):
-        yield _problem(text, f"pressures of at most {LARGEST:g} MPa", "more")
+    elif large := [part for part in parts if abs(float(part)) > LARGEST]:
+        expected = f"pressures from {-LARGEST:g} to {LARGEST:g} MPa"
+        yield _problem(text, expected, large[0].strip())
 
 
 def _unit(part: str) -> str:

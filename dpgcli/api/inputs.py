@@ -242,6 +242,8 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
 def path_of(field: str, path: str | os.PathLike[str]) -> Path:
     """The path of a file or folder. Raises UsageError for what is none, or no system can name.
 
+    An empty text is none, though for pathlib it is the current folder.
+
     >>> path_of("spec", None)
     Traceback (most recent call last):
         ...
@@ -249,7 +251,7 @@ def path_of(field: str, path: str | os.PathLike[str]) -> Path:
     """
     try:
         found = Path(path)
-        is_name = b"\0" not in os.fsencode(found)
+        is_name = b"\0" not in os.fsencode(found) and path != ""
     except (TypeError, UnicodeEncodeError):  # half of a pair in UTF-16
         is_name = False
     if not is_name:

@@ -15,7 +15,6 @@ from dpgcli.api.inputs import (
     Settings,
     SpecInput,
     as_texts,
-    check_numbers,
     figure_path,
     path_of,
     point,
@@ -201,12 +200,7 @@ def body_of(
     """The jaws at rest, and the two apertures. Raises UsageError for what is none."""
     if scene.gripper is None:
         raise UsageError(Field("gaps"), ": jaws need a gripper in the spec")
-    try:
-        first, last = (float(gap) for gap in gaps)
-    except (TypeError, ValueError):
-        raise UsageError(Field("gaps"), ": expected two apertures in mm, such as 10:60") from None
-    check_numbers(gaps=first)
-    check_numbers(gaps=last)
+    first, last = point("gaps", gaps)
     if not (min(first, last) >= NARROWEST and max(first, last) <= WIDEST and first != last):
         raise UsageError(
             Field("gaps"),

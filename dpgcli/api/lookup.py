@@ -101,7 +101,7 @@ def lookup(spec: SpecInput, *, start: str = "", settings: Settings = ()) -> Look
 
 def lookup_of(given: PressedInput, start: str = "") -> LookupResult:
     """The same, of what was read before."""
-    begin = code_of(given, "start", start)
+    begin = code_of(given, "start", start, may_lack=True)
     check_state(given, "start", begin)
     pressed, line_of = given.pressed, given.pressure.line_of
     reach = thresholds_alone(pressed).reach

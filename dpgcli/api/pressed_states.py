@@ -13,13 +13,17 @@ from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
 
 
-def code_of(given: PressedInput, field: str, pattern: str) -> int:
-    """The code of a pattern; of an empty one, that of rest. Raises UsageError for what is none."""
+def code_of(given: PressedInput, field: str, pattern: str, *, may_lack: bool = False) -> int:
+    """The code of a pattern; of an empty one, if it may be, that of rest.
+
+    Raises UsageError for what is none.
+    """
     check_texts(**{field: pattern})
     n_units = given.pressed.finger.n_units
-    if not re.fullmatch(f"[01]{{{n_units}}}", pattern or "0" * n_units):
+    said = pattern or "0" * n_units if may_lack else str(pattern)
+    if not re.fullmatch(f"[01]{{{n_units}}}", said):
         raise UsageError(Field(field), f" {pattern}: expected {n_units} digits, 0 or 1")
-    return int(pattern or "0", 2)
+    return int(said, 2)
 
 
 def check_state(given: PressedInput, field: str, code: int) -> None:

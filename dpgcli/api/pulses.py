@@ -243,7 +243,7 @@ def pulses_of(
     given: PressedInput, end: str, start: str = "", draws: Draws | None = None
 ) -> PulsesResult:
     """The same, of what was read before."""
-    begin, target = code_of(given, "start", start), code_of(given, "end", end)
+    begin, target = code_of(given, "start", start, may_lack=True), code_of(given, "end", end)
     check_size(given)
     check_state(given, "start", begin)
     keep_freed_memory()

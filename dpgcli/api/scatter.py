@@ -14,7 +14,7 @@ from dpgcli.design.scatter import OF_UNITS, SCATTERED, Scattered, scatter_issues
 from dpgcli.errors import Field, Problem, SpecError, UsageError
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.pressure import NUMBER
-from dpgcli.files.scene_file.tolerances import share_of
+from dpgcli.files.scene_file.tolerances import beyond, share_of
 from dpgcli.states.units import UnitSolutions
 from dpgcli.text import counted
 
@@ -115,7 +115,8 @@ def spread_of(scatter: ScatterInput) -> dict[str, Tolerance]:
         elif size is None:
             unit = unit_of(key)
             expected = f"a percentage such as 2%, or a number{f' in {unit}' if unit else ''}"
-            problems.append(_problem(key, expected, shown(said) if said else "nothing"))
+            found_there = shown(said) if said else "nothing"
+            problems.append(_problem(key, expected, found_there, _bound(key, said)))
         found[key] = size or Tolerance(0.0, False)
     if problems:
         raise SpecError(tuple(problems))
@@ -141,10 +142,24 @@ def _size(key: str, said: str) -> Tolerance | None:
     share = share_of(said)
     if share is not None:
         return Tolerance(share, True)
-    number = said.removesuffix(unit_of(key)).strip()
-    if not NUMBER.fullmatch(number) or not 0.0 <= float(number) <= LARGEST:
+    number = _number(key, said)
+    if number is None or not 0.0 <= number <= LARGEST:
         return None
-    return Tolerance(float(number), False)
+    return Tolerance(number, False)
+
+
+def _number(key: str, said: str) -> float | None:
+    """A number without the unit of its key."""
+    number = said.removesuffix(unit_of(key)).strip()
+    return float(number) if NUMBER.fullmatch(number) else None
+
+
+def _bound(key: str, said: str) -> str:
+    """The bound that a size is beyond, in words."""
+    number = _number(key, said)
+    if number is not None and number < 0.0:
+        return "at least 0"
+    return beyond(said if number is None else number)
 
 
 def _unknown(key: str) -> tuple[str, str, str]:

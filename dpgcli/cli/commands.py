@@ -10,10 +10,20 @@ from dpgcli.cli.examples import EXAMPLES
 from dpgcli.cli.exits import command
 
 WHOLE = 1000  # characters: no description is longer
+EMPTY = "is empty: expected a value"
 
 
 class Command(TyperCommand):
     """A command whose epilog is a list of examples."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Refuse empty texts, of variables that are not set: a path of them is this folder."""
+        given, _, _ = self.make_parser(ctx).parse_args(args=[*args])
+        for parameter in () if ctx.resilient_parsing else self.params:
+            said = given.get(parameter.name)
+            if "" in (said if isinstance(said, list | tuple) else (said,)):
+                raise typer.BadParameter(EMPTY, ctx, parameter)  # type: ignore[arg-type]
+        return super().parse_args(ctx, args)
 
     def get_short_help_str(self, limit: int = 0) -> str:
         """The description, however narrow the terminal."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.options import (
+    LONG,
     Patterns,
     Quiet,
     Settings,
@@ -20,9 +21,11 @@ from dpgcli.cli.options import (
 from dpgcli.cli.printing import ROWS_SHOWN, Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
+from dpgcli.text import counted
 
 if TYPE_CHECKING:
     from dpgcli.api.inputs import SceneInput
+    from dpgcli.grasping.costs import Work
 
 Body = Annotated[
     str | None,
@@ -81,7 +84,7 @@ def grasp(
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
     from dpgcli.api.bodies import with_body
-    from dpgcli.api.grasp import check_drawable, grasp_of, pairs_of
+    from dpgcli.api.grasp import check_drawable, check_work, grasp_of, pairs_of, work_of
     from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.grasping.approach import Way
@@ -95,12 +98,17 @@ def grasp(
         _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
         return
     given = with_body(given, body, point("--at", at))
-    chosen = tuple(patterns or ("*",))
+    chosen, way = tuple(patterns or ("*",)), Way(approach.value)
+    pairs = pairs_of(chosen, given.scene, both)
     if plot is not None:
-        check_drawable(len(pairs_of(chosen, given.scene, both)[0]))
+        check_drawable(len(pairs[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
+    work = work_of(given.scene, pairs, way)
+    check_work(work)
+    if work.seconds > LONG and not quiet:
+        say(_expected(work))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, chosen, both, Way(approach.value))
+        found = grasp_of(given, chosen, both, way)
     if output is not None:
         found.save(output)
     if plot is not None:
@@ -111,6 +119,16 @@ def grasp(
     if not quiet:
         for line in found.summary:
             say(line)
+
+
+def _expected(work: "Work") -> str:
+    """What is said before long work."""
+    from dpgcli.sweeps.extent import size_text, time_text
+
+    return (
+        f"{counted(work.n_rows, 'grasp')} of {counted(work.n_states, 'state')}: about "
+        f"{time_text(work.seconds)} on one core and {size_text(work.peak_bytes)} of memory (rough)"
+    )
 
 
 def _check_alone(body: str | None, both: bool, approach: ApproachName) -> None:

@@ -11,6 +11,7 @@ OPTIONS = {
     "patterns": "--pattern",
     "start": "--from",
     "end": "--to",
+    "gaps": "--jaws",
 }
 
 

@@ -47,6 +47,7 @@ def transitions(
     quiet: Quiet = False,
 ) -> None:
     """Find where pressure drives every stable state, and what can be reached from rest."""
+    from dpgcli.actuation.costs import announced
     from dpgcli.api.pressure import pressed_input
     from dpgcli.api.scatter import drawn_by
     from dpgcli.api.transitions import (
@@ -68,6 +69,9 @@ def transitions(
         graph_path(graph)
     outputs = (output, Mark.TABLE), (graph, Mark.GRAPH), (plot, Mark.FIGURE)
     check_outputs(given.given.files, *outputs)
+    expected = announced(given.pressed.finger, len(given.pressure.lines))
+    if expected and not quiet:
+        say(expected)
     with under_way("following every state", quiet=quiet):
         found = transitions_of(given, drawn)
     if output is not None:

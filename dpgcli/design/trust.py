@@ -37,6 +37,10 @@ SAY_SNAP = "say pressure.snap_pressure_MPa, or effective_area_mm2, as measured"
 BRIDGED_RESET = "reset pressures are assumed: nothing is sampled where domes come back"
 SAMPLE = "sample the dome's curve between rest and its inverted well"
 CALIBRATE_HERE = "calibrate at this geometry: dpg help calibration"
+BENDS_DOWN = (
+    "the curve's spline bends down at travel 0: domes are not at rest there but further open, and "
+    "where gaps are pulled shut the energy may have no bottom; give points nearer to rest"
+)
 UNDER_LOAD = "loads move it by stiffness"
 WITH_WALLS = "within 30 % of finite elements, up to 60 % too stiff if walls are fitted to shapes"
 DOMES = (BISTABLE_STIFFNESS.key, FORCE_LINEARITY.key)
@@ -57,14 +61,26 @@ def trusts_of(case: DesignCase) -> tuple[Trust, ...]:
 
 
 def warnings_of(case: DesignCase) -> tuple[str, ...]:
-    """The warnings of fits whose values, or curve, are in use, each with its file's name."""
+    """The warnings of fits whose values, or curve, are in use, each with its file's name.
+
+    And of a curve that bends down at rest, where all is in the spline between two points.
+    """
     used = {value.file for each in case.values.values() for value in each}
-    return tuple(
-        f"{file.file}: {warning}"
+    said = tuple(
+        f"{_name(file)}: {warning}"
         for place, file in enumerate(case.design.calibrations)
         if isinstance(file, Calibration) and (place in used or file is case.domes.calibration)
         for warning in file.warnings
     )
+    curve, calibration = case.domes.law.curve, case.domes.calibration
+    if curve is None or calibration is None or curve.rest == 0.0:
+        return said
+    return (*said, f"{_name(calibration)}: {BENDS_DOWN}")
+
+
+def _name(calibration: Calibration) -> str:
+    """The file of a calibration, or where one stands that has none."""
+    return calibration.file or "finger.calibration"
 
 
 def _shapes(case: DesignCase) -> Trust:

@@ -195,7 +195,7 @@ class Sheet:
         """Expected, found and hint where there is no number."""
         plain = self.marks.plain(cell)
         if NUMBER.fullmatch(plain):
-            expected = f"a number of at most {LARGEST:g}"
+            expected = f"a number from {-LARGEST:g} to {LARGEST:g}"
             return expected, shown(cell), "is the unit another one?"
         if self.marks.doubtful and GROUPED.fullmatch(cell):
             return "a number", shown(cell), WHICH_MARK["." in cell]

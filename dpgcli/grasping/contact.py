@@ -362,11 +362,12 @@ class Obstructed:
         return shapes.inverted & ~self.is_open(shapes)
 
     def is_open(self, shapes: ContactShapes) -> Flags:
-        """Which units are beyond their barriers, (unit, batch)."""
+        """Which units are in their inverted wells, (unit, batch)."""
         own = []
         for finger, potential in enumerate(self.potentials(shapes.inverted)):
             springs = potential.coordinates.springs(self.of_finger(shapes.coordinates, finger))
-            own.append(springs.extension > self.units.wells.spring_barrier)
+            acts = potential.coordinates.finger.acting > 0.0  # others only have a wide gap
+            own.append((springs.extension > self.units.wells.spring_barrier) & acts)
         return np.concatenate(own)
 
     def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:

@@ -1,6 +1,6 @@
 """What a finger, or a gripper's two, do with a body in their way."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -13,7 +13,7 @@ from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
-from dpgcli.grasping.contact import Motion, Obstructed
+from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
@@ -30,6 +30,8 @@ from dpgcli.states.units import UnitSolutions
 
 MARGIN_TO = 2.0  # of the load: margins are looked for so far
 TOUCHES = 1e-12  # N: a smaller push is rounding
+BLOCK = 2**28  # bytes
+LANE = 800  # bytes of a lane, times the square of its units: measured from 10 to 26 of them
 
 
 @dataclass(frozen=True)
@@ -73,18 +75,23 @@ class Grasped:
             [np.concatenate(v, axis=-1) for v in zip(*values, strict=True)]
             for values in ([p.nodes for p in parts], [p.touches for p in parts])
         )
-        resets: list[Reset] = []
-        before = 0
-        for part in parts:
-            resets += [replace(reset, lanes=reset.lanes + before) for reset in part.resets]
-            before += len(part.code)
         return cls(
             **arrays,
             touches=Touches(*touches),
             phalanges=parts[0].phalanges,
             nodes=Stations(*nodes),
-            resets=tuple(resets),
+            resets=_resets_of([part.resets for part in parts], [len(p.code) for p in parts]),
         )
+
+
+def _resets_of(parts: Sequence[Sequence[Reset]], sizes: Sequence[int]) -> tuple[Reset, ...]:
+    """Resets of several batches of these sizes, by the lanes of all of them."""
+    firsts = np.cumsum([0, *sizes])
+    return tuple(
+        replace(reset, lanes=reset.lanes + first)
+        for first, resets in zip(firsts, parts, strict=False)
+        for reset in resets
+    )
 
 
 @dataclass(frozen=True)
@@ -95,6 +102,27 @@ class Placed:
     own: Obstructed
     grown: Approach
     status: NDArray[np.uint8]
+
+    @classmethod
+    def joined(cls, parts: Sequence["Placed"]) -> "Placed":
+        """Those of several batches as one, of the same fingers and body."""
+        lanes = [[*vars(part.grown.shapes).values(), part.grown.load] for part in parts]
+        *shapes, load = (np.concatenate(values, axis=-1) for values in zip(*lanes, strict=True))
+        sizes = [len(part.codes) for part in parts]
+        resets = _resets_of([part.grown.resets for part in parts], sizes)
+        return cls(
+            np.concatenate([part.codes for part in parts]),
+            replace(parts[0].own, depth=np.concatenate([part.own.depth for part in parts])),
+            Approach(ContactShapes(*shapes), load, resets),
+            np.concatenate([part.status for part in parts]),
+        )
+
+
+def blocks(n_lanes: int, n_units: int) -> Iterator[slice]:
+    """Lanes that are worked on at once, so that these take no more than BLOCK bytes."""
+    size = max(BLOCK // (LANE * n_units**2), 1)
+    for first in range(0, max(n_lanes, 1), size):
+        yield slice(first, min(first + size, n_lanes))
 
 
 def placed(
@@ -112,7 +140,12 @@ def placed(
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
     thickness = np.reshape(scene.layer_thickness, -1)
-    return met(UnitSolutions.of(scene.finger), formulate, thickness, body, frame, codes, way)
+    units = UnitSolutions.of(scene.finger)
+    parts = [
+        met(units, formulate, thickness, body, frame, codes[some], way)
+        for some in blocks(len(codes), scene.finger.n_units)
+    ]
+    return Placed.joined(parts)
 
 
 def met(
@@ -229,6 +262,17 @@ def _is_entered(nodes: Array, body: Obstacle) -> Flags:
     area = shapely.polygons(body.points.transpose(2, 1, 0))
     inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
     return np.asarray(shapely.intersects(shapely.linestrings(nodes.transpose(2, 1, 0)), inner))
+
+
+def told(part: Placed) -> Grasped:
+    """The same of fingers that have met a body which stays where it is."""
+    grown, parts = part.grown, list[Grasped]()
+    for some in blocks(len(part.codes), part.own.units.finger.n_units):
+        lanes = np.arange(some.start, some.stop)
+        own, shapes = part.own.take_lanes(lanes), grown.shapes.take_lanes(lanes)
+        came = Approach(shapes, grown.load[some], ())
+        parts += described(own, [part.codes[some]], came, part.status[some])
+    return replace(Grasped.joined(parts), resets=grown.resets)
 
 
 def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:

@@ -1,7 +1,7 @@
 """Grasps as a table: a row for each state of a finger, or for each pair of states of a gripper."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -13,8 +13,9 @@ from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, placed
+from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, blocks, placed, told
 from dpgcli.grasping.release import let_go, motion_of, moved_by
+from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -95,8 +96,7 @@ def grasps(
     motion = motion_of(body, scene.held, seen_from)
     if motion is None:
         different = parts[:1] if is_alike else parts
-        told = [described(part.own, [part.codes], part.grown, part.status) for part in different]
-        fingers = [finger for (finger,) in told] * (len(parts) // len(told))
+        fingers = [told(part) for part in different] * (len(parts) // len(different))
         return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
     found, moved = let_go(parts, lanes, motion, scene.held)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
@@ -117,6 +117,16 @@ def columns_of(scene: Scene) -> tuple[Column, ...]:
 
 def grasp_rows(found: Grasps) -> Columns:
     """Rows by column, (row,). What is not known of states that are not stable is NaN."""
+    resets, n_rows = [_resets(finger) for finger in found.fingers], found.pairs.shape[1]
+    parts = []
+    for some in blocks(n_rows, found.scene.finger.n_units):
+        few = replace(found, pairs=found.pairs[:, some], centers=found.centers[:, some])
+        parts.append(_rows(few, resets))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _rows(found: Grasps, resets: Sequence[NDArray[np.str_]]) -> Columns:
+    """The same of few rows; `resets` are texts by finger and lane."""
     n_units = found.scene.finger.n_units
     of_fingers = [
         {name: getattr(finger, name)[..., lanes] for name in Grasped.BY_LANE}
@@ -138,7 +148,7 @@ def grasp_rows(found: Grasps) -> Columns:
         "status": status,
         "pattern_after": _joined([_texts(own["after"], n_units) for own in of_fingers], is_there),
         "resets": _joined(
-            [_resets(f)[lanes] for f, lanes in zip(found.fingers, found.pairs, strict=True)],
+            [own[lanes] for own, lanes in zip(resets, found.pairs, strict=True)],
             is_there,
         ),
         "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
@@ -173,8 +183,10 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
     assert found.scene.gripper is not None, "of a gripper"
     thickness = found.scene.layer_thickness
     assert thickness is not None, "the face is known"
-    poses = [place_in_gripper(found.scene.gripper, thickness, f.nodes) for f in found.fingers]
-    halves = [pose.aperture[lanes] for pose, lanes in zip(poses, found.pairs, strict=True)]
+    halves = []
+    for finger, lanes in zip(found.fingers, found.pairs, strict=True):
+        nodes = Stations(*(values[..., lanes] for values in finger.nodes))
+        halves.append(place_in_gripper(found.scene.gripper, thickness, nodes).aperture)
     overlaps = np.zeros(len(is_there), bool)
     upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
     overlaps[is_there] = shapely.intersects(upper, lower)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 FEWEST_POINTS = 4
+LEVEL = 1e-6  # of k_b: a curve as level is not told from one that is
 AT_REST = 1e-6  # of the travels: points as near to rest are not told from it
 
 
@@ -59,11 +60,13 @@ class Curve(Spline):
     `rests` are the top and the well, where the slope vanishes: the minimum that lies deepest below
     the highest maximum before it, and that maximum; NaN where there is none.
     `branches` are the stretches between the two on which the energy falls, each from its top to its
-    well, the last one first.
+    well, the last one first. `rest` is the travel of the dome at rest: 0, but the first minimum
+    of a spline that bends down there.
     """
 
     rests: tuple[float, float]
     branches: tuple[tuple[float, float], ...]
+    rest: float
 
 
 @cache  # one curve for all designs that share a calibration
@@ -89,7 +92,7 @@ def spline(travel: tuple[float, ...], value: tuple[float, ...]) -> Curve:
     rest: Any = (1, 0.0) if starts_at_rest else "not-a-knot"
     counted = np.subtract(value, value[0] if starts_at_rest else 0.0)
     cubic = CubicSpline(travel, counted, bc_type=(rest, "not-a-knot"))
-    return Curve(np.asarray(travel, float), spline_pieces(cubic), *_rests(cubic))
+    return Curve(np.asarray(travel, float), spline_pieces(cubic), *_rests(cubic), _rest(cubic))
 
 
 def spline_pieces(cubic: "CubicSpline") -> Array:
@@ -158,6 +161,15 @@ def _parabola(travel: Array, value: Array) -> tuple[float, float]:
         np.stack((travel[nearest], travel[nearest] ** 2), axis=1), rise, rcond=None
     )[0]
     return float(slope), float(bend)
+
+
+def _rest(cubic: "CubicSpline") -> float:
+    """The first minimum downhill from travel 0, on the way open: 0 unless it bends down there."""
+    bend = cubic.derivative(2)
+    if bend(0.0) >= -LEVEL:
+        return 0.0
+    roots = cubic.derivative().roots(extrapolate=False)
+    return float(np.min(roots[(roots > 0.0) & (bend(roots) > 0.0)], initial=np.inf))
 
 
 def _rests(

@@ -8,7 +8,7 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.states.rigid_unit import single_units
+from dpgcli.states.rigid_unit import single_units, tangent_of
 from dpgcli.states.wells import ByUnit, Wells
 
 
@@ -24,8 +24,9 @@ class FirstOrder(ByUnit):
     extensions (mm) that the rigid unit's forces cause, a strut's by one of its two units;
     `by_chord`, `by_near_strut`, `by_far_strut` the answer of the near corner to those, rad/mm (of
     the far corner: near and far exchanged). A ground unit carries no force and has all of them
-    zero. Close to the loss of bistability, and without a hinge, the answers grow without bound:
-    they are then scaled down to a tenth of m. `turn` is what both corners may turn by in any
+    zero, unless it rests at `rest_angle` and its wall by `rest_wall`: see `straight`. Close to the
+    loss of bistability, and without a hinge, the answers grow without bound: they are then scaled
+    down to a tenth of m. `turn` is what both corners may turn by in any
     pattern (rad), not scaled down. `wall_by_chord`, `wall_by_corner` and `wall_by_strut` are what
     the wall yields more, as bars and corners move. Shapes as in `Wells`.
     """
@@ -41,6 +42,8 @@ class FirstOrder(ByUnit):
     wall_by_chord: Array = field(default_factory=_none)
     wall_by_corner: Array = field(default_factory=_none)
     wall_by_strut: Array = field(default_factory=_none)
+    rest_angle: Array = field(default_factory=_none)
+    rest_wall: Array = field(default_factory=_none)
 
 
 def first_order(finger: Finger, wells: Wells) -> FirstOrder:
@@ -57,8 +60,10 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
         wall = np.broadcast_to(
             wells.extension - 2.0 * finger.segment_height * np.sin(wells.angle), zero.shape
         )
+    rest_angle, rest_wall = _straight(finger, wells.rest)
+    at_rest = {"rest_angle": rest_angle, "rest_wall": rest_wall}
     if finger.is_rigid:
-        return FirstOrder(rigid_angle, wall, zero, zero, zero, zero, zero, zero)
+        return FirstOrder(rigid_angle, wall, zero, zero, zero, zero, zero, zero, **at_rest)
     angle = rigid_angle.reshape(1, -1)
     rest = np.zeros_like(angle)
     potential = chain_potential(flat)
@@ -84,8 +89,25 @@ def first_order(finger: Finger, wells: Wells) -> FirstOrder:
     scaled = (np.where(np.isfinite(part), part, 0.0) * scale for part in answers)
     by_chord, by_near_strut, by_far_strut = scaled
     return FirstOrder(
-        rigid_angle, wall, chord, strut, by_chord, by_near_strut, by_far_strut, turn, *follows
+        rigid_angle,
+        wall,
+        chord,
+        strut,
+        by_chord,
+        by_near_strut,
+        by_far_strut,
+        turn,
+        *follows,
+        **at_rest,
     )
+
+
+def _straight(finger: Finger, rest: Array) -> tuple[Array, Array]:
+    """Corner angle (rad) and yield of the wall (mm) of straight units at rest."""
+    if not rest.any():
+        return rest, rest
+    angle = np.arctan(tangent_of(finger, rest))
+    return angle, rest - 2.0 * finger.segment_height * np.sin(angle)
 
 
 def _wall_answers(finger: Finger, band: Array, shape: tuple[int, ...]) -> tuple[Array, ...]:
@@ -136,18 +158,20 @@ def geometric_guess(finger: Finger, inverted: Flags, unit: FirstOrder) -> Intern
     Bars extend, and corners follow, to first order; the error left is of order (k_b/k_L)².
     """
     on = inverted.astype(float)
+    off = 1.0 - on
     if finger.is_rigid:
         rest = np.zeros((1, 1))
-        angle = unit.rigid_angle * on
-        return Internal(rest, angle, angle, rest, unit.wall * on)
+        angle = unit.rigid_angle * on + unit.rest_angle * off
+        return Internal(rest, angle, angle, rest, unit.wall * on + unit.rest_wall * off)
     strut = unit.strut * on
     strut[:-1] += (unit.strut * on)[1:]
     near_strut = np.zeros_like(strut)
     near_strut[1:] = strut[:-1]
     common = unit.rigid_angle + unit.by_chord * unit.chord
-    near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut)
-    far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut)
-    wall = unit.wall * on
+    ground = off * unit.rest_angle
+    near = on * (common + unit.by_near_strut * near_strut + unit.by_far_strut * strut) + ground
+    far = on * (common + unit.by_near_strut * strut + unit.by_far_strut * near_strut) + ground
+    wall = unit.wall * on + unit.rest_wall * off
     if finger.has_walls:
         turned = near + far - 2.0 * unit.rigid_angle * on
         wall += on * (unit.wall_by_chord * unit.chord + unit.wall_by_corner * turned)

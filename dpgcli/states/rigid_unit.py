@@ -4,6 +4,7 @@ Both corners open by m, so that the opening is x = 2H sin m, and the hinge's ene
 Walls take the rest of the dome's extension y: w = y − x.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -124,4 +125,6 @@ def single_units(finger: Finger) -> tuple[Finger, tuple[int, int]]:
     arrays = {**finger.arrays(), "branch": finger.branch}
     units, designs = np.broadcast_shapes(*(values.shape for values in arrays.values()))
     flat = {k: np.broadcast_to(v, (units, designs)).reshape(1, -1) for k, v in arrays.items()}
-    return finger.with_units([0]).changed(**flat).unloaded, (units, designs)
+    # its parts are the whole finger's
+    one = replace(finger.with_units([0]), **flat)  # type: ignore[arg-type]  # all arrays
+    return one.unloaded, (units, designs)

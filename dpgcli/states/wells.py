@@ -17,6 +17,7 @@ from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, tangent_of
 from dpgcli.states.scan import MIDDLE, WIDEST, opened, pulls, scan
+from dpgcli.states.straight import energy_at_rest, straight_rest
 
 INFLECTION_BISECTIONS = 24
 
@@ -57,7 +58,8 @@ class Wells(ByUnit):
     ripples of the curve, infinite where there are none: a state outside is another one.
     `snap_force` and `reset_force` (N, on the opening) are what a unit bears in its ground and in
     its inverted well; where there is no second well, `reset_force` is negative, what is lacking.
-    A dome that only pushes does not act in the ground well, whose hinge bears anything.
+    A dome that only pushes does not act in the ground well, whose hinge bears anything. `rest` (mm)
+    is the extension at which a unit that is not inverted rests, see `straight`: 0 under most laws.
     """
 
     exists: Flags
@@ -69,6 +71,7 @@ class Wells(ByUnit):
     to_top: Array
     snap_force: Array
     reset_force: Array
+    rest: Array
 
 
 def inverted_wells(finger: Finger) -> Wells:
@@ -103,6 +106,7 @@ def inverted_wells(finger: Finger) -> Wells:
         np.full(exists.shape, np.inf),
         snap if pulls(finger) else np.full(exists.shape, np.inf),
         -reset,
+        np.zeros(exists.shape),
     )
 
 
@@ -144,6 +148,7 @@ def _scanned_wells(finger: Finger) -> Wells:
         found.to_top,
         found.snap_force,
         found.reset_force,
+        straight_rest(finger, found.barrier),
     )
 
 
@@ -190,8 +195,8 @@ def _turn_over_sine(turn: Array) -> tuple[Array, Array]:
 def barriers(finger: Finger, wells: Wells) -> Array:
     """Smallest barrier (mJ) that keeps a unit of each design in its well, shape (design,).
 
-    To snap or to reset, hinge included, bars rigid: e(barrier) less e of the well, 0 where a
-    unit has but one well.
+    To snap or to reset, hinge included, bars rigid: e(barrier) less e of the well, or of the unit
+    at rest; 0 where a unit has but one well.
     """
     attached = replace(finger, law=finger.law.pulling)
     top, bottom = (
@@ -199,5 +204,8 @@ def barriers(finger: Finger, wells: Wells) -> Array:
     )
     # a dome that inverts before it touches its neighbor does not open the hinge
     snap = np.where(wells.barrier > 0.0, top, attached.springs(wells.barrier).energy)
-    lowest = np.where(wells.exists, np.minimum(snap, snap - bottom), 0.0)
+    at_rest = energy_at_rest(finger, wells.rest)
+    if pulls(finger):  # what turns over before it touches has no rest beside its neighbor
+        at_rest = np.where(wells.barrier > 0.0, at_rest, 0.0)
+    lowest = np.where(wells.exists, np.minimum(snap - at_rest, snap - bottom), 0.0)
     return np.asarray(lowest.min(axis=0))

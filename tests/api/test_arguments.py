@@ -29,6 +29,7 @@ LATTICE = {f"{name}_{unit}": STUDY[name] for name, unit in (
     ("hinge_stiffness", "N_mm_per_rad"),
 )} | {"force_linearity": 0.043}  # fmt: skip
 BASE = {"finger": {"units": 2, "linear_stiffness_N_per_mm": 1e4, "lattice": LATTICE}}
+PRESSED = {**BASE, "pressure": {"effective_area_mm2": 31.61}}
 STROKES = {"finger.lattice.stroke_mm": [2.5, 3.5], "finger.units": [1, 2]}
 SWEEP = {"base": BASE, "space": [{"paired": STROKES}]}
 DOME = {"travel_mm": [0.0, 1.0, 2.0], "energy_mJ": [0.0, 1.0, 0.5]}
@@ -124,6 +125,16 @@ def fit(**given: Any) -> Any:
         (lambda: dpg.actuate(BASE, pressure=b"ab"), "pressure b'ab': expected two numbers"),
         (lambda: dpg.actuate(BASE, pressure=bytearray(b"ab")), "pressure bytearray.*expected two"),
         (lambda: dpg.predict(FINGER, patterns=b"11"), "patterns b'11': expected a text"),
+        (lambda: dpg.pulses(PRESSED, end=""), "end : expected 2 digits, 0 or 1"),
+        (lambda: dpg.pulses(PRESSED, end=None), "end None: expected 2 digits, 0 or 1"),
+        (lambda: dpg.pulses(PRESSED, end=0), "end 0: expected a text"),
+        (lambda: dpg.landscape(FINGER, start="", end="11"), "start : expected 2 digits"),
+        (lambda: dpg.sweep(SWEEP, ""), "output '': expected a path"),
+        (lambda: dpg.merge([""], "x"), "shards '': expected a path"),
+        (lambda: dpg.merge(["x"], ""), "output '': expected a path"),
+        (lambda: dpg.report(""), "folder '': expected a path"),
+        (lambda: dpg.predict(""), "spec '': expected a path"),
+        (lambda: dpg.predict(FINGER).save(""), "path '': expected a path"),
         (lambda: fit(fix={1: 2}), "fix 1: no value of the law"),
         (lambda: fit(bootstrap=None), "bootstrap None: expected a whole number from 0 on"),
         (
@@ -187,6 +198,11 @@ def test_a_place_may_be_any_two_numbers_in_an_order(place: Any) -> None:
 def test_a_diameter_is_a_number(text: str) -> None:
     with pytest.raises(dpg.UsageError, match=f"^object {text}: expected disc and its diameter"):
         dpg.grasp(GRIPPER, object=text, at=(40, 0))
+
+
+def test_without_a_start_all_units_are_at_rest() -> None:
+    for start in ("", None, "00"):
+        assert dpg.lookup(PRESSED, start=start).start == "00"  # type: ignore[arg-type]
 
 
 ITSELF: list[Any] = []

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
-from dpgcli.design.scene import Scene
+from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 FINGER = uniform_finger(2, **STUDY)
@@ -46,6 +46,7 @@ SPEC = {
 }
 SWEEP = {"base": SPEC, "space": [{"key": "finger.units", "values": [1]}]}
 TOUCHING = Scene(FINGER, (), None, 1.5)
+GRIPPING = Scene(FINGER, (), Gripper(base_spacing=40.0, mounting_angle=0.0), 1.5)
 FACE: dict[str, dict[str, Any]] = {
     "actuate": {"spec": FINGER, "pressure": "0..0.1"},
     "bench": {"spec": FINGER, "repeats": -1},  # refused in the end
@@ -58,6 +59,7 @@ FACE: dict[str, dict[str, Any]] = {
     "fit_hinge": {"curve": HINGE},
     "fit_unit": {"curve": TURNS},
     "grasp": {"spec": TOUCHING, "object": "disc:10", "at": (20.0, -10.0)},
+    "jaws": {"spec": GRIPPING, "gaps": (10.0, 12.0), "at": (20.0, 0.0), "patterns": "00"},
     "landscape": {"spec": FINGER, "start": "0x", "end": "11"},
     "lookup": {"spec": FINGER},
     "merge": {"shards": ["nowhere"], "output": "new"},

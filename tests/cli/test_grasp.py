@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.grasping.table import COLUMNS, OF_PAIRS
+from dpgcli.grasping.table import COLUMNS, JAW_GAP, OF_PAIRS
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-NAMES = [column.name for column in COLUMNS]
+NAMES = [column.name for column in COLUMNS if column.name != JAW_GAP]  # of a disc
 DISC = ("--object", "disc:40", "--at", "40,0")
 RIGID = ("--set", "finger.linear_stiffness_N_per_mm=.inf")
 
@@ -59,6 +59,23 @@ def test_a_body_in_the_spec_is_the_same(call: Any, folder: Path, gripper: str) -
     smaller = rows_of(call, "grasp", "own.yaml", *chosen, "--object", "disc:20")
     assert smaller[0]["n_contacts"] == 0
     assert call("predict", "own.yaml", "-q").exit_code == ExitCode.DONE
+
+
+def test_long_work_is_said_before(call: Any, gripper: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ("grasp", gripper, *DISC, *RIGID, "--pattern", "0111?")
+    said = "2 grasps of 4 states: about "
+    assert said not in call(*arguments).stderr
+    monkeypatch.setattr("dpgcli.cli.grasp.LONG", 0.0)
+    first = call(*arguments).stderr.splitlines()[0]
+    assert first.startswith(said)
+    assert first.endswith(" MiB of memory (rough)")
+    assert call(*arguments, "-q").stderr == ""
+
+
+def test_grasps_that_take_too_much_are_refused(call: Any, gripper: str) -> None:
+    result = call("grasp", gripper, *DISC, "--set", "finger.units=10", "--both")
+    assert result.exit_code == ExitCode.USAGE
+    assert "GiB of memory: expected at most 1.0: select with --pattern" in result.stderr
 
 
 def test_pairs_of_states(call: Any, gripper: str) -> None:

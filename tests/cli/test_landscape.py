@@ -109,7 +109,7 @@ def test_the_summary_says_ties_and_what_barriers_rest_on(call: Any, graded: str)
     [
         (("--from", "0000", "--to", "11111"), "--from 0000: expected 5 digits, 0 or 1"),
         (("--from", "00000", "--to", "1111?"), "--to 1111?: expected 5 digits, 0 or 1"),
-        (("--from", "00000", "--to", ""), "--to : expected 5 digits, 0 or 1"),
+        (("--from", "00000", "--to", ""), "is empty: expected a value"),
         (("--from", "00000", "--to", "1" * 5, "--via", "2"), "--via 2: expected 5 digits"),
         (("--from", "00000"), "--to"),
         (("--to", "00000"), "--from"),

@@ -118,3 +118,18 @@ def test_an_interrupt_leaves_no_file(start: Any, folder: Path) -> None:
     program.send_signal(signal.SIGINT)
     assert program.wait(60) == 130
     assert not [path for path in folder.iterdir() if path.name.startswith("t.parquet")]
+
+
+@pytest.mark.parametrize(("lines", "is_long"), [((), False), (LINES, True)])
+def test_what_may_take_long_is_said_before_by_law(
+    call: Any, monkeypatch: pytest.MonkeyPatch, lines: tuple[str, ...], is_long: bool
+) -> None:
+    """By a curve: 16 directions of three units on one line are short, 32 on two here are not."""
+    monkeypatch.setattr("dpgcli.actuation.costs.LONG", 12.0)
+    by_curve = ("-s", "finger.calibration=finite_elements", "-s", "finger.law=push_only")
+    found = call("transitions", "three_unit.yaml", *by_curve, *lines, "--format", "csv")
+    said = "32 directions of 8 patterns: 0 to 16 s"
+    assert (found.stderr.splitlines()[0] == said) is is_long
+    assert said not in found.stdout
+    quiet = call("transitions", "three_unit.yaml", *by_curve, *lines, "-q", "--format", "csv")
+    assert quiet.stderr == ""

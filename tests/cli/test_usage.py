@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from typer.models import OptionInfo
 
 from dpgcli.cli.examples import EXAMPLES
-from dpgcli.cli.main import NAMES
+from dpgcli.cli.main import NAMES, Commands
 
 Call = Callable[..., Any]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -181,6 +182,10 @@ def test_an_option_is_spelled_the_same_everywhere() -> None:
         (("predict", "x", "--columns"), "option '--columns' requires an argument"),
         (("init", "--force=1"), "option '--force' does not take a value"),
         (("-v",), "missing command (see dpg --help)"),
+        (("sweep", "x", "-o", ""), "--output is empty: expected a value (see dpg sweep --help)"),
+        (("fe", "hinge", "x", "--output="), "--output is empty: expected a value (see dpg fe"),
+        (("predict", "x", "--set", "a=1", "--set", ""), "--set is empty: expected a value"),
+        (("merge", "a", "", "-o", "b"), "FOLDER... is empty: expected a value"),
         (("-v", "schema"), "--verbose goes with --version (see dpg --help)"),
     ],
 )
@@ -188,6 +193,21 @@ def test_misuse_is_said_in_one_line(run: Run, arguments: tuple[str, ...], said: 
     done = run(*arguments, before="import sys; sys.argv[0] = 'dpg'")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert done.stderr.startswith(f"dpg: {said}")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_an_empty_text_is_no_value_and_no_folder(name: str) -> None:
+    """As of a variable that is not set: `-o "$OUT"` would fill the current folder."""
+    first, _, second = name.partition(" ")
+    command = Commands()[first].commands[second] if second else Commands()[first]
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    words = {argument: ["x"] * place + [""] for place, argument in enumerate(arguments)}
+    options = [p for p in command.params if p not in words and not p.is_flag]
+    words |= {option: [f"{option.opts[-1]}="] for option in options}
+    for parameter, said in words.items():
+        with pytest.raises(typer.BadParameter, match=r"^is empty: expected a value") as met:
+            command.make_context(name, said)
+        assert met.value.param is parameter
 
 
 @pytest.mark.parametrize("arguments", [(), ("fit",), ("fe",)])

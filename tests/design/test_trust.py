@@ -676,3 +676,20 @@ def test_energies_scaled_for_another_law_are_extrapolated() -> None:
     assert (energies.basis, energies.known_error) == (Basis.EXTRAPOLATED, "unknown")
     assert energies.doubt
     assert not trusts(PUSHED)[Output.ENERGIES].doubt
+
+
+@pytest.mark.parametrize("law", ["tabulated", "push_only", None])
+@pytest.mark.parametrize("second", [0.01, 0.8])
+def test_a_curve_that_bends_down_at_rest_is_warned_of(law: str | None, second: float) -> None:
+    """By few points that all rise: the third lies high above the parabola of the second."""
+    travel = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    energy = np.array([0.0, second, 3.0, 5.0, 4.0, 2.0, 8.0])
+    few = replace(dome(), curve=DomeCurve(travel, energy, 0.35, ()))
+    found = resolve(replace(PUSHED, calibrations=(few, PUBLISHED), law=law)).warnings
+    warns = law is not None and second < 0.1
+    alone = replace(PUSHED, calibrations=(replace(few, file=None), PUBLISHED), law=law)
+    said = resolve(alone).warnings
+    assert [warning.split(": ")[0] for warning in said] == ["finger.calibration"] * warns
+    assert [warning.split(" at travel")[0] for warning in found] == (
+        ["dome.yaml: the curve's spline bends down"] if warns else []
+    )

@@ -167,7 +167,7 @@ TIPS = "tip_x_mm and tip_y_mm, or tip_angle_rad"
             [
                 '2: tip_x_mm: expected a number, found "left"',
                 '2: tip_y_mm: expected a number, found "nan"',
-                '3: tip_x_mm: expected a number of at most 1e+12, found "1e300" '
+                '3: tip_x_mm: expected a number from -1e+12 to 1e+12, found "1e300" '
                 "(is the unit another one?)",
                 '3: tip_y_mm: expected a number, found "inf"',
             ],

@@ -1,6 +1,7 @@
 """Jaws that open and close: slopes, work against energy, a closed form, and a linear mechanism."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,18 @@ from scipy.optimize import root
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Gripper, Scene
+from dpgcli.grasping.contact import ContactShapes, Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.jaw_table import by_number, jaw_rows, path_rows
 from dpgcli.grasping.jaws import JawPath, jaw_path
 from dpgcli.grasping.mechanism import Branch, Mechanism
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.laws import PUBLISHED, PushOnly
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
+from dpgcli.states.units import UnitSolutions
 
 Fingers = Callable[..., Finger]
 SPACING, THICKNESS = 30.0, 1.5  # mm
@@ -133,3 +138,15 @@ def test_branches_go_by_rising_apertures(reference_finger: Fingers) -> None:
     assert (np.diff(one.gap) > 0.0).all() and (np.diff(other.gap) > 0.0).all()
     assert other.squeeze == pytest.approx(one.squeeze, rel=1e-9)
     assert other.stiffness == pytest.approx(one.stiffness, rel=1e-6)
+
+
+def test_a_gap_that_is_wide_without_a_dome_is_no_inverted_unit(reference_finger: Fingers) -> None:
+    """Domes that only push: the ground unit's hinge alone opens its gap, past the barrier."""
+    finger = replace(reference_finger(2), law=PushOnly(PUBLISHED))
+    units = UnitSolutions.of(finger)
+    body = Obstacle.disc(np.array([100.0, 0.0]), 1.0)
+    own = Obstructed(units, chain_potential, np.array([[THICKNESS]]), (body,), np.zeros(1))
+    wide = np.array([[0.17], [0.17], [0.17], [0.17]])
+    inverted, nothing = np.array([[True], [False]]), np.zeros((own.n_gaps, 1))
+    shapes = ContactShapes(wide, nothing, nothing > 0.0, inverted, np.ones(1, bool))
+    assert own.is_open(shapes)[:, 0].tolist() == [True, False]

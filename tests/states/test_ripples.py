@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from dpgcli.arrays import Array
 from dpgcli.design.scene import Scene
@@ -15,6 +15,7 @@ from dpgcli.mechanics.curve import spline
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly, Tabulated
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.barriers import barriers as over_saddles
 from dpgcli.states.certify import Status, certified
 from dpgcli.states.guess import stroke_guess
 from dpgcli.states.plan import Request
@@ -219,3 +220,98 @@ def test_a_well_beyond_a_ripple_that_the_hinge_takes_away() -> None:
     assert len(wells_of_it) == 1
     assert wells.exists.all()
     assert wells.extension[0, 0] == pytest.approx(opening[wells_of_it[0]], abs=1e-4)
+
+
+FEW = np.array([0.0, 0.28, 0.56, 0.84, 1.12, 1.4, 1.68, 1.96, 2.24, 2.52])  # mm
+RISING = np.array([0.0, 0.18, 1.01, 1.29, 1.40, 1.07, 0.97, 0.59, 0.53, 1.37])  # mJ
+
+
+def bends_down(n_units: int, law: Callable[..., object] = Tabulated, **changes: float) -> Finger:
+    """Units whose energy rises from point to point, but not from rest on."""
+    values = {"segment_length": 10.0, "segment_height": 13.4, "hinge_stiffness": 1.7}
+    values |= {"stroke": 2.04, "bistable_stiffness": 6.07, "force_linearity": 0.0}
+    finger = uniform_finger(n_units, **{**values, **changes})
+    curve = spline(tuple(FEW / 2.04), tuple(RISING / (6.07 * 2.04**2)))
+    return replace(finger, law=law(curve))
+
+
+def unit_energy(opening: Array) -> Array:
+    dome = CubicSpline(FEW, RISING, bc_type=((1, 0.0), "not-a-knot"))(opening)
+    return np.asarray(dome + 0.5 * 1.7 * (2.0 * np.arcsin(opening / 26.8)) ** 2)
+
+
+def ground_opening() -> float:
+    found = minimize_scalar(unit_energy, bounds=(0.01, 0.1), method="bounded", options=FINE)
+    return float(found.x)
+
+
+FINE = {"xatol": 1e-10}
+
+
+def test_a_straight_unit_that_is_not_at_rest_opens_to_where_it_is() -> None:
+    opening = ground_opening()
+    finger, patterns = bends_down(1), np.array([[False, True]])
+    found = settle(UnitSolutions.of(finger), chain_potential, patterns, 1e-12)
+    assert found.status.tolist() == [Status.STABLE, Status.STABLE]
+    potential = found.potential.coordinates
+    extension = potential.openings(found.equilibrium.coordinates)
+    assert extension[0, 0] == pytest.approx(opening, rel=1e-7)
+    assert opening == pytest.approx(0.0448, abs=1e-4)
+
+
+@pytest.mark.parametrize("bars", [np.inf, 1e4, 100.0])
+@pytest.mark.parametrize("n_units", [3, 9])
+def test_so_do_all_straight_units_of_a_finger(bars: float, n_units: int) -> None:
+    """Directly, and by pairs of half-fingers."""
+    finger = bends_down(n_units, linear_stiffness=bars)
+    found = predict(Scene(finger, ()), Request(columns=("default", "openings"))).arrays()
+    assert (found["status"] == "stable").all()
+    openings = np.array([found[f"opening_{unit}_mm"] for unit in range(1, n_units + 1)])
+    is_straight = np.array([[digit == "0" for digit in text] for text in found["pattern"]]).T
+    assert openings[is_straight] == pytest.approx(ground_opening(), rel=0.2)
+
+
+def test_its_barrier_is_counted_from_there() -> None:
+    """Here the smaller one is to snap: both by a scan of the energy."""
+    finger = bends_down(1)
+    energy = unit_energy(np.linspace(0.0, 2.4, 240_001))
+    snap = energy[:150_000].max() - energy[:50_000].min()
+    reset = energy[:150_000].max() - energy[150_000:].min()
+    found = float(barriers(finger, inverted_wells(finger))[0])
+    assert found == pytest.approx(min(snap, reset), abs=1e-9)
+
+
+def test_a_dome_that_only_pushes_snaps_from_its_own_rest() -> None:
+    """Where that is the smaller barrier: its inverted well lies deeper."""
+    energy = RISING - 0.2 * FEW**2
+    curve = spline(tuple(FEW / 2.04), tuple(energy / (6.07 * 2.04**2)))
+    finger = replace(bends_down(1), law=PushOnly(Tabulated(curve)))
+    dome = CubicSpline(FEW, energy, bc_type=((1, 0.0), "not-a-knot"))
+    own = dome(np.linspace(0.0, 1.2, 120_001))
+    assert own.min() < -1e-3
+    snap = barriers(finger, inverted_wells(finger))
+    hinge = 0.5 * 1.7 * (2.0 * np.arcsin(inverted_wells(finger).barrier / 26.8)) ** 2
+    top = dome(inverted_wells(finger).barrier) + hinge
+    assert snap[0] == pytest.approx(float(top[0, 0]) - own.min(), abs=1e-9)
+
+
+@pytest.mark.parametrize("compliance", [0.02, 1.0])
+def test_walls_yield_in_straight_units_that_are_not_at_rest(compliance: float) -> None:
+    finger = bends_down(2, linear_stiffness=1e4)
+    finger = finger.changed(wall_compliance=np.array([[compliance], [0.0]]))
+    found = predict(Scene(finger, ()), Request()).arrays()
+    assert found["status"].tolist() == ["stable"] * 4
+    assert UnitSolutions.of(finger).wells.rest[1, 0] == pytest.approx(ground_opening(), rel=1e-7)
+
+
+@pytest.mark.parametrize("stroke", [8.0, 10.0])
+def test_a_barrier_is_counted_from_a_gap_that_its_dome_pulls_shut(stroke: float) -> None:
+    """A dome that pulls and rests a way off: the barrier to snap is that of the saddle."""
+    u = TRAVEL / 13.0
+    curve = 960.0 * u**2 * (1.0 - u) ** 2 - 30.0 * u**2 * (3.0 - 2.0 * u)
+    finger = rippled(Tabulated, curve, stroke=stroke)
+    units, patterns = UnitSolutions.of(finger), np.array([[False, True]])
+    states = settle(units, chain_potential, patterns, 1e-12)
+    over = over_saddles(units, chain_potential, states, 1e-12).energy
+    assert barriers(finger, units.wells) == pytest.approx(over.min(), rel=1e-9)
+    assert over[0, 0] < over[0, 1], "to snap"

@@ -254,3 +254,16 @@ def test_walls_that_hardly_give_way_are_rigid(compliance: float) -> None:
     finger = rigid.changed(wall_compliance=np.array([[compliance]]))
     extension = np.array([[0.0, 1.0, 3.5, 21.0]])
     assert tangent_of(finger, extension) == pytest.approx(tangent_of(rigid, extension), rel=1e-12)
+
+
+@pytest.mark.parametrize("bars", [np.inf, 1e4])
+def test_units_taken_from_a_finger_keep_its_walls(bars: float) -> None:
+    """Solved again by themselves: designs or units all of whose walls are rigid."""
+    finger = finger_with(3, 0.7, 0.0, 0.0, bars=bars)
+    pattern = np.ones((2, 1), bool)
+    cut = settled(finger.section(1, 3), pattern)
+    bare = settled(finger_with(2, 0.0, bars=bars), pattern)
+    assert cut.status.tolist() == bare.status.tolist() == [Status.STABLE]
+    assert cut.equilibrium.energy == pytest.approx(bare.equilibrium.energy, rel=1e-12)
+    size = bare.potential.coordinates.size
+    assert cut.potential.coordinates.size == size + 2

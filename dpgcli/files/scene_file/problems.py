@@ -28,7 +28,7 @@ from dpgcli.files.scene_file.models import (
 )
 from dpgcli.files.scene_file.pressure import EXPECTED, PressureSpec, UnitPressure, expected_at
 from dpgcli.files.scene_file.scenes import body_issues, early_issues
-from dpgcli.files.scene_file.tolerances import Tolerances
+from dpgcli.files.scene_file.tolerances import Tolerances, beyond
 from dpgcli.files.sections import (
     Geometry,
     Lattice,
@@ -87,6 +87,7 @@ HINTS = {
     "hinge_coupling_N_mm_per_rad": "0 is none; that of the study's finger is about 1.2",
     "chamber_width_mm": "chamber width is unit cell minus 2 mm",
     "segment_length_mm": "chamber length + 2 dome thickness + unit separation",
+    "model_error": "above 0% and at most 100%",
     "segment_height_mm": "half the chamber width + half the limiting layer",
 }
 
@@ -185,7 +186,7 @@ def _problem(document: Document, error: Any) -> Problem:
     show = _shown if path[:1] in WHOLE else shown
     found = "nothing" if error["type"] == "missing" else show(error["input"])
     is_worded = path[:-1] == UNCERTAINTY or bool(expected_at(path))
-    hint = "" if is_worded else _hint(key, error)
+    hint = ("" if is_worded else _hint(key, error)) or beyond(error["input"])
     return document.problem(path, _expected(path), found, hint)
 
 
@@ -265,7 +266,8 @@ def _nearest(key: str, known: list[str]) -> str:
         for name in model.model_fields
     }
     if key in elsewhere:
-        return f"did you mean {elsewhere[key]}?"
+        at_the_top = f"{key} stands at the top of a spec, in no section"
+        return at_the_top if elsewhere[key] == key else f"did you mean {elsewhere[key]}?"
     if close := get_close_matches(key, known, n=1):
         return f"did you mean {close[0]}?"
     if close := get_close_matches(key, list(elsewhere), n=1):

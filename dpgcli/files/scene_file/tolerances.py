@@ -1,5 +1,6 @@
 """What the values of a spec, and the model, may be off by: keys, types and meaning."""
 
+import math
 import re
 from typing import Annotated, Any
 
@@ -23,6 +24,22 @@ def share_of(value: object) -> float | None:
     if match is None or float(match[1]) > 100.0:
         return None
     return float(match[1]) / 100.0
+
+
+def beyond(value: object) -> str:
+    """The bound that a number, one of a list of them or a percentage is beyond, in words.
+
+    >>> beyond("200%"), beyond([0, -1.1e16]), beyond(".nan")
+    ('at most 100%', 'at most 1e+12 in size', '')
+    """
+    if isinstance(value, str):
+        match = PERCENTAGE.fullmatch(value)
+        return "at most 100%" if match is not None and float(match[1]) > 100.0 else ""
+    numbers = value if isinstance(value, list) else [value]
+    is_beyond = (
+        isinstance(part, int | float) and LARGEST < abs(part) < math.inf for part in numbers
+    )
+    return f"at most {LARGEST:g} in size" if any(is_beyond) else ""
 
 
 def _tolerance(value: object) -> object:

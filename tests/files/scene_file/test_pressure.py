@@ -199,6 +199,18 @@ def test_what_says_the_same_is_the_same() -> None:
         ("history: {A: [0, .inf]}", "history.A.1: expected a pressure in MPa, found .inf"),
         ("history: {A: [0, null, 0]}", "history.A.1: expected a pressure in MPa, found nothing"),
         ("history: {A: [0, x]}", 'history.A.1: expected a pressure in MPa, found "x"'),
+        (
+            "history: {A: [0, -1.1e+16]}",
+            "history.A.1: expected a pressure in MPa, found -1.1e+16 (at most 1e+12 in size)",
+        ),
+        (
+            "history: {A: 0:2e12}",
+            "history.A.1: expected a pressure in MPa, found 2000000000000.0 (at",
+        ),
+        (
+            "history: {time_s: [0, 1e13], A: 0:1}",
+            "history.time_s.1: expected a time in s, found 10000000000000.0 (at most 1e+12 in",
+        ),
         ("history: {C: 0:1}", "history.C: expected a line: A, found C"),
         (
             "history: {time_s: [0, 1]}",

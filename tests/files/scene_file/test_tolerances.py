@@ -68,12 +68,12 @@ def test_a_spec_that_a_table_keeps_means_the_same() -> None:
 WRONG = [
     ("dome_height_mm", "-0.1", "-0.1"),
     ("dome_height_mm", "0.1mm", '"0.1mm"'),
-    ("dome_height_mm", "101%", '"101%"'),
+    ("dome_height_mm", "101%", '"101%" (at most 100%)'),
     ("dome_height_mm", ".nan", ".nan"),
     ("dome_height_mm", ".inf", ".inf"),
     ("dome_height_mm", "true", "true"),
     ("dome_height_mm", "[1]", "a list"),
-    ("dome_height_mm", "1e13", "10000000000000.0"),
+    ("dome_height_mm", "1e13", "10000000000000.0 (at most 1e+12 in size)"),
 ]
 
 
@@ -87,10 +87,11 @@ def test_what_is_no_uncertainty(key: str, value: str, found: str) -> None:
     assert found in problem
 
 
-@pytest.mark.parametrize("value", ["0.05", "5", "0%", "often", "-5%"])
+@pytest.mark.parametrize("value", ["0.05", "5", "0%", "often", "-5%", "101%"])
 def test_what_is_no_model_error(value: str) -> None:
     (problem,) = problems(f"model_error: {value}\n")
     assert "model_error: expected a percentage such as 5%, or leave_one_out, found " in problem
+    assert "(above 0% and at most 100%)" in problem
 
 
 def test_mistakes_between_keys_all_at_once() -> None:

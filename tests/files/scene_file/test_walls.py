@@ -1,6 +1,7 @@
 """Walls that give way, in specs: of the whole finger, of some units, from a calibration."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,9 +79,17 @@ def test_a_sweep_over_walls_finds_what_predictions_find() -> None:
         assert part["pattern"].tolist() == own["pattern"].tolist()
 
 
-def test_pairs_of_halves_know_walls() -> None:
-    """All states of a long finger, and some of them alone."""
-    spec = finger(units=14, wall_compliance_mm_per_N=0.8)
+@pytest.mark.parametrize(
+    "walls",
+    [
+        {"wall_compliance_mm_per_N": 0.8},
+        {"overrides": {"1": {"wall_compliance_mm_per_N": 0.8}}},
+        {"overrides": {"9-14": {"wall_compliance_mm_per_N": 0.8}}},
+    ],
+)
+def test_pairs_of_halves_know_walls(walls: dict[str, Any]) -> None:
+    """All states of a long finger, and some of them alone; also where half of it has none."""
+    spec = finger(units=14, **walls)
     whole = dpg.predict(spec, columns="states")
     assert whole.plan.method == "pairs of half-fingers"
     few = dpg.predict(spec, patterns="1010*0011", columns="states")
@@ -88,5 +97,3 @@ def test_pairs_of_halves_know_walls() -> None:
     rows = whole.to_pandas().set_index("pattern").loc[few.table["pattern"].tolist()]
     for name in ("tip_x_mm", "tip_y_mm", "energy_mJ"):
         np.testing.assert_allclose(rows[name], few.table[name].tolist(), atol=1e-9)
-    mixed = finger(units=14, overrides={"1": {"wall_compliance_mm_per_N": 0.8}})
-    assert dpg.explain(mixed, columns="states").method == "direct"

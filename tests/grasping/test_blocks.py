@@ -1,0 +1,87 @@
+"""Work in blocks of lanes: the same rows, in memory that has a bound, and said before."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import dpgcli as dpg
+from dpgcli.api.grasp import check_work, pairs_of, work_of
+from dpgcli.design.scene import Gripper, Held, Scene
+from dpgcli.errors import UsageError
+from dpgcli.grasping import grasp
+from dpgcli.grasping.approach import Way
+from dpgcli.grasping.costs import Work
+from dpgcli.mechanics.finger import STUDY, uniform_finger
+
+GRIPPER = Gripper(base_spacing=30.0, mounting_angle=0.0)
+
+
+def scene(n_units: int, held: Held = Held.FIXED) -> Scene:
+    return Scene(uniform_finger(n_units, **STUDY), (), GRIPPER, 1.5, held=held)
+
+
+@pytest.mark.parametrize(
+    ("held", "way", "both"),
+    [
+        (Held.FIXED, "place", True),
+        pytest.param(Held.FIXED, "insert", False, marks=pytest.mark.slow),
+        pytest.param(Held.FREE, "place", False, marks=pytest.mark.slow),
+    ],
+)
+@pytest.mark.parametrize("size", [1, 3])
+def test_rows_are_the_same_in_blocks_of_any_size(
+    monkeypatch: pytest.MonkeyPatch, held: Held, way: str, both: bool, size: int
+) -> None:
+    def rows() -> dict[str, np.ndarray[tuple[int], np.dtype[np.generic]]]:
+        body = {"object": "disc:20", "at": (32.0, 1.0)}
+        return dpg.grasp(scene(3, held), **body, approach=way, both=both).rows  # type: ignore
+
+    expected = rows()
+    monkeypatch.setattr(grasp, "BLOCK", size * grasp.LANE * 9)
+    found = rows()
+    assert held is Held.FREE or any(expected["resets"] != "")
+    for name, values in expected.items():
+        assert found[name].tobytes() == values.tobytes(), name
+        assert found[name].dtype == values.dtype
+
+
+@pytest.mark.slow
+def test_memory_is_that_of_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    def peak() -> int:
+        tracemalloc.start()
+        len(dpg.grasp(scene(6), object="disc:20", at=(32.0, 0.0), patterns=["*"]).rows)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak()  # with what is imported
+    whole = peak()
+    monkeypatch.setattr(grasp, "BLOCK", 8 * grasp.LANE * 36)
+    assert peak() < 0.5 * whole
+    assert 0.3 < whole / (64 * grasp.LANE * 36) < 3.0
+
+
+def test_memory_has_a_bound_whatever_the_number_of_units() -> None:
+    for n_units in (14, 26, 64):
+        assert Work(2**14, 2**14, n_units, 1, is_moving=False).peak_bytes < 2**29 + 2**28
+    assert [*grasp.blocks(0, 5)] == [slice(0, 0)]
+    assert sum(b.stop - b.start for b in grasp.blocks(2**14, 26)) == 2**14
+    assert max(b.stop - b.start for b in grasp.blocks(2**14, 26)) * grasp.LANE * 26**2 < grasp.BLOCK
+
+
+def test_grasps_that_take_too_much_are_refused_with_the_number() -> None:
+    moving = scene(10, Held.FREE)
+    pairs = pairs_of(["*"], moving, both=True)
+    with pytest.raises(UsageError, match=r"^1,048,576 grasps of 10 units take about .* GiB of mem"):
+        check_work(work_of(moving, pairs))
+    with pytest.raises(UsageError, match=r"^1,048,576 grasps of 10 units take about 2"):
+        dpg.grasp(scene(10), object="disc:20", at=(32.0, 0.0), both=True)
+
+
+def test_work_counts_states_once_and_rows_of_bodies_that_move() -> None:
+    pairs = pairs_of(["00*"], scene(5), both=True)
+    fixed, moving = work_of(scene(5), pairs), work_of(scene(5, Held.FREE), pairs)
+    assert (fixed.n_states, fixed.n_rows) == (16, 64)
+    assert moving.seconds > 3.0 * fixed.seconds
+    assert work_of(scene(5), pairs, Way.INSERT).seconds > fixed.seconds
