@@ -207,12 +207,15 @@ def body_of(
             f" {first:g}:{last:g}: expected two apertures from {NARROWEST:g} to {WIDEST:g} mm",
         )
     known = scene.body if isinstance(scene.body, Jaws) else None
-    if at is None and scene.body is None:
+    if at is not None:
+        center = np.array(point("at", at))
+    elif scene.body is not None:
+        center = scene.body.center
+    else:
         raise UsageError(Field("at"), ": expected the middle of the jaws in mm, such as 40,0")
-    center = scene.body.center if at is None and scene.body is not None else point("at", at or ())
     height = HEIGHT if known is None else known.height
     rest = max(first, last) if known is None else known.gap
-    body = Jaws(np.array(center), rest, height)
+    body = Jaws(center, rest, height)
     if body.center[1] != 0.0:
         raise UsageError(Field("at"), ": expected jaws on the axis of the gripper, y of 0")
     for gap in (first, last):

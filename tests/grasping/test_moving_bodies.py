@@ -87,7 +87,7 @@ def test_derivatives_by_fingers_and_body(
     disc = Disc(np.array([25.0, 1.0]), 30.0)
     parts = [placed(scene, chain_potential, disc, f, codes("001")) for f in seen]
     lane = np.zeros(1, int)
-    own, shapes = together(parts, [lane, lane], motion_of(held, seen))
+    own, shapes = together(parts, [lane, lane], motion_of(disc, held, seen))
     random = np.random.default_rng(5)
     push = random.uniform(5000.0, 6000.0, (own.n_gaps, 1))
     potential = own.pressed(shapes.inverted, push, np.ones(1))
@@ -141,7 +141,7 @@ def test_an_energy_of_its_own_and_slsqp_find_the_same_place(
     code = codes("00001")
     parts = [placed(scene, chain_potential, CAN, f, code) for f in seen]
     lane = np.zeros(1, int)
-    joint, start = together(parts, [lane, lane], motion_of(Held.FREE, seen))
+    joint, start = together(parts, [lane, lane], motion_of(CAN, Held.FREE, seen))
     found = released(joint, start).shapes
     inverted = np.array([digit == "1" for digit in "00001"])
     n = joint.n_own // 2
