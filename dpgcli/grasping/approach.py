@@ -12,7 +12,9 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import Ends, PathEnd, follow
-from dpgcli.grasping.contact import ContactShapes, Obstructed
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.descent import finished, relaxed
+from dpgcli.grasping.shapes import ContactShapes
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
@@ -122,7 +124,7 @@ def _put_right(obstructed: Obstructed, shapes: ContactShapes, load: Array) -> No
         few, own = shapes.take_lanes(lanes), obstructed.take_lanes(lanes)
         begun = np.where(few.active, few.push, own.stiffness * own.large)
         push = np.where(few.active ^ is_wrong[:, lanes], begun, 0.0)
-        shapes.put(lanes, own.finished(few.coordinates, few.inverted, push, load[lanes]))
+        shapes.put(lanes, finished(own, few.coordinates, few.inverted, push, load[lanes]))
 
 
 def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
@@ -157,12 +159,12 @@ def _gone_on(
         is_fold = ends.outcome[falls] == PathEnd.FOLD
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
         beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
-        there = few.relaxed(begun.coordinates + further, begun.inverted, begun.push, beyond)
+        there = relaxed(few, begun.coordinates + further, begun.inverted, begun.push, beyond)
         lost = np.flatnonzero(~there.is_there)
         if len(lost):  # pushes of contacts that the fall has left lead nowhere
             own_, anew = few.take_lanes(lost), there.take_lanes(lost)
             args = anew.coordinates, anew.inverted, 0.0 * anew.push, beyond[lost]
-            there.put(lost, own_.relaxed(*args))
+            there.put(lost, relaxed(own_, *args))
         flipped[:, falls] = few.is_open(begun) ^ few.is_open(there)
         moved.put(falls, there)
     return moved, flipped, at_fold

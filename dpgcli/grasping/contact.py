@@ -22,86 +22,24 @@ from dpgcli.equilibrium.contracts import (
     Coordinates,
     OwnCoordinate,
     Row,
-    ScalarLaw,
     Term,
     WideMeasure,
     take_lanes,
 )
-from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.joined import Joined, OfPart, Together, terms_of_part
 from dpgcli.equilibrium.loaded import LoadedPotential, ShareOfLaw
-from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.potential import Potential
+from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
-from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
 STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has rounding in it
-TOLERANCE = 1e-12  # of the forces in play
-CLOSE = 1e-6  # of a stroke: multipliers that change by less have found their set
-MOST_UPDATES, MOST_STEPS = 30, 120  # of multipliers; of a descent
-STUCK, MOST_STUCK = 1e-8, 4  # of the forces in play; descents that end in a corner
-SHORT_STEP = 0.25  # of the step cap, a twentieth of a stroke: no well is stepped over
 
 Constrained = Extended[Coordinates]
-
-
-@dataclass(frozen=True)
-class ContactShapes:
-    """Shapes against bodies, a lane each: coordinates (size, batch) and pushes (cell, batch), N.
-
-    `inverted` (unit, batch) are the domes that act as inverted ones, `active` (cell, batch) the
-    gaps that are closed. `is_there` says which are equilibria, (batch,).
-    """
-
-    coordinates: Array
-    push: Array
-    active: Flags
-    inverted: Flags
-    is_there: Flags
-
-    def put(self, index: Indices, others: "ContactShapes") -> None:
-        """Replace the lanes at `index`."""
-        for name, values in vars(self).items():
-            values[..., index] = getattr(others, name)
-
-    def take_lanes(self, index: Indices) -> "ContactShapes":
-        """Some of them."""
-        return ContactShapes(*(np.take(values, index, axis=-1) for values in vars(self).values()))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How a body may move, by q, (motion, batch) in mm.
-
-    `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
-    `resistance` is the law of the last q, if any. `hold` (motion, batch) N keeps it where it is at
-    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move
-    by itself: q is (λ − 1) D.
-    """
-
-    directions: tuple[Array, ...]
-    resistance: ScalarLaw | None = None
-    hold: Array | None = None
-    travel: Array | None = None
-
-    @property
-    def n(self) -> int:
-        """Number of motions."""
-        return int(self.directions[0].shape[1])
-
-    def take_lanes(self, index: Indices) -> "Motion":
-        """Those of some lanes."""
-        return Motion(
-            tuple(take_lanes(along, index) for along in self.directions),
-            self.resistance and self.resistance.take_lanes(index),
-            None if self.hold is None else take_lanes(self.hold, index),
-            None if self.travel is None else take_lanes(self.travel, index),
-        )
 
 
 @dataclass(frozen=True)
@@ -160,11 +98,8 @@ class Obstructed:
     @cached_property
     def faces(self) -> tuple[Face, ...]:
         """The faces of the fingers, as the body sees them."""
-        alone, n = (
-            Face.of(self.formulate(self.units.finger).coordinates, self.thickness),
-            self.n_fingers,
-        )
-        faces = []
+        alone = Face.of(self.formulate(self.units.finger).coordinates, self.thickness)
+        n, faces = self.n_fingers, []
         for finger in range(n):
             face = replace(alone, places=n * alone.places + finger)
             if self.motion is not None:
@@ -340,27 +275,6 @@ class Obstructed:
         """The pushes of contacts, (cell, batch), that have these multipliers, N."""
         return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
 
-    def relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
-        """Go downhill from coordinates at some loads to the next minima, by short steps.
-
-        Domes that only push and are pushed out of their wells are let go, and the others go on.
-        """
-        found = self._relaxed(start, inverted, push, load)
-        for _ in range(self.n_fingers * self.units.finger.n_units):
-            fallen = self._fallen(found)
-            lanes = np.flatnonzero(fallen.any(axis=0))
-            if not len(lanes):
-                break
-            few, own = found.take_lanes(lanes), self.take_lanes(lanes)
-            left = few.inverted & ~fallen[:, lanes]
-            found.put(lanes, own._relaxed(few.coordinates, left, few.push, load[lanes]))
-        return found
-
-    def _fallen(self, shapes: ContactShapes) -> Flags:
-        if not isinstance(self.units.finger.law, PushOnly):
-            return np.zeros(shapes.inverted.shape, bool)
-        return shapes.inverted & ~self.is_open(shapes)
-
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are in their inverted wells, (unit, batch)."""
         own = []
@@ -369,42 +283,3 @@ class Obstructed:
             acts = potential.coordinates.finger.acting > 0.0  # others only have a wide gap
             own.append((springs.extension > self.units.wells.spring_barrier) & acts)
         return np.concatenate(own)
-
-    def _relaxed(self, start: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
-        here, push, lanes = start.copy(), push.copy(), np.arange(start.shape[1])
-        found = ContactShapes(here.copy(), push.copy(), push > 0.0, inverted.copy(), lanes < 0)
-        n_stuck = np.zeros(len(lanes), int)
-        for count in range(MOST_UPDATES):
-            own = self.take_lanes(lanes)
-            potential = own.pressed(inverted[:, lanes], push[:, lanes], load[lanes])
-            there = minimize(
-                potential, here[:, lanes], TOLERANCE, MOST_STEPS, largest_step=SHORT_STEP
-            )
-            contact = potential.terms[-1]
-            assert isinstance(contact.law, AugmentedContact), "the last term"
-            pushed = contact.law.pushes(contact.measure(there.coordinates).value)
-            here[:, lanes], push[:, lanes] = there.coordinates, pushed
-            near = own.finished(there.coordinates, inverted[:, lanes], pushed, load[lanes])
-            away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
-            is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
-            n_stuck = n_stuck + (there.relative_residual > STUCK)
-            goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
-            found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
-            lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
-            if not len(lanes):
-                break
-        return found
-
-    def finished(self, near: Array, inverted: Flags, push: Array, load: Array) -> ContactShapes:
-        """Equilibria with the active set that pushes say, (cell, batch), from nearby."""
-        active = (push > 0.0) | self.are_kept
-        family, n = self.family(inverted, active), len(load)
-        nothing, free = np.full(n, -1), np.zeros(n)
-        begun = ContactShapes(near, push, active, inverted.copy(), np.ones(n, bool))
-        guess = self.stacked(begun)
-        there = corrected(family, guess, load, nothing, free, max(family.column_depths))
-        margin = family.law.margin(there.loaded, load)
-        is_there = there.is_fine & (margin >= -CLOSE).all(axis=0)
-        found, y = there.coordinates[: len(near)], there.coordinates[len(near) :]
-        pushes = self.pushes(active, y)
-        return replace(begun, coordinates=found, push=pushes, is_there=is_there)

@@ -13,8 +13,10 @@ from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
-from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame
+from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps, Touches
@@ -178,7 +180,7 @@ def _grown(
 ) -> Approach:
     """How fingers in free states, coordinates (size, batch), meet a body that grows."""
     begin = np.zeros(x.shape[1])
-    start = own.finished(x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
+    start = finished(own, x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
     start = replace(start, is_there=start.is_there & is_stable)
     return approach(own, start, begin, begin + 1.0)
 
@@ -195,7 +197,7 @@ def _inserted(
     coming = replace(own, depth=np.zeros(1), motion=motion)
     start = np.concatenate((x, np.broadcast_to(from_there, (1, len(begin)))))
     nothing = np.zeros((coming.n_gaps + 1, len(begin)))
-    shapes = coming.finished(start, pattern, nothing, begin)
+    shapes = finished(coming, start, pattern, nothing, begin)
     came = moved_in(coming, replace(shapes, is_there=shapes.is_there & is_stable))
     return replace(came, shapes=coming.at_rest(came.shapes))
 

@@ -18,9 +18,11 @@ from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.grasping.approach import Approach, approach
-from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import described, placed
+from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
@@ -111,7 +113,7 @@ def _with_motion(own: Obstructed, shapes: ContactShapes) -> ContactShapes:
     from_there = np.broadcast_to(-own.motion.travel, (1, n))
     coordinates = np.concatenate((shapes.coordinates, from_there))
     push = np.concatenate((shapes.push, np.ones((1, n))))
-    begun = own.finished(coordinates, shapes.inverted, push, np.zeros(n))
+    begun = finished(own, coordinates, shapes.inverted, push, np.zeros(n))
     return replace(begun, is_there=begun.is_there & shapes.is_there)
 
 

@@ -15,9 +15,10 @@ from dpgcli.arrays import Array, Indices
 from dpgcli.design.bodies import Body, Jaws
 from dpgcli.design.scene import Held
 from dpgcli.grasping.approach import Approach, approach
-from dpgcli.grasping.contact import ContactShapes, Motion, Obstructed
+from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described
+from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.terms import Quadratic
 from dpgcli.states.certify import Status
 

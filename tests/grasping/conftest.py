@@ -15,7 +15,9 @@ import pytest
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.grasping.approach import Approach, approach
-from dpgcli.grasping.contact import ContactShapes, Obstructed
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.descent import finished
+from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.obstacle import Obstacle
@@ -170,7 +172,7 @@ def begun() -> Callable[..., tuple[Obstructed, ContactShapes]]:
         depth = np.maximum(radius, -bare.gaps()(x).value.min(axis=0))
         obstructed = replace(bare, depth=depth)
         nothing = np.zeros((finger.n_units, n))
-        return obstructed, obstructed.finished(x, inverted, nothing, np.zeros(n))
+        return obstructed, finished(obstructed, x, inverted, nothing, np.zeros(n))
 
     return begin
 

@@ -12,11 +12,12 @@ from scipy.optimize import root
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Gripper, Scene
-from dpgcli.grasping.contact import ContactShapes, Obstructed
+from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.jaw_table import by_number, jaw_rows, path_rows
 from dpgcli.grasping.jaws import JawPath, jaw_path
 from dpgcli.grasping.mechanism import Branch, Mechanism
+from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.obstacle import Obstacle

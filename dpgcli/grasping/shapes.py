@@ -1,0 +1,62 @@
+"""Shapes of fingers against bodies, and how bodies may move."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
+
+
+@dataclass(frozen=True)
+class ContactShapes:
+    """Shapes against bodies, a lane each: coordinates (size, batch) and pushes (cell, batch), N.
+
+    `inverted` (unit, batch) are the domes that act as inverted ones, `active` (cell, batch) the
+    gaps that are closed. `is_there` says which are equilibria, (batch,).
+    """
+
+    coordinates: Array
+    push: Array
+    active: Flags
+    inverted: Flags
+    is_there: Flags
+
+    def put(self, index: Indices, others: "ContactShapes") -> None:
+        """Replace the lanes at `index`."""
+        for name, values in vars(self).items():
+            values[..., index] = getattr(others, name)
+
+    def take_lanes(self, index: Indices) -> "ContactShapes":
+        """Some of them."""
+        return ContactShapes(*(np.take(values, index, axis=-1) for values in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a body may move, by q, (motion, batch) in mm.
+
+    `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
+    `resistance` is the law of the last q, if any. `hold` (motion, batch) N keeps it where it is at
+    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move
+    by itself: q is (λ − 1) D.
+    """
+
+    directions: tuple[Array, ...]
+    resistance: ScalarLaw | None = None
+    hold: Array | None = None
+    travel: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of motions."""
+        return int(self.directions[0].shape[1])
+
+    def take_lanes(self, index: Indices) -> "Motion":
+        """Those of some lanes."""
+        return Motion(
+            tuple(take_lanes(along, index) for along in self.directions),
+            self.resistance and self.resistance.take_lanes(index),
+            None if self.hold is None else take_lanes(self.hold, index),
+            None if self.travel is None else take_lanes(self.travel, index),
+        )
