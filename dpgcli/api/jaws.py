@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dpgcli.api.bodies import check_body
-from dpgcli.api.grasp import MOST_DRAWN, MOST_LANES
+from dpgcli.api.grasp import check_drawable
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -22,7 +22,7 @@ from dpgcli.api.inputs import (
     table_path,
 )
 from dpgcli.api.tables import Table
-from dpgcli.arrays import Columns, keep_freed_memory
+from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
@@ -39,6 +39,7 @@ from dpgcli.text import counted
 if TYPE_CHECKING:
     import pandas as pd
 
+MOST_STATES = 1024
 HEIGHT = 40.0  # mm, of jaws that the spec says nothing of
 NARROWEST, WIDEST = 1e-3, 1e4  # mm
 
@@ -139,10 +140,7 @@ class JawsResult:
         """Draw force by aperture, and by the number of inverted units, to a .svg or .png file."""
         from dpgcli.reports.jaws import draw_jaws
 
-        if len(self.path.codes) > MOST_DRAWN:
-            n = len(self.path.codes)
-            what = f" draws at most {MOST_DRAWN} states, not {n:,}: select with "
-            raise UsageError(Field("plot"), what, Field("patterns"))
+        check_drawable(len(self.path.codes))
         draw_jaws(self.given.scene, self.path, self.rows, figure_path(path))
 
 
@@ -181,17 +179,22 @@ def jaws_of(
     """The same, of what was read before."""
     scene = given.scene
     body, (first, last) = body_of(scene, gaps, at)
-    selection = select(patterns, scene.finger.n_units)
-    if len(selection) > MOST_LANES:
-        raise UsageError(
-            Field("patterns"), f": {len(selection):,} states, expected at most {MOST_LANES:,}"
-        )
+    codes = states_of(scene, patterns)
     keep_freed_memory()
-    codes = selection.codes(0, len(selection))
     upper = frames(scene.gripper)[0]
     return JawsResult(
         given, body, jaw_path(scene, chain_potential, body, upper, codes, (first, last))
     )
+
+
+def states_of(scene: Scene, patterns: Sequence[str]) -> Codes:
+    """The states of these patterns. Raises UsageError for what is no pattern, and for too many."""
+    selection = select(patterns, scene.finger.n_units)
+    if len(selection) > MOST_STATES:
+        raise UsageError(
+            Field("patterns"), f": {len(selection):,} states, expected at most {MOST_STATES:,}"
+        )
+    return selection.codes(0, len(selection))
 
 
 def body_of(

@@ -158,13 +158,24 @@ def _open_jaws(
     quiet: bool,
 ) -> None:
     """Force by the aperture of jaws, for each state."""
-    from dpgcli.api.jaws import jaws_of
+    from dpgcli.api.grasp import check_drawable
+    from dpgcli.api.jaws import jaws_of, states_of
     from dpgcli.files.output import Mark, check_outputs
+    from dpgcli.grasping.costs import jaw_seconds
     from dpgcli.grasping.jaw_table import COLUMNS
+    from dpgcli.sweeps.extent import time_text
 
+    gaps, chosen = _gaps(jaws), tuple(patterns or ("*",))
+    n_states = len(states_of(given.scene, chosen))
+    if plot is not None:
+        check_drawable(n_states)
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
+    seconds = jaw_seconds(n_states, given.scene.finger.n_units)
+    if seconds > LONG and not quiet:
+        many, took = counted(n_states, "state"), time_text(seconds)
+        say(f"{many}: about {took} on one core, or several times that")
     with under_way("opening the jaws", quiet=quiet):
-        found = jaws_of(given, _gaps(jaws), at, tuple(patterns or ("*",)))
+        found = jaws_of(given, gaps, at, chosen)
     if output is not None:
         found.save(output)
     if plot is not None:

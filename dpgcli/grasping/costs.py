@@ -8,6 +8,7 @@ from dpgcli.grasping.grasp import BLOCK, LANE
 # Measured on one core of a 2020s server, in seconds, times the square of the number of units.
 STATE_SECONDS = {Way.PLACE: 6e-5, Way.INSERT: 3e-4}
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
+JAW_SECONDS = 0.03  # of a state at all apertures; with a calibration's curve several times as much
 START_SECONDS, ROW_SECONDS = 1.0, 3e-5
 LIBRARY_BYTES = 2**26
 KEPT_BYTES, ROW_BYTES = 200, 180  # of a finger and of a row, times the number of units
@@ -48,3 +49,12 @@ class Work:
         return (
             LIBRARY_BYTES + block + self.n_units * (KEPT_BYTES * n_kept + ROW_BYTES * self.n_rows)
         )
+
+
+def jaw_seconds(n_states: int, n_units: int) -> float:
+    """Seconds of one core for states at jaws that open and close.
+
+    >>> round(jaw_seconds(32, 5))
+    25
+    """
+    return START_SECONDS + n_states * JAW_SECONDS * n_units**2
