@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.api.inputs import SceneInput, check_texts, path_of, point
 from dpgcli.arrays import Array
-from dpgcli.design.bodies import Body, Disc, Jaws
+from dpgcli.design.bodies import PLACES, Body, Disc, Jaws
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.scene_file.objects import ObjectSpec
@@ -48,17 +48,28 @@ def with_body(given: SceneInput, said: str | None, at: Sequence[float] | None) -
     if said.lower().endswith(SUFFIXES):
         spec, path = _of_file(said, place), Path(said)
         body = spec.known if at is None else replace(spec.known, center=_known(place))
+        body = _giving_way(body, known)
         held = Held(spec.held) if "held" in spec.model_fields_set else scene.held
         files = (*given.files, path.absolute())
         return replace(given, scene=replace(scene, body=body, held=held), files=files)
-    return replace(given, scene=replace(scene, body=_of_text(said, place)))
+    body = _giving_way(_of_text(said, place), known)
+    return replace(given, scene=replace(scene, body=body))
+
+
+def _giving_way(body: Body, known: Body | None) -> Body:
+    """Jaws as stiff as those of the spec, unless they have a stiffness of their own."""
+    if isinstance(body, Jaws) and isinstance(known, Jaws) and body.stiffness is None:
+        return replace(body, stiffness=known.stiffness)
+    return body
 
 
 def _of_file(name: str, place: Array | None) -> ObjectSpec:
     """The keys in a file, which may leave its place to others."""
     document = read_document(path_of("object", name))
     if "at_mm" not in document.data:
-        document = replace(document, data={**document.data, "at_mm": _known(place).tolist()})
+        parts = [document.data.get(key) for key in PLACES]
+        at = parts if place is None and None not in parts else _known(place).tolist()
+        document = replace(document, data={**document.data, "at_mm": at})
     return checked_object(document)
 
 

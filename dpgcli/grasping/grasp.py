@@ -258,12 +258,18 @@ def described(
 
 
 def _is_entered(nodes: Array, body: Obstacle) -> Flags:
-    """Whether a face, nodes (2, node, batch), runs into a polygon: one whose gaps do not tell."""
-    if not len(body.plates):
-        return np.zeros(nodes.shape[2], bool)
-    area = shapely.polygons(body.points.transpose(2, 1, 0))
-    inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
-    return np.asarray(shapely.intersects(shapely.linestrings(nodes.transpose(2, 1, 0)), inner))
+    """Whether a face, nodes (2, node, batch), runs into a polygon: one whose gaps do not tell.
+
+    Lanes that are lost have no nodes, and run into nothing.
+    """
+    enters = np.zeros(nodes.shape[2], bool)
+    lanes = np.flatnonzero(np.isfinite(nodes).all(axis=(0, 1)))
+    if len(body.plates) and len(lanes):
+        area = shapely.polygons(body.take_lanes(lanes).points.transpose(2, 1, 0))
+        inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
+        faces = shapely.linestrings(nodes[..., lanes].transpose(2, 1, 0))
+        enters[lanes] = shapely.intersects(faces, inner)
+    return enters
 
 
 def told(part: Placed) -> Grasped:

@@ -111,3 +111,38 @@ def test_wrong_files(call: Any, folder: Path, gripper: str, keys: str, said: str
     indented = "\n".join(f"  {line}" for line in ("at_mm: [40, 0]", *keys.splitlines()))
     in_spec = call("grasp", with_object(folder, gripper, indented))
     assert in_spec.exit_code == ExitCode.USAGE and said in in_spec.stderr
+
+
+def test_jaws_of_the_command_line_give_way_as_those_of_the_spec(call: Any, folder: Path) -> None:
+    compliance = "compliance: {stiffness_N_per_mm: 0.1}"
+    own = f"object: {{jaws: {{gap_mm: 56, height_mm: 40}}, at_mm: [45, 0], {compliance}}}"
+    text = (CONFIGS / "gripper.yaml").read_text(encoding="utf-8")
+    (folder / "own.yaml").write_text(f"{text}\n{own}\n", encoding="utf-8")
+    asked = "--pattern", "00001", "-q", "--format", "csv"
+    from_spec = call("grasp", "own.yaml", *asked)
+    said = call("grasp", "own.yaml", "--object", "jaws:56x40", *asked)
+    assert (from_spec.exit_code, said.stdout) == (ExitCode.DONE, from_spec.stdout)
+    rigid = call(
+        "grasp", str(CONFIGS / "gripper.yaml"), "--object", "jaws:56x40", "--at", "45,0", *asked
+    )
+    assert rigid.stdout != said.stdout
+
+
+def test_a_file_may_have_the_parts_of_its_place(call: Any, folder: Path) -> None:
+    (folder / "ball.yaml").write_text(
+        "disc: {diameter_mm: 40}\nat_x_mm: 40\nat_y_mm: 0\n", encoding="utf-8"
+    )
+    gripper = str(CONFIGS / "gripper.yaml")
+    asked = "--pattern", "00000", "-q"
+    result = call("grasp", gripper, "--object", "ball.yaml", *asked)
+    assert (
+        result.stdout
+        == call("grasp", gripper, "--object", "disc:40", "--at", "40,0", *asked).stdout
+    )
+    assert result.exit_code == ExitCode.DONE
+
+
+def test_a_stiffness_has_its_unit(call: Any, folder: Path) -> None:
+    own = "object.compliance.stiffness_N_per_mm=-0.05"
+    result = call("grasp", str(CONFIGS / "gripper.yaml"), "--set", own)
+    assert "a stiffness > 0 in N/mm, found -0.05" in result.stderr

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from dpgcli.arrays import Array
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import Body, Disc, Jaws
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp
 from dpgcli.grasping.approach import Way
@@ -18,6 +18,7 @@ from dpgcli.grasping.grasp import placed
 from dpgcli.grasping.release import motion_of, released, together
 from dpgcli.grasping.table import Grasps, grasp_rows, grasps
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
@@ -43,7 +44,7 @@ def gripper_of(finger: Finger, angle: float = 0.0) -> Scene:
     return Scene(finger, (), Gripper(base_spacing=SPACING, mounting_angle=angle), 1.5)
 
 
-def grasped(scene: Scene, body: Disc, held: Held, *pairs: str, way: Way = Way.PLACE) -> Grasps:
+def grasped(scene: Scene, body: Body, held: Held, *pairs: str, way: Way = Way.PLACE) -> Grasps:
     uppers, lowers = zip(*(pair.split("/") for pair in pairs), strict=True)
     both = codes(*uppers), codes(*lowers)
     return grasps(replace(scene, body=body, held=held), chain_potential, body, both, way)
@@ -200,7 +201,7 @@ def test_an_energy_of_its_own_and_slsqp_find_the_same_place(
 
 def test_a_body_that_nothing_keeps_leaves(reference_finger: Fingers) -> None:
     scene = gripper_of(reference_finger(5))
-    squeezed_out = grasp_rows(grasped(scene, CAN, Held.FREE, "00000/00000", "11000/11000"))
+    squeezed_out = grasp_rows(grasped(scene, CAN, Held.FREE, "00000/00000"))
     far = Disc(np.array([400.0, 0.0]), 10.0)
     untouched = grasp_rows(grasped(scene, far, Held.FREE, "00000/00000"))
     fixed = grasp_rows(grasped(scene, far, Held.FIXED, "00000/00000"))
@@ -234,3 +235,33 @@ def test_insertion_ends_where_placing_does(reference_finger: Fingers) -> None:
     assert grown["pattern_after"].tolist() == moved["pattern_after"].tolist()
     for name in ("finger_force_x_N", "finger_force_y_N", "aperture_mm"):
         assert moved[name] == pytest.approx(grown[name], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_lost_body_with_sides_does_not_end_the_others(reference_finger: Fingers) -> None:
+    """Nothing keeps plates along x from sliding: no rest, and no shape to look at."""
+    scene = gripper_of(reference_finger(2))
+    jaws = Jaws(np.array([20.0, 0.0]), 56.0, 20.0)
+    rows = grasp_rows(grasped(scene, jaws, Held.GUIDED, "01/01", "00/00"))
+    assert set(rows["status"]) == {Status.NOT_HELD}
+
+
+def test_faces_that_are_lost_run_into_nothing() -> None:
+    square = Obstacle.polygon(np.array([[0.0, 4.0, 4.0, 0.0], [0.0, 0.0, 4.0, 4.0]]))
+    through = np.array([[-1.0, 5.0], [2.0, 2.0]])
+    beside = through + np.array([[0.0], [4.0]])
+    nodes = np.stack((through, beside, np.full((2, 2), np.nan)), axis=2)
+    assert grasp._is_entered(nodes, square).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("stiffness", [0.02, 0.5])
+def test_jaws_that_give_way_balance(stiffness: float, reference_finger: Fingers) -> None:
+    """k (a_0 − a) is the squeeze, and that of rigid jaws at the aperture a."""
+    scene = gripper_of(reference_finger(2))
+    jaws = Jaws(np.array([20.0, 0.0]), 56.0, 20.0, stiffness)
+    rows = grasp_rows(grasped(scene, jaws, Held.FIXED, "01/01"))
+    assert rows["status"].tolist() == [Status.STABLE]
+    gap, squeeze = float(rows["jaw_gap_mm"][0]), float(rows["squeeze_N"][0])
+    assert squeeze > 0.01 and squeeze == pytest.approx(stiffness * (56.0 - gap), rel=1e-9)
+    rigid = grasp_rows(grasped(scene, replace(jaws, gap=gap, stiffness=None), Held.FIXED, "01/01"))
+    assert rigid["squeeze_N"] == pytest.approx([squeeze], rel=1e-8)

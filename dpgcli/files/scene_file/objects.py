@@ -20,6 +20,7 @@ EXPECTED = {
     PLACE: "two numbers in mm, such as [40, 0]",
     **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
+    "stiffness_N_per_mm": "a stiffness > 0 in N/mm",
     POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
 LATER = ("friction", "mass_g")  # keys of objects that nothing is made of yet
