@@ -136,6 +136,11 @@ class Obstructed:
         is_told = self.motion is not None and self.motion.travel is not None
         return (self._motions,) if is_told else ()
 
+    @property
+    def is_free(self) -> bool:
+        """Whether the body moves by itself."""
+        return self.motion is not None and self.motion.travel is None
+
     @cached_property
     def n_gaps(self) -> int:
         """Cells that are gaps."""

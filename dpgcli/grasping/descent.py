@@ -63,6 +63,8 @@ def _relaxed(
         is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
         n_stuck = n_stuck + (there.relative_residual > STUCK)
         goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
+        if own.is_free:  # a body that nothing pushes after so many steps has left
+            goes_on &= (pushed[: own.n_gaps] > 0.0).any(axis=0)
         found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
         lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
         if not len(lanes):

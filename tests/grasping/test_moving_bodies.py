@@ -201,9 +201,9 @@ def test_an_energy_of_its_own_and_slsqp_find_the_same_place(
 
 def test_a_body_that_nothing_keeps_leaves(reference_finger: Fingers) -> None:
     scene = gripper_of(reference_finger(5))
-    squeezed_out = grasp_rows(grasped(scene, CAN, Held.FREE, "00000/00000"))
+    squeezed_out = grasp_rows(grasped(scene, CAN, Held.FREE, "00000/00000", "11000/11000"))
     far = Disc(np.array([400.0, 0.0]), 10.0)
-    untouched = grasp_rows(grasped(scene, far, Held.FREE, "00000/00000"))
+    untouched = grasp_rows(grasped(scene, far, Held.FREE, "00000/00000", "11000/11000"))
     fixed = grasp_rows(grasped(scene, far, Held.FIXED, "00000/00000"))
     for rows in (squeezed_out, untouched):
         assert (rows["status"] == Status.NOT_HELD).all()
@@ -237,7 +237,6 @@ def test_insertion_ends_where_placing_does(reference_finger: Fingers) -> None:
         assert moved[name] == pytest.approx(grown[name], rel=1e-9)
 
 
-@pytest.mark.slow
 def test_a_lost_body_with_sides_does_not_end_the_others(reference_finger: Fingers) -> None:
     """Nothing keeps plates along x from sliding: no rest, and no shape to look at."""
     scene = gripper_of(reference_finger(2))
