@@ -119,7 +119,7 @@ def test_unstable_branches_go_into_files(call: Any, folder: Path, graded: str) -
 REFUSED = {
     "one number": (("--pressure", "0.15"), "0:0.15:0 back as well"),
     "kPa": (("--pressure", "0:150kPa:0"), "--pressure: 0:150kPa:0: expected"),
-    "no pressure": (("--pressure", ""), "found nothing"),
+    "no pressure": (("--pressure", ""), "is empty: expected a value"),
     "a line of nobody": (("--pressure", "B=0:1"), "expected a line: A, found B"),
     "a start": (("--pressure", "0:1", "--from", "111"), "--from 111: expected 5 digits"),
     "cycles": (("--pressure", "0:1", "--cycles", "0"), "--cycles 0: expected 1 to 100,000"),
