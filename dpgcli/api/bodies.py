@@ -1,6 +1,6 @@
 """Bodies as arguments: texts such as "disc:40", files, places; and which of them can be grasped."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +9,7 @@ import numpy as np
 from dpgcli.api.inputs import SceneInput, check_texts, path_of, point
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import PLACES, Body, Disc, Jaws
+from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.scene_file.objects import ObjectSpec
@@ -104,3 +105,13 @@ def check_body(scene: Scene, body: Body) -> None:
             f" {body.center[0]:g},{body.center[1]:g}: {body.name} there begins in the base of a "
             "finger: move it along x, or take a smaller one",
         )
+
+
+def force_lines(scene: Scene) -> Iterator[str]:
+    """What the forces of fingers on bodies rest on, and warnings."""
+    for trust in scene.trusts:
+        if trust.output is Output.FORCES:
+            yield f"forces: {trust.basis_text}, {trust.source}; error {trust.known_error}"
+            if trust.doubt:
+                yield f"warning: {trust}"
+    yield from (f"warning: {warning}" for warning in scene.warnings)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import check_body, with_body
+from dpgcli.api.bodies import check_body, force_lines, with_body
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -23,7 +23,6 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
-from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
@@ -90,12 +89,7 @@ class GraspResult:
                 f"{counted(int(rows['overlaps'].sum()), 'state')} in which the fingers overlap "
                 "each other: their contact with each other is not in the model"
             )
-        for trust in self.given.scene.trusts:
-            if trust.output is Output.FORCES:
-                yield f"forces: {trust.basis_text}, {trust.source}; error {trust.known_error}"
-                if trust.doubt:
-                    yield f"warning: {trust}"
-        yield from (f"warning: {warning}" for warning in self.given.scene.warnings)
+        yield from force_lines(self.given.scene)
 
     def to_arrow(self) -> Any:
         """The rows as a `pyarrow.Table`."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import check_body
+from dpgcli.api.bodies import check_body, force_lines
 from dpgcli.api.grasp import check_drawable
 from dpgcli.api.inputs import (
     SceneInput,
@@ -24,7 +24,6 @@ from dpgcli.api.inputs import (
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws
-from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.frames import frames
@@ -85,12 +84,7 @@ class JawsResult:
         if n_lost:
             yield f"{counted(n_lost, 'state')} without an answer: see the column status"
         yield from self._mechanism()
-        for trust in self.given.scene.trusts:
-            if trust.output is Output.FORCES:
-                yield f"forces: {trust.basis_text}, {trust.source}; error {trust.known_error}"
-                if trust.doubt:
-                    yield f"warning: {trust}"
-        yield from (f"warning: {warning}" for warning in self.given.scene.warnings)
+        yield from force_lines(self.given.scene)
 
     def _mechanism(self) -> Iterator[str]:
         """The study's two forces: one fitted, the other predicted, if both states are there."""

@@ -138,8 +138,9 @@ class Obstructed:
 
     @property
     def is_free(self) -> bool:
-        """Whether the body moves by itself."""
-        return self.motion is not None and self.motion.travel is None
+        """Whether nothing but the fingers keeps the body where it is."""
+        motion = self.motion
+        return motion is not None and motion.travel is None and motion.resistance is None
 
     @cached_property
     def n_gaps(self) -> int:
@@ -158,11 +159,12 @@ class Obstructed:
         """D of every cell, (…, batch)."""
         if self.motion is None or self.motion.travel is None:
             return self.depth
-        depth, travel = np.broadcast_arrays(self.depth[None], self.motion.travel[:1])
-        depth = np.broadcast_to(depth, (self.n_gaps, depth.shape[1]))
-        return np.concatenate(
-            (depth, np.broadcast_to(self.motion.travel, (self._n_motions, travel.shape[1])))
+        own, travel = (
+            np.broadcast_to(self.depth, (self.n_gaps, len(self.depth))),
+            self.motion.travel,
         )
+        n_lanes = max(own.shape[1], travel.shape[1])
+        return np.concatenate([np.broadcast_to(d, (len(d), n_lanes)) for d in (own, travel)])
 
     def bound(self, load: Array) -> Array:
         """b = (λ − 1) D, mm."""

@@ -96,13 +96,6 @@ class Face:
         places = rows.reshape(finger.n_units, -1)[:, order].ravel()
         return cls(finger.segment_length, 0.5 * thickness, finger.n_units, finger.is_rigid, places)
 
-    def part(self, first: int, stop: int) -> Self:
-        """The face of units first+1 … stop, clamped at the nearer end of the first."""
-        n_rows = len(self.places) // self.n_units
-        length = self.length if len(self.length) == 1 else self.length[first:stop]
-        places = self.places[first * n_rows : stop * n_rows]
-        return replace(self, length=length, n_units=stop - first, places=places)
-
     def seen_from(self, directions: Array, places: Indices) -> Self:
         """As a body sees it that moves along `directions` by the coordinates at `places`."""
         return replace(self, directions=directions, places=np.append(places, self.places))
