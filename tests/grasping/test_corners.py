@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dpgcli.equilibrium import newton
-from dpgcli.grasping import contact
+from dpgcli.grasping import descent
 from dpgcli.mechanics.finger import Finger
 
 
@@ -44,7 +44,7 @@ def test_a_tip_that_slips_over_a_body_is_no_grasp(
         searches.append(args)
         return newton.minimize(*args, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(contact, "minimize", counted)
+    monkeypatch.setattr(descent, "minimize", counted)
     found = grown(reference_finger(3, 1e3), ["111"], (41.0, -20.0), 16.0)
     assert 1 < len(searches) < 100
     assert not found.shapes.is_there.any()
