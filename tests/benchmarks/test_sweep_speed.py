@@ -8,8 +8,11 @@ so that other work on the machine meets both; compare the medians' ratio.
 """
 
 import compileall
+import multiprocessing
 import subprocess
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -69,14 +72,22 @@ def swept_finger() -> Finger:
     return resolve(base.with_values(values)).batch(np.arange(height.size)).finger
 
 
-def core_seconds(finger: Finger) -> float:
-    """CPU time of all states of all designs."""
+def core_seconds(finger: Finger, designs_of: Sequence[range]) -> float:
+    """CPU time of all states of all designs, those of each range in a process of its own."""
+    forked = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(len(designs_of), forked) as pool:
+        return sum(pool.map(seconds_of, [finger] * len(designs_of), designs_of))
+
+
+def seconds_of(finger: Finger, own: range) -> float:
+    """CPU time of all states of a range of designs."""
+    keep_freed_memory()
     began = process_time()
     patterns = inverted_units(np.arange(32, dtype=np.uint64), 5)
     units = UnitSolutions.of(finger)
     size = lanes_at_once(5) // 32
-    for first in range(0, finger.n_designs, size):
-        designs = np.arange(first, min(first + size, finger.n_designs))
+    for first in range(own.start, own.stop, size):
+        designs = np.arange(first, min(first + size, own.stop))
         inverted = np.tile(patterns, len(designs))
         lanes = units.take_lanes(np.repeat(designs, 32))
         settled = settle(lanes, chain_potential, inverted, 1e-12)
@@ -90,11 +101,11 @@ def test_cpu_of_a_whole_sweep_over_that_of_its_states(
     benchmark: Any, tmp_path: Path, jobs: int
 ) -> None:
     compileall.compile_dir(Path(dpgcli.__file__).parent, quiet=2)
-    keep_freed_memory()
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     command = [sys.executable, "-c", TREE, sys.executable, "-m", "dpgcli", "sweep", "sweep.yaml"]
     finger = swept_finger()
-    core_seconds(finger)
+    share = finger.n_designs // jobs
+    designs_of = [range(first, first + share) for first in range(0, finger.n_designs, share)]
     outputs, core, whole = iter("abcdefgh"), [], []
 
     def sweep() -> None:
@@ -102,7 +113,7 @@ def test_cpu_of_a_whole_sweep_over_that_of_its_states(
         whole.append(float(subprocess.check_output([*command, *options], cwd=tmp_path)))
 
     def of_states() -> None:
-        core.append(core_seconds(finger))
+        core.append(core_seconds(finger, designs_of))
 
     benchmark.pedantic(sweep, setup=of_states, rounds=ROUNDS)
     benchmark.extra_info["core_cpu_seconds"] = round(median(core), 2)
