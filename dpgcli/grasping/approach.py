@@ -160,7 +160,7 @@ def _gone_on(
         further = np.where(is_fold, DISPLACED * ends.onward[:size, falls], 0.0)
         beyond = np.minimum((ends.load + _beyond(ends))[falls], end[falls])
         there = relaxed(few, begun.coordinates + further, begun.inverted, begun.push, beyond)
-        lost = np.flatnonzero(~there.is_there)
+        lost = np.flatnonzero(~there.is_there & ~few.are_slipping(there.coordinates, beyond))
         if len(lost):  # pushes of contacts that the fall has left lead nowhere
             own_, anew = few.take_lanes(lost), there.take_lanes(lost)
             args = anew.coordinates, anew.inverted, 0.0 * anew.push, beyond[lost]

@@ -282,6 +282,12 @@ class Obstructed:
         """The pushes of contacts, (cell, batch), that have these multipliers, N."""
         return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
 
+    def are_slipping(self, coordinates: Array, load: Array) -> Flags:
+        """Whether the end of a finger slips over the body, (batch,)."""
+        pairs, bound = zip(self.faces, self.bodies, strict=True), (load - 1.0) * self.depth
+        slips = [FaceGaps(face, body).are_slipping(coordinates, bound) for face, body in pairs]
+        return np.asarray(np.any(slips, axis=0))
+
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are in their inverted wells, (unit, batch)."""
         own = []

@@ -24,7 +24,8 @@ def relaxed(
 ) -> ContactShapes:
     """Go downhill from coordinates at some loads to the next minima, by short steps.
 
-    Domes that only push and are pushed out of their wells are let go, and the others go on.
+    Domes that only push and are pushed out of their wells are let go, and the others go on. One
+    whose end slips over a body stays there, and is none.
     """
     found = _relaxed(obstructed, start, inverted, push, load)
     for _ in range(obstructed.n_fingers * obstructed.units.finger.n_units):
@@ -61,8 +62,12 @@ def _relaxed(
         near = finished(own, there.coordinates, inverted[:, lanes], pushed, load[lanes])
         away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
         is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
-        n_stuck = n_stuck + (there.relative_residual > STUCK)
-        goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1)
+        is_stuck = there.relative_residual > STUCK
+        is_slipping = is_stuck & ~is_near & own.are_slipping(there.coordinates, load[lanes])
+        near.coordinates[:, is_slipping] = there.coordinates[:, is_slipping]
+        near.is_there[is_slipping] = False
+        n_stuck = n_stuck + is_stuck
+        goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1) & ~is_slipping
         if own.is_free:  # a body that nothing pushes after so many steps has left
             goes_on &= (pushed[: own.n_gaps] > 0.0).any(axis=0)
         found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))

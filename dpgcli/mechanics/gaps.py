@@ -25,6 +25,7 @@ from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.plates import PlateGaps, plate_gaps
 
 FAR = 1e9  # mm: of a gap that is another one's
+LEVEL = 1e-4  # of the last side: what is so near to level with the finger's end
 
 
 class Nearest(NamedTuple):
@@ -152,6 +153,20 @@ class FaceGaps:
                 whole = np.broadcast_to(values, shape_of_all)
                 parts.append(whole.reshape(2, -1, whole.shape[-1]))
         return Touches(np.concatenate(places, axis=1), np.concatenate(ways, axis=1))
+
+    def are_slipping(self, coordinates: Array, bound: Array) -> Flags:
+        """Whether the finger's end slips over a body that it touches at a bound, (batch,).
+
+        The body is then level with the end, and behind it: beyond the end the gap is the distance
+        from it, before it the body is behind the face, and the gap jumps.
+        """
+        nodes = self.face.shape(coordinates).nodes
+        side, away = nodes[:, -1:] - nodes[:, -2:-1], self.obstacle.points - nodes[:, -1:]
+        length = np.hypot(*side)
+        beyond = total(away * side) / length
+        is_behind = side[1] * away[0] < side[0] * away[1]
+        is_touched = np.hypot(*away) - self.obstacle.radii - bound <= LEVEL * length
+        return np.asarray(((np.abs(beyond) <= LEVEL * length) & is_behind & is_touched).any(axis=0))
 
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""

@@ -244,3 +244,23 @@ def test_lanes_have_their_own_bodies(graded_finger: Fingers, random_shape: Shape
     assert (few.value == every.value[:, index]).all()
     assert (few.gradient == every.gradient[..., index]).all()
     assert (few.bent(force[:, index]) == every.bent(force)[..., index]).all()
+
+
+@pytest.mark.parametrize(
+    ("beyond", "inwards", "bound", "slips"),
+    [
+        pytest.param(0.0, -2.999, 0.0, True, id="touched"),
+        pytest.param(0.0, 2.999, 0.0, False, id="in front of the face"),
+        pytest.param(0.1, -2.99, 0.0, False, id="beyond the end"),
+        pytest.param(-0.1, -2.99, 0.0, False, id="before the end"),
+        pytest.param(0.0, -3.1, 0.0, False, id="not touched"),
+        pytest.param(0.0, -2.999, -1.0, False, id="not as large yet"),
+    ],
+)
+def test_a_finger_slips_where_a_body_is_level_with_its_end_and_behind(
+    beyond: float, inwards: float, bound: float, slips: bool, reference_finger: Fingers
+) -> None:
+    face = Face.of(chain_potential(reference_finger(2, np.inf)).coordinates, np.array([[1.5]]))
+    center = np.array([27.0 + beyond, -0.75 - inwards])  # the inner side is below
+    gaps = FaceGaps(face, Obstacle.disc(center, 3.0))
+    assert gaps.are_slipping(np.zeros((4, 1)), np.array([bound])).tolist() == [slips]
