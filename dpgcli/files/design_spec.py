@@ -54,13 +54,17 @@ def write_spec(path: Path, spec: Spec, about: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def swept_base(metadata: Mapping[str, str]) -> Document:
-    """The base spec that a sweep's table keeps. Raises UsageError where it keeps none."""
+def swept_base(metadata: Mapping[str, str], name: str = "base") -> Document:
+    """The base spec that a sweep's table keeps; `name` is what messages call it.
+
+    Raises UsageError where it keeps none.
+    """
     try:
         data = Spec.model_validate(base_of(metadata)).model_dump(exclude_none=True)
     except ValidationError:
-        raise UsageError("no base spec is kept in its metadata, as dpg sweep writes them") from None
-    return with_files(Document("base", data, {}), Path())
+        kept = "no base spec is kept in the table's metadata, where dpg sweep writes it"
+        raise UsageError(f"{name}: {kept}") from None
+    return with_files(Document(name, data, {}), Path())
 
 
 def base_of(metadata: Mapping[str, str]) -> dict[str, Any]:
