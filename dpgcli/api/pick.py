@@ -41,7 +41,7 @@ class PickResult:
     """The rows that were chosen, in their order; `lines` say what became of the others.
 
     `warnings` name the columns that nothing should be chosen by, as far as the table says it;
-    `first` is the design of the first row, None where the table does not say what it is made from.
+    `first` is the design of the first row.
     """
 
     columns: tuple[Column, ...]
@@ -50,7 +50,7 @@ class PickResult:
     warnings: tuple[str, ...]
     metadata: dict[str, str]
     sources: tuple[Path, ...]
-    first: DesignRow | None
+    first: DesignRow
 
     @property
     def table(self) -> Table:
@@ -82,8 +82,6 @@ class PickResult:
         Raises OutputError, SpecError for a design that cannot be, and UsageError where the table
         does not say what its designs are made from.
         """
-        if self.first is None:
-            raise UsageError("no spec: the table does not say what its designs are made from")
         spec = path_of("path", path)
         check_outputs(self.sources, (spec, Mark.SPEC))
         write_spec(spec, checked(self.first.document), str(self.first))
@@ -122,7 +120,7 @@ def pick(
     source = table_of(designs, has_states=states)
     with opened_rows(source, has_states=states) as rows:
         asked = question(conditions, *objectives, top, rows.numbers)
-        shown = _shown(rows, asked, [name.strip() for name in names])
+        shown = _shown(rows, asked, [name.strip() for name in names if name.strip()])
         return _picked(rows, asked, shown, tables_beside(source), strict=strict)
 
 
@@ -164,9 +162,8 @@ def _picked(
     if strict:
         check_undoubted(source.trusts, warnings)
     rows = source.rows(found.places, shown)
-    place = int(found.places[0])
     metadata = _metadata(source, asked, shown)
-    design = source.design(place) if SWEEP in source.metadata and source.keys else None
+    design = source.design(int(found.places[0]))
     return PickResult(source.described(rows), rows, lines, warnings, metadata, files, design)
 
 

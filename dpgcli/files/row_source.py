@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Columns, Indices, distinct
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import Trust
-from dpgcli.errors import UsageError
+from dpgcli.errors import Field, UsageError
 from dpgcli.files.design_spec import SWEEP, swept_base
 from dpgcli.files.parts import BASE
 from dpgcli.files.scene_file.settings import changed
@@ -36,6 +36,7 @@ from dpgcli.states.columns import Column, Kind
 from dpgcli.sweeps.evaluation import VALUE_OF
 from dpgcli.text import printable
 
+STATES = Field("states")
 OF_STATES = ("design", "pattern", "status")
 KINDS = {"b": Kind.FLAG, "i": Kind.COUNT, "f": Kind.NUMBER}  # by the kind of NumPy's type
 
@@ -101,27 +102,21 @@ class RowSource:
         return self._plain(self.table.read([*names]))
 
     def rows(self, places: Indices, names: Sequence[str]) -> Columns:
-        """The rows at some places, in their order."""
+        """The rows at some places, in their order, texts as an array of their own."""
         order = np.argsort(places, kind="stable")
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         found = self._plain(_at(self.table, places[order], [*names]))
-        return {name: column[back] for name, column in found.items()}
+        ordered = {name: column[back] for name, column in found.items()}
+        return {n: c.astype(str) if c.dtype == object else c for n, c in ordered.items()}
 
     def described(self, rows: Columns) -> tuple[Column, ...]:
         """The columns of some rows, with their units and descriptions."""
         return tuple(_described(self.schema.field(name), rows[name]) for name in rows)
 
     def design(self, place: int) -> "DesignRow":
-        """The design of a row. Raises UsageError where columns do not say of which keys they are.
-
-        A design that lacks some of its values would be another one.
-        """
+        """The design of a row, with what its columns say of its values."""
         keys = self.keys
-        lost = [key for key in _varied(self.metadata) if key not in keys.values()]
-        if lost or not keys:
-            what = ", ".join(lost) or "keys of a spec"
-            raise UsageError(f"{self.name}: no columns of {what}, which dpg sweep writes")
         found = self.rows(np.array([place]), ("design", *keys))
         row = {name: column[0].item() for name, column in found.items()}
         values = {key: _said(key, row[name]) for name, key in keys.items()}
@@ -147,8 +142,16 @@ class DesignRow:
 
     @property
     def document(self) -> Document:
-        """Its spec, calibrations read. Raises UsageError for a table without a base spec."""
-        base = swept_base(self.metadata, f"{self.name}, design {self.number}")
+        """Its spec, calibrations read.
+
+        Raises UsageError for a table that keeps no base spec, or has lost columns of values: it
+        would be another design.
+        """
+        name = f"{self.name}, design {self.number}"
+        base = swept_base(self.metadata, name)
+        lost = [key for key in _varied(self.metadata) if key not in self.values]
+        if lost or not self.values:
+            raise UsageError(f"{name}: no column of {', '.join(lost) or 'values'} in the table")
         return changed(base, self.values)
 
     def __str__(self) -> str:
@@ -173,6 +176,8 @@ def opened_rows(source: Path | Any, *, has_states: bool) -> Iterator[RowSource]:
 def _checked(source: RowSource) -> RowSource:
     names, what = source.schema.names, f"{source.what}s"
     needed = OF_STATES if source.has_states else NEEDED
+    if not source.has_states and {*OF_STATES} <= {*names}:
+        raise UsageError(f"{source.name} is a table of states: choose among them with ", STATES)
     if missing := [name for name in needed if name not in names]:
         raise UsageError(
             f"{source.name} is no table of {what}: no column {', '.join(missing)}; "

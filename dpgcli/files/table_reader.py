@@ -98,8 +98,8 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     with undamaged_file(path) as (stream, file):
         names = chosen(file.schema_arrow)
         _check_room(path, file.metadata, names)
-        is_text = {f.name: f.name in TEXTS and is_text(f.type) for f in file.schema_arrow}
-        texts = [name for name in names if is_text[name] and chosen is not _all]
+        known = [f.name for f in file.schema_arrow if f.name in TEXTS and is_text(f.type)]
+        texts = [name for name in names if name in known and chosen is not _all]
         return _with_dictionaries(stream, file, names, texts)
 
 
