@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -29,6 +29,7 @@ from dpgcli.files.table_reader import (
     texts_in,
     trusts_of,
     undamaged_file,
+    with_dictionaries,
 )
 from dpgcli.files.trust import outputs_of
 from dpgcli.files.yaml_file import Document
@@ -48,6 +49,7 @@ class RowSource:
     name: str
     table: Any  # pyarrow.Table or pyarrow.parquet.ParquetFile
     has_states: bool
+    stream: BinaryIO | None = None  # of the file
 
     @property
     def what(self) -> str:
@@ -57,7 +59,7 @@ class RowSource:
     @property
     def schema(self) -> Any:
         """Its pyarrow schema."""
-        return self.table.schema if isinstance(self.table, pa.Table) else self.table.schema_arrow
+        return self.table.schema if self.stream is None else self.table.schema_arrow
 
     @property
     def metadata(self) -> dict[str, str]:
@@ -97,18 +99,38 @@ class RowSource:
 
     def columns(self, names: Sequence[str]) -> Columns:
         """Whole columns, as numbers or texts. Raises UsageError for what is neither."""
-        if isinstance(self.table, pa.Table):
+        if self.stream is None:
             return self._plain(self.table.select([*names]))
-        return self._plain(self.table.read([*names]))
+        return self._plain(with_dictionaries(self.stream, self.table, [*names]))
 
     def rows(self, places: Indices, names: Sequence[str]) -> Columns:
         """The rows at some places, in their order, texts as an array of their own."""
-        order = np.argsort(places, kind="stable")
+        starts = self._starts
+        groups = np.searchsorted(starts, places, side="right") - 1
+        met = distinct(groups).tolist() or [0]
+        parts = [self._rows_of(g, places[groups == g] - starts[g], names) for g in met]
+        order = np.argsort(groups, kind="stable")
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        found = self._plain(_at(self.table, places[order], [*names]))
-        ordered = {name: column[back] for name, column in found.items()}
-        return {n: c.astype(str) if c.dtype == object else c for n, c in ordered.items()}
+        return {name: np.concatenate([part[name] for part in parts])[back] for name in names}
+
+    @property
+    def _starts(self) -> Indices:
+        """The places where groups of rows start."""
+        if self.stream is None:
+            return np.zeros(1, np.int64)
+        metadata = self.table.metadata
+        sizes = [metadata.row_group(group).num_rows for group in range(metadata.num_row_groups)]
+        return np.cumsum([0, *sizes[:-1]])
+
+    def _rows_of(self, group: int, places: Indices, names: Sequence[str]) -> Columns:
+        """Rows of a group, texts as arrays of their own; NumPy takes, as Arrow loads pandas."""
+        if self.stream is None:
+            found = self.columns(names)
+        else:
+            found = self._plain(self.table.read_row_group(group, columns=[*names]))
+        taken = {name: found[name][places] for name in names}
+        return {n: c.astype(str) if c.dtype == object else c for n, c in taken.items()}
 
     def described(self, rows: Columns) -> tuple[Column, ...]:
         """The columns of some rows, with their units and descriptions."""
@@ -169,8 +191,8 @@ def opened_rows(source: Path | Any, *, has_states: bool) -> Iterator[RowSource]:
     if not isinstance(source, Path):
         yield _checked(RowSource("the table", source, has_states))
         return
-    with undamaged_file(source) as (_, file):
-        yield _checked(RowSource(str(source), file, has_states))
+    with undamaged_file(source) as (stream, file):
+        yield _checked(RowSource(str(source), file, has_states, stream))
 
 
 def _checked(source: RowSource) -> RowSource:
@@ -187,27 +209,6 @@ def _checked(source: RowSource) -> RowSource:
         found = f"{', '.join(twice)} again"
         raise UsageError(f"{source.name}: expected each column once, found {found}")
     return source
-
-
-def _at(table: Any, places: Indices, names: list[str]) -> Any:
-    """Rows at places that go up; of a file, the groups of rows that they are in."""
-    if isinstance(table, pa.Table):
-        return table.select(names).take(_indices(places))
-    metadata = table.metadata
-    sizes = [metadata.row_group(group).num_rows for group in range(metadata.num_row_groups)]
-    starts = np.concatenate(([0], np.cumsum(sizes)))
-    groups = np.searchsorted(starts, places, side="right") - 1
-    parts = [table.schema_arrow.empty_table().select(names)]
-    for group in distinct(groups).tolist():
-        own = places[groups == group] - starts[group]
-        parts.append(table.read_row_group(group, columns=names).select(names).take(_indices(own)))
-    return pa.concat_tables(parts[1:] or parts)
-
-
-def _indices(places: Indices) -> Any:
-    """Whole numbers for Arrow; `pyarrow.array` imports pandas."""
-    content = pa.py_buffer(np.ascontiguousarray(places, np.int64))
-    return pa.Array.from_buffers(pa.int64(), len(places), [None, content])
 
 
 def _values(column: Any) -> NDArray[Any] | None:

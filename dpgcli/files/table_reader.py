@@ -98,9 +98,7 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     with undamaged_file(path) as (stream, file):
         names = chosen(file.schema_arrow)
         _check_room(path, file.metadata, names)
-        known = [f.name for f in file.schema_arrow if f.name in TEXTS and is_text(f.type)]
-        texts = [name for name in names if name in known and chosen is not _all]
-        return _with_dictionaries(stream, file, names, texts)
+        return file.read(names) if chosen is _all else with_dictionaries(stream, file, names)
 
 
 @contextmanager
@@ -125,12 +123,14 @@ def undamaged_file(path: Path) -> Iterator[tuple[BinaryIO, Any]]:
     raise UsageError(f"{path} is {DAMAGED}")
 
 
-def _with_dictionaries(stream: BinaryIO, file: Any, names: list[str], texts: list[str]) -> Any:
-    """Columns of a file, some texts as dictionaries: pyarrow reads those of some encodings so.
+def with_dictionaries(stream: BinaryIO, file: Any, names: list[str]) -> Any:
+    """Columns of a file, its `TEXTS` as dictionaries: pyarrow reads those of some encodings so.
 
     Of the others not more than some rows are there in full: a text that repeats takes no room.
     """
     metadata = file.metadata
+    texts = [f.name for f in file.schema_arrow if f.name in TEXTS and is_text(f.type)]
+    texts = [name for name in names if name in texts]
     by_hand = [name for name in texts if not _is_read_as_dictionary(metadata, name)]
     options = {"page_checksum_verification": True, "metadata": metadata}
     read = pq.ParquetFile(stream, read_dictionary=[t for t in texts if t not in by_hand], **options)
