@@ -16,7 +16,7 @@ Source = Annotated[
 ]
 Where = Annotated[
     list[str] | None,
-    typer.Option("--where", metavar="EXPR", help="What each row must meet; repeatable"),
+    typer.Option("--where", metavar="CONDITION", help="What each row must meet; repeatable"),
 ]
 Minimize = Annotated[
     list[str] | None,
@@ -31,7 +31,7 @@ Top = Annotated[
 ]
 SpecFile = Annotated[
     Path | None,
-    typer.Option("--spec", metavar="FILE", help="Write the first row's design as a spec"),
+    typer.Option("--spec", metavar="SPEC", help="Write the first row's design as a spec"),
 ]
 States = Annotated[bool, typer.Option("--states", help="Choose among states, not designs")]
 Shown = Annotated[
