@@ -64,8 +64,7 @@ class RowSource:
     @property
     def metadata(self) -> dict[str, str]:
         """What it says of itself."""
-        said = (self.schema.metadata or {}).items()
-        return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in said}
+        return _texts_of(self.schema)
 
     @property
     def trusts(self) -> Mapping[str, Sequence[Trust]]:
@@ -94,8 +93,9 @@ class RowSource:
     @property
     def keys(self) -> dict[str, str]:
         """The keys of the spec whose values columns hold, by column."""
-        said = {f.name: (f.metadata or {}).get(b"description", b"").decode() for f in self.schema}
-        return {n: text.removeprefix(VALUE_OF) for n, text in said.items() if VALUE_OF in text}
+        said = {f.name: _texts_of(f).get("description", "") for f in self.schema}
+        begun = {name: text for name, text in said.items() if text.startswith(VALUE_OF)}
+        return {name: text.removeprefix(VALUE_OF) for name, text in begun.items()}
 
     def columns(self, names: Sequence[str]) -> Columns:
         """Whole columns, as numbers or texts. Raises UsageError for what is neither."""
@@ -219,8 +219,14 @@ def _values(column: Any) -> NDArray[Any] | None:
     return found == 1 if found is not None and pa.types.is_boolean(column.type) else found
 
 
+def _texts_of(described: Any) -> dict[str, str]:
+    """The metadata of a schema or a field."""
+    said = (described.metadata or {}).items()
+    return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in said}
+
+
 def _described(field: Any, values: NDArray[Any]) -> Column:
-    said = {k.decode(): v.decode(errors="replace") for k, v in (field.metadata or {}).items()}
+    said = _texts_of(field)
     unit, description = said.get("unit", ""), said.get("description", "")
     kind = KINDS.get(values.dtype.kind, Kind.TEXT)
     return Column(field.name, unit, description, kind=kind, outputs=outputs_of(field))
@@ -228,7 +234,7 @@ def _described(field: Any, values: NDArray[Any]) -> Column:
 
 def _said(key: str, value: float) -> float:
     """A value as a spec has it: numbers of units are whole."""
-    return int(value) if key == UNITS else value
+    return int(value) if key == UNITS and float(value).is_integer() else value
 
 
 def _varied(metadata: Mapping[str, str]) -> list[str]:

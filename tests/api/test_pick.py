@@ -111,3 +111,13 @@ def test_integers_with_gaps_are_numbers(swept: Any) -> None:
     found = dpg.pick(frame, minimize="rank", top=3)
     assert found.table["design"].tolist() == [2, 6, 3]
     assert found.lines[-1] == "rank: 2 designs left out without a value"
+
+
+def test_rows_come_in_order_from_all_groups_of_a_file(swept: Any) -> None:
+    frame = swept.designs.to_pandas()
+    frame.to_parquet("groups.parquet", row_group_size=3)
+    found = dpg.pick("groups.parquet", maximize="design", columns="all").to_pandas()
+    pd.testing.assert_frame_equal(found, frame[::-1].reset_index(drop=True))
+    some = dpg.pick("groups.parquet", "n_units == 3", minimize="reach_min_mm", columns="all")
+    expected = frame[frame.n_units == 3].sort_values("reach_min_mm", kind="stable")
+    pd.testing.assert_frame_equal(some.to_pandas(), expected.reset_index(drop=True))
