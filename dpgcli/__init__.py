@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from dpgcli.api.jaws import jaws
     from dpgcli.api.landscape import landscape
     from dpgcli.api.lookup import lookup
+    from dpgcli.api.pick import pick
     from dpgcli.api.predict import predict
     from dpgcli.api.pulses import pulses
     from dpgcli.api.report import report
@@ -75,6 +76,7 @@ __all__ = [
     "landscape",
     "lookup",
     "merge",
+    "pick",
     "predict",
     "pulses",
     "read_calibration",
@@ -102,6 +104,7 @@ _HOMES = {
     "landscape": "api.landscape",
     "lookup": "api.lookup",
     "merge": "api.sweep",
+    "pick": "api.pick",
     "predict": "api.predict",
     "pulses": "api.pulses",
     "read_calibration": "files.calibration",

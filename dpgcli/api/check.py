@@ -44,6 +44,11 @@ def designs_of(designs: DesignsInput) -> DesignTable:
     """A table of designs, with what it says of its columns."""
     if isinstance(designs, str | os.PathLike):
         return read_designs(path_of("designs", designs))
+    return designs_in(arrow_of(designs), "the table")
+
+
+def arrow_of(designs: Any) -> Any:
+    """A table of designs as one of Arrow. Raises UsageError for what is no table."""
     import pyarrow as pa
 
     rows: Any = designs.arrow if isinstance(designs, Table) else designs
@@ -52,4 +57,4 @@ def designs_of(designs: DesignsInput) -> DesignTable:
             rows = pa.Table.from_pandas(frame_of(rows), preserve_index=False)
         except (ValueError, TypeError, pa.ArrowException) as error:
             raise UsageError(f"expected a table of designs: {error}") from error
-    return designs_in(rows, "the table")
+    return rows

@@ -19,6 +19,7 @@ from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, SpecError, UsageError
+from dpgcli.files.access import reading
 from dpgcli.files.calibration import Calibration
 from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
@@ -108,6 +109,22 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
         said = "a spec, with the key finger", "a sweep", "dpg sweep and dpg explain take it"
         raise SpecError((document.problem(("space",), *said),))
     return scene_input_in(document, path, settings)
+
+
+def spec_or_design(spec: SpecInput, design: int | None, settings: Settings = ()) -> SceneInput:
+    """A spec as `scene_input` reads it, or the design of this number of a sweep's folder."""
+    check_whole(design=design)
+    if design is not None:
+        from dpgcli.api.designs import design_input  # whatever reads tables
+
+        return design_input(spec, design, settings)
+    if isinstance(spec, str | os.PathLike):
+        path = path_of("spec", spec)
+        with reading(path):
+            is_folder = path.is_dir()
+        if is_folder:
+            raise UsageError(f"{path} is a folder: say which of its designs with ", Field("design"))
+    return scene_input(spec, settings)
 
 
 def scene_input_in(document: Document, path: Path, settings: Settings = ()) -> SceneInput:

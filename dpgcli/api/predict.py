@@ -16,7 +16,7 @@ from dpgcli.api.inputs import (
     check_texts,
     figure_path,
     path_of,
-    scene_input,
+    spec_or_design,
     table_path,
 )
 from dpgcli.api.tables import Table
@@ -114,6 +114,7 @@ class PredictResult:
 def predict(
     spec: SpecInput,
     *,
+    design: int | None = None,
     settings: Settings = (),
     patterns: str | Sequence[str] = (),
     columns: str | Sequence[str] = "default",
@@ -123,6 +124,8 @@ def predict(
 ) -> PredictResult:
     """Predict and certify stable states.
 
+    With `design` the `spec` is the folder of a sweep, or its table of designs, and this is one of
+    them by its number.
     `settings` change keys of the spec; `patterns` are globs such as "1*1", none for all states;
     `columns` names columns or groups of them. `tolerance` is the largest residual over the forces
     in play; a `target_error` (mm, of the tips) takes the cheapest accuracy level that is bounded by
@@ -135,7 +138,7 @@ def predict(
     >>> states["pattern"].tolist(), states["status"].tolist()
     (['101', '111'], ['stable', 'stable'])
     """
-    given = scene_input(spec, settings)
+    given = spec_or_design(spec, design, settings)
     request = request_of(patterns, columns, formulation, tolerance, target_error)
     prediction = states.predict(given.scene, request)
     return PredictResult(given, prediction, tuple(prediction.blocks()))

@@ -26,6 +26,11 @@ EXAMPLES = {
         'dpg check out/designs.parquet --require "reach_max_mm > 30"',
         'dpg check out/designs.parquet --require "n_stable >= 8" --summary-file summary.md',
     ),
+    "pick": (
+        'dpg pick out --where "min_barrier_mJ > 1" --maximize reach_max_mm --top 5',
+        "dpg pick out --minimize reach_min_mm --maximize reach_max_mm --spec best.yaml",
+        "dpg pick out --states --minimize tip_y_mm --top 3 --format csv",
+    ),
     "report": ("dpg report out", "dpg report out --output page.html"),
     "bench": (
         "dpg bench finger.yaml",

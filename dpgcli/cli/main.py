@@ -19,8 +19,18 @@ os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
-    *("predict", "explain", "sweep", "merge", "check", "report", "bench", "compare"),
-    *("stress", "actuate", "transitions", "pulses", "landscape", "grasp", "validate", "init"),
+    *("predict", "explain", "sweep", "merge", "check", "pick", "report", "bench"),
+    *(
+        "compare",
+        "stress",
+        "actuate",
+        "transitions",
+        "pulses",
+        "landscape",
+        "grasp",
+        "validate",
+        "init",
+    ),
     *("schema", "fit", "fe", "help"),
 )
 

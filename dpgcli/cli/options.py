@@ -27,6 +27,10 @@ ColumnNames = Annotated[
         "--columns", metavar="LIST", help="Columns or groups, comma-separated; see dpg help columns"
     ),
 ]
+DesignNumber = Annotated[
+    int | None,
+    typer.Option("--design", metavar="N", help="The design of a sweep by its number"),
+]
 Nodes = Annotated[bool, typer.Option("--nodes", help="Add all node positions")]
 WithUncertainty = Annotated[
     bool,

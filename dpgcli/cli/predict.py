@@ -13,13 +13,13 @@ from dpgcli.cli.explain import expected
 from dpgcli.cli.options import (
     LONG,
     ColumnNames,
+    DesignNumber,
     FormulationName,
     FormulationOption,
     Nodes,
     Patterns,
     Quiet,
     Settings,
-    SpecPath,
     TargetError,
     Tolerance,
     WithUncertainty,
@@ -41,6 +41,12 @@ if TYPE_CHECKING:
 BRAILLE = "\u28ff"
 
 
+SpecOrFolder = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SPEC", help="YAML spec; - reads standard input; with --design a sweep's folder"
+    ),
+]
 Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write all rows to this Parquet file"),
@@ -62,7 +68,8 @@ Sketch = Annotated[
 
 
 def predict(
-    spec: SpecPath,
+    spec: SpecOrFolder,
+    design: DesignNumber = None,
     output: Output = None,
     printed_as: PrintedAs = None,
     patterns: Patterns = None,
@@ -79,10 +86,10 @@ def predict(
     quiet: Quiet = False,
 ) -> None:
     """Predict and certify every stable state."""
-    from dpgcli.api.inputs import scene_input
+    from dpgcli.api.inputs import spec_or_design
     from dpgcli.states import predict as states
 
-    given = scene_input(spec, settings or ())
+    given = spec_or_design(spec, design, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )

@@ -40,6 +40,7 @@ class Mark(Enum):
     FIGURE = rb"\A<\?xml (?s:.){,999}<dc:title>drawn by dpg<|\A\x89PNG(?s:.){,99}\x00drawn by dpg"
     GRAPH = rb"\A<\?xml [^>]*>\n<!-- written by dpg -->\n<graphml "
     CALIBRATION = rb"\Acalibration_version: .*\nmade_by: dpg "
+    SPEC = rb"\A# Written by dpg: "
     DEPFILE = rb"\A# dpg sweep: "
     DECK = rb"\A\*\* dpg fe "
     CURVE = rb"\A# dpg fe "

@@ -2,8 +2,8 @@
 
 import json
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -68,10 +68,10 @@ def designs_in(table: Any, name: str) -> DesignTable:
         field.name: (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
         for field in table.schema
     }
-    return DesignTable(_plain(name, table), units, _trusts(table.schema))
+    return DesignTable(_plain(name, table), units, trusts_of(table.schema))
 
 
-def _trusts(described: Any) -> dict[str, tuple[Trust, ...]]:
+def trusts_of(described: Any) -> dict[str, tuple[Trust, ...]]:
     """What the columns of a schema rest on, as far as it says so."""
     metadata = (described.metadata or {}).items()
     known = trusts_in({k.decode(errors="replace"): v.decode(errors="replace") for k, v in metadata})
@@ -95,15 +95,21 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     text that repeats is there once. Raises UsageError for what is damaged, no Parquet file, or
     larger than memory.
     """
+    with undamaged_file(path) as (stream, file):
+        names = chosen(file.schema_arrow)
+        _check_room(path, file.metadata, names)
+        return file.read(names) if chosen is _all else with_dictionaries(stream, file, names)
+
+
+@contextmanager
+def undamaged_file(path: Path) -> Iterator[tuple[BinaryIO, Any]]:
+    """A Parquet file, open: its stream and a ParquetFile. Raises UsageError as `read_undamaged`."""
     try:
         with opened(path) as stream:  # pyarrow takes no name that is not text
             file = undamaged(stream)
             if file is not None:
-                names = chosen(file.schema_arrow)
-                _check_room(path, file.metadata, names)
-                is_text = {f.name: f.name in TEXTS and _is_text(f.type) for f in file.schema_arrow}
-                texts = [name for name in names if is_text[name] and chosen is not _all]
-                return _with_dictionaries(stream, file, names, texts)
+                yield stream, file
+                return
     except MemoryError as error:  # before those of pyarrow, of which some are this too
         raise UsageError(f"cannot read {path}: {NO_ROOM}") from error
     except OSError as error:
@@ -117,12 +123,14 @@ def read_undamaged(path: Path, chosen: Callable[[Any], list[str]] = _all) -> Any
     raise UsageError(f"{path} is {DAMAGED}")
 
 
-def _with_dictionaries(stream: BinaryIO, file: Any, names: list[str], texts: list[str]) -> Any:
-    """Columns of a file, some texts as dictionaries: pyarrow reads those of some encodings so.
+def with_dictionaries(stream: BinaryIO, file: Any, names: list[str]) -> Any:
+    """Columns of a file, its `TEXTS` as dictionaries: pyarrow reads those of some encodings so.
 
     Of the others not more than some rows are there in full: a text that repeats takes no room.
     """
     metadata = file.metadata
+    texts = [f.name for f in file.schema_arrow if f.name in TEXTS and is_text(f.type)]
+    texts = [name for name in names if name in texts]
     by_hand = [name for name in texts if not _is_read_as_dictionary(metadata, name)]
     options = {"page_checksum_verification": True, "metadata": metadata}
     read = pq.ParquetFile(stream, read_dictionary=[t for t in texts if t not in by_hand], **options)
@@ -182,12 +190,12 @@ def _readable(source: str, described: Any) -> list[str]:
         )
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
-    swept = _swept(described)
+    swept = swept_in(described)
     kept = []
     for field in (described.field(name) for name in _in_our_order(names, swept)):
-        is_readable = _is_number(field.type)
+        is_readable = is_number(field.type)
         if field.name in TEXTS:  # empty ones come back from CSV as numbers, or as nothing
-            is_readable |= _is_text(field.type) or pa.types.is_null(field.type)
+            is_readable |= is_text(field.type) or pa.types.is_null(field.type)
         if is_readable:
             kept.append(field.name)
         elif field.name in (*NEEDED, *swept):
@@ -195,7 +203,7 @@ def _readable(source: str, described: Any) -> list[str]:
     return kept
 
 
-def _swept(described: Any) -> list[str]:
+def swept_in(described: Any) -> list[str]:
     """Columns of the swept values: between the design's number and its calibration.
 
     In a table whose columns were put into another order, those that are none of our others.
@@ -204,7 +212,7 @@ def _swept(described: Any) -> list[str]:
     between: list[str] = names[names.index("design") + 1 : names.index("calibration")]
     if between and not OTHERS.intersection(between):
         return between
-    numbers = (field.name for field in described if _is_number(field.type))
+    numbers = (field.name for field in described if is_number(field.type))
     return [name for name in numbers if name not in OTHERS]
 
 
@@ -213,7 +221,7 @@ def _in_our_order(names: list[str], swept: list[str]) -> list[str]:
     return first + [name for name in names if name not in first]
 
 
-def _is_number(kind: Any) -> bool:
+def is_number(kind: Any) -> bool:
     """Whether values of a type may be numbers: those of an empty column are none at all."""
     kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     types = pa.types
@@ -221,7 +229,8 @@ def _is_number(kind: Any) -> bool:
     return any(is_kind(kind) for is_kind in kinds)
 
 
-def _is_text(kind: Any) -> bool:
+def is_text(kind: Any) -> bool:
+    """Whether values of a type are texts."""
     kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
 
@@ -237,7 +246,7 @@ def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
 def _plain(source: str, table: Any) -> Columns:
     """The columns of three plain types."""
     names = table.column_names
-    swept = _swept(table.schema)
+    swept = swept_in(table.schema)
     columns: Columns = {}
     for name in names:
         column = table.column(name)
@@ -249,14 +258,14 @@ def _plain(source: str, table: Any) -> Columns:
     return columns
 
 
-def _text(column: Any) -> NDArray[Any] | None:
+def texts_in(column: Any) -> NDArray[Any] | None:
     """Text, empty where there is none; None for a column of anything else."""
-    if _is_text(column.type):
+    if is_text(column.type):
         try:
             return _looked_up(column)
         except UnicodeDecodeError:
             return None
-    numbers = _numbers(column)
+    numbers = numbers_in(column)
     is_empty = column.null_count == len(column) or (numbers is not None and np.isnan(numbers).all())
     return np.full(len(column), "", object) if is_empty else None
 
@@ -274,14 +283,14 @@ def _looked_up(column: Any) -> NDArray[Any]:
 
 def _whole(column: Any) -> NDArray[Any] | None:
     """Whole numbers, none missing; None for a column of anything else."""
-    numbers = _numbers(column)
+    numbers = numbers_in(column)
     if numbers is None or numbers.dtype == np.int64:
         return numbers
     is_whole = (np.abs(numbers) < 2**63) & (np.trunc(numbers) == numbers)
     return numbers.astype(np.int64) if is_whole.all() else None
 
 
-def _numbers(column: Any) -> NDArray[Any] | None:
+def numbers_in(column: Any) -> NDArray[Any] | None:
     """Whole numbers if all are there and fit, else numbers; None for a column of neither."""
     if pa.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
@@ -306,7 +315,7 @@ def _unboxed(column: Any) -> NDArray[Any]:
     return np.concatenate([empty, *map(np.from_dlpack, column.chunks)])
 
 
-READERS = {"text": _text, "whole numbers": _whole, "numbers": _numbers}
+READERS = {"text": texts_in, "whole numbers": _whole, "numbers": numbers_in}
 
 
 def _facts(path: Path) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """What a table of designs was made from, as its metadata say: base spec, law, calibration."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -8,17 +7,19 @@ from typing import Any
 from dpgcli.design.calibrations import PUBLISHED
 from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.design.resolve import NEARLY_RIGID
+from dpgcli.files.design_spec import base_of
 from dpgcli.files.parts import BASE
 
-SWEEP = "dpg.sweep"
 LAW = "dpg.law"
 
 
 def base_lines(metadata: Mapping[str, str]) -> Iterator[str]:
     """Base spec, law and calibration in words; none of a table without such metadata.
 
-    >>> said = {SWEEP: json.dumps({"base": json.dumps({"finger": {"units": 3}})}), BASE: "a.yaml"}
-    >>> list(base_lines({**said, LAW: "published law"}))
+    >>> import json
+    >>> base = json.dumps({"finger": {"units": 3}})
+    >>> said = {"dpg.sweep": json.dumps({"base": base}), BASE: "a.yaml", LAW: "published law"}
+    >>> list(base_lines(said))
     ['Base spec: a.yaml (units 3).', 'Law: published law. Calibration: none.']
     """
     base = base_of(metadata)
@@ -31,15 +32,6 @@ def base_lines(metadata: Mapping[str, str]) -> Iterator[str]:
     yield f"Base spec: {metadata.get(BASE, 'unnamed')} ({values})."
     names = ", ".join(_names(base)) or "none"
     yield f"Law: {metadata.get(LAW, 'unknown')}. Calibration: {names}."
-
-
-def base_of(metadata: Mapping[str, str]) -> dict[str, Any]:
-    """The data of the base spec; empty where they are not there or not to be read."""
-    try:
-        base: Any = json.loads(json.loads(metadata[SWEEP])["base"])
-        return base if isinstance(base["finger"], dict) else {}
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return {}
 
 
 def bar_stiffness(metadata: Mapping[str, str]) -> float:

@@ -308,6 +308,7 @@ LEVEL_COLUMNS = (
     Column("accuracy_level", "", "chosen for the target error", kind=Kind.TEXT),
     Column("error_bound_mm", "mm", "bound on the tips' error before the work"),
 )
+VALUE_OF = "value of "  # begins the description of a column of values, its key behind it
 EMPTY = {Kind.COUNT: 0, Kind.TEXT: b""}
 REASON = Column("reason", "", "why the design is invalid", kind=Kind.TEXT)
 
@@ -331,7 +332,7 @@ def value_columns(space: Space) -> dict[str, Column]:
         key: Column(
             short if last.count(short) == 1 and ".overrides." not in key else key,
             unit_of(key),
-            f"value of {key}",
+            f"{VALUE_OF}{key}",
             kind=Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
         )
         for key, short in zip(space.keys, last, strict=True)

@@ -91,8 +91,7 @@ class Expression:
         """
         undefined: list[Any] = []
         with np.errstate(all="ignore"):
-            body = ast.parse(_without_digits(self.text), mode="eval").body
-            value = _value(body, values, undefined)
+            value = _value(_body(_without_digits(self.text)), values, undefined)
         is_undefined = reduce(np.logical_or, undefined, np.False_)
         return np.where(is_undefined, np.nan, value) if np.any(is_undefined) else value
 
@@ -111,13 +110,34 @@ def expression(text: str) -> Expression:
     if "#" in text:
         raise ExpressionError("# would hide what stands behind it: there are no comments here")
     try:
-        body = ast.parse(_without_digits(text.strip()), mode="eval").body
+        body = _body(_without_digits(text.strip()))
         names = frozenset(_names(body, MOST_LEVELS))
     except ExpressionError:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"not an expression: {text!r}{_hint(text)}") from error
     return Expression(text.strip(), names, _is_comparison(body))
+
+
+def conjuncts(rule: Expression) -> list[Expression]:
+    """The parts of an expression that all have to hold, those that `and` joins.
+
+    >>> [part.text for part in conjuncts(expression("a > 1 and (b < 2 and not (c > 3 and d > 4))"))]
+    ['a > 1', 'b < 2', 'not (c > 3 and d > 4)']
+    """
+    spelled = _without_digits(rule.text)
+    texts = (ast.get_source_segment(spelled, node) for node in _joined(_body(spelled)))
+    return [expression(_with_digits(text or "")) for text in texts]
+
+
+def _joined(node: ast.expr) -> list[ast.expr]:
+    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+        return [part for value in node.values for part in _joined(value)]
+    return [node]
+
+
+def _body(spelled: str) -> ast.expr:
+    return ast.parse(spelled, mode="eval").body
 
 
 def _is_comparison(node: ast.expr) -> bool:
@@ -158,6 +178,12 @@ def _without_digits(text: str) -> str:
         return f".{DIGITS_PREFIX}{match[1].replace('-', 'to')}."
 
     return re.sub(r"(?<=[A-Za-z_])\.(\d+(?:-\d+)?)\.(?=[A-Za-z_])", spelled, text)
+
+
+def _with_digits(spelled: str) -> str:
+    """The same, as it was written."""
+    parts = rf"\.{DIGITS_PREFIX}(\d+)(?:to(\d+))?\."
+    return re.sub(parts, lambda m: f".{m[1]}-{m[2]}." if m[2] else f".{m[1]}.", spelled)
 
 
 def _names(node: ast.expr, depth: int) -> list[str]:

@@ -80,7 +80,7 @@ class RequirementVerdict:
         ]
 
 
-def requirement(text: str, columns: Collection[str]) -> Expression:
+def requirement(text: str, columns: Collection[str], field: str = "require") -> Expression:
     """A threshold over columns of numbers, such as `reach_max_mm > 60 and n_stable == 32`.
 
     Raises UsageError for what is no such threshold, with the nearest name for an unknown one.
@@ -88,25 +88,27 @@ def requirement(text: str, columns: Collection[str]) -> Expression:
     try:
         rule = expression(text)
         for name in sorted(rule.names.difference(columns)):
-            nearest = get_close_matches(name, sorted(columns), n=1, cutoff=0.0)
-            raise UsageError(
-                Field("require"),
-                f" {text!r}: no column {name} of numbers; the nearest is {nearest[0]}",
-            )
+            raise UsageError(Field(field), f" {text!r}: {unknown_column(name, columns)}")
         rule(dict.fromkeys(rule.names, 1.0))
     except ExpressionError as error:
-        raise UsageError(Field("require"), f" {text!r}: {error}") from error
+        raise UsageError(Field(field), f" {text!r}: {error}") from error
     except (TypeError, ValueError, RecursionError) as error:
-        raise UsageError(Field("require"), f" {text!r}: cannot be evaluated") from error
+        raise UsageError(Field(field), f" {text!r}: cannot be evaluated") from error
     if not rule.is_comparison:
-        raise UsageError(Field("require"), f" {text!r}: expected a comparison, found a number")
+        raise UsageError(Field(field), f" {text!r}: expected a comparison, found a number")
     return rule
 
 
-def doubts(rule: Expression, trusts: Trusts) -> tuple[Message, ...]:
+def unknown_column(name: str, columns: Collection[str]) -> str:
+    """That there is no such column of numbers, and which is the nearest."""
+    nearest = get_close_matches(name, sorted(columns), n=1, cutoff=0.0)
+    return f"no column {name} of numbers; the nearest is {nearest[0]}"
+
+
+def doubts(rule: Expression, trusts: Trusts, field: str = "require") -> tuple[Message, ...]:
     """Why no design should be judged by columns of a requirement, in a line for each reason."""
     found = doubts_about({name: trusts.get(name, ()) for name in sorted(rule.names)})
-    return tuple(Message(Field("require"), f" {rule.text!r}: {why}") for why in found)
+    return tuple(Message(Field(field), f" {rule.text!r}: {why}") for why in found)
 
 
 def ranking_doubts(metrics: Iterable[str], trusts: Trusts) -> list[str]:
@@ -155,13 +157,25 @@ def failing(designs: Columns, rule: Expression) -> Indices:
 
     A design without a stable state meets none, nor does one where a value is NaN or has none.
     """
-    values = {name: designs[name] for name in rule.names}
-    met = designs["n_stable"] > 0
-    for column in values.values():
-        met &= ~np.isnan(column)
-    truth = np.broadcast_to(np.asarray(rule(values), float), len(met))
-    met &= np.isfinite(truth) & (truth != 0.0)
+    met = (designs["n_stable"] > 0) & holds(rule, designs)
     return np.flatnonzero(~met & _in_question(designs))
+
+
+def holds(rule: Expression, columns: Columns) -> Flags:
+    """In which rows a comparison holds: in none where a value is NaN, or where it has none."""
+    values = {name: columns[name] for name in rule.names}
+    truth = np.asarray(rule(values), float)
+    met = have_values(columns, rule.names)
+    met &= np.isfinite(truth) & (truth != 0.0)
+    return met
+
+
+def have_values(columns: Columns, names: Iterable[str]) -> Flags:
+    """In which rows all of these columns have a value: one that is not NaN."""
+    have = np.ones(len(next(iter(columns.values()))), bool)
+    for name in names:
+        have &= ~np.isnan(columns[name])
+    return have
 
 
 def check_designs(
@@ -196,19 +210,21 @@ def check_requirements(
             rule,
             n_checked,
             failing(designs, rule),
-            (*doubts(rule, trusts or {}), *_failed_searches(designs, rule)),
+            (*doubts(rule, trusts or {}), *failed_searches(designs, rule)),
         )
         for rule in requirements
     )
 
 
-def _failed_searches(designs: Columns, rule: Expression) -> tuple[Message, ...]:
+def failed_searches(
+    designs: Columns, rule: Expression, field: str = "require"
+) -> tuple[Message, ...]:
     """That a count of states is that of those found, where searches failed."""
     if REACHABLE not in rule.names or UNKNOWN not in designs:
         return ()
     n = int(((designs[UNKNOWN] > 0) & _in_question(designs)).sum())
     why = f"searches failed in {counted(n, 'design')} ({UNKNOWN}): more states may be reached there"
-    return (Message(Field("require"), f" {rule.text!r}: {why}"),) if n else ()
+    return (Message(Field(field), f" {rule.text!r}: {why}"),) if n else ()
 
 
 def _in_question(designs: Columns) -> Flags:

@@ -63,6 +63,7 @@ FACE: dict[str, dict[str, Any]] = {
     "landscape": {"spec": FINGER, "start": "0x", "end": "11"},
     "lookup": {"spec": FINGER},
     "merge": {"shards": ["nowhere"], "output": "new"},
+    "pick": {"designs": DESIGNS, "where": "n_stable > 1"},
     "predict": {"spec": FINGER},
     "pulses": {"spec": FINGER, "end": "11"},
     "report": {"folder": "nowhere"},

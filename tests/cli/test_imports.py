@@ -113,6 +113,8 @@ def test_a_sweep_with_its_report_loads_nothing_that_it_can_do_without(
     heavy = {"scipy", "pandas", "pyarrow.compute", "numpy.ma", "matplotlib", "markdown_it"}
     assert found & heavy == set()
     assert loaded("report", str(output)) & heavy == set()
+    chosen = ("--minimize", "reach_min_mm", "--maximize", "reach_max_mm", "--top", "2")
+    assert loaded("pick", str(output), *chosen) & heavy == set()
 
 
 def test_workers_load_no_reader_of_specs() -> None:
@@ -150,6 +152,7 @@ def test_a_command_loads_no_other_than_those_it_shares_with(loaded: Loaded) -> N
         "fit",
         "init",
         "merge",
+        "pick",
         "report",
         "stress",
         "sweep",

@@ -32,7 +32,7 @@ def hinge(
     output: Output = None,
     where: Annotated[
         str | None,
-        typer.Option("--where", metavar="COLUMN=TEXT", help="Only rows with this text"),
+        typer.Option("--where", metavar="CONDITION", help="Only rows with a text: COLUMN=TEXT"),
     ] = None,
     column: ColumnTitles = None,
     skip: Skip = None,

@@ -3,7 +3,6 @@
 Written by `dpg fit`, read by specs. Keys of values and geometry are those of a spec.
 """
 
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -13,7 +12,6 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
 from pydantic import ValidationError
-from ruamel.yaml import YAML
 
 from dpgcli import __version__
 from dpgcli.design.dimensions import AGREEMENT
@@ -39,6 +37,7 @@ from dpgcli.files.sections import (
     wrong_width,
 )
 from dpgcli.files.yaml_file import Document, parse_document, parse_value, read_text
+from dpgcli.files.yaml_text import yaml_text
 from dpgcli.text import KeyPath, dotted, quoted
 
 __all__ = [
@@ -95,16 +94,9 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
     Raises OutputError, and leaves no half-written file whatever happens.
     """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None  # leaves on one line, sections on several
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # typed None
-    yaml.width = 110
-    yaml.allow_unicode = True
-    content = calibration.model_dump(exclude_none=True)
-    text = io.StringIO()
-    yaml.dump(content, text)
+    text = yaml_text(calibration.model_dump(exclude_none=True))
     with whole_file(path, Mark.CALIBRATION) as new:
-        new.write_text(sealed(text.getvalue()), encoding="utf-8", newline="\n")
+        new.write_text(sealed(text), encoding="utf-8", newline="\n")
 
 
 def read_calibration(path: str | Path) -> Calibration:

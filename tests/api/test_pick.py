@@ -1,0 +1,123 @@
+"""`dpg.pick`: tables as paths and values, merged ones too, and designs as specs."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import dpgcli as dpg
+
+STROKE = "finger.lattice.stroke_mm"
+SPACE: list[dict[str, Any]] = [
+    {"key": STROKE, "values": [2.0, 2.5, 3.0, 3.5]},
+    {"key": "finger.units", "values": [2, 3]},
+]
+SERIAL: dict[str, Any] = {"executor": "serial"}
+SWEEP = {"base": "study.yaml", "space": SPACE}
+
+
+@pytest.fixture
+def swept(folder: Path) -> Any:
+    return dpg.sweep(SWEEP, "out", **SERIAL)
+
+
+def test_a_folder_a_file_a_table_and_a_frame_are_alike(swept: Any) -> None:
+    frame = swept.designs.to_pandas()
+    arrow = swept.designs.to_arrow()
+    for designs in ("out", Path("out/designs.parquet"), swept.designs, arrow, frame):
+        found = dpg.pick(designs, "n_units == 3", maximize="reach_max_mm", minimize="reach_min_mm")
+        assert found.table["design"].tolist() == [7]
+        assert found.lines[0] == "8 designs: 8 with stable states"
+
+
+def test_the_rows_are_those_of_the_table(swept: Any) -> None:
+    frame = swept.designs.to_pandas()
+    found = dpg.pick("out", minimize="min_barrier_mJ", columns="all").to_pandas()
+    expected = frame.sort_values("min_barrier_mJ", kind="stable").reset_index(drop=True)
+    pd.testing.assert_frame_equal(found, expected)
+
+
+def test_states_of_a_table_and_their_spec(swept: Any) -> None:
+    found = dpg.pick(swept.states, "units == 3", states=True, maximize="energy_mJ", top=1)
+    assert found.table["pattern"].tolist() == ["111"]
+    found.save_spec("best.yaml")
+    states = dpg.predict("best.yaml", patterns="111").to_pandas()
+    assert states.energy_mJ.tolist() == found.table["energy_mJ"].tolist()
+
+
+def test_merged_shards_are_chosen_from_as_the_whole(swept: Any) -> None:
+    shards = [f"shard{number}" for number in (1, 2)]
+    for number, shard in enumerate(shards, 1):
+        dpg.sweep(SWEEP, shard, shard=f"{number}/2", **SERIAL)
+    dpg.merge(shards, "merged")
+    for folder in ("out", "merged"):
+        dpg.pick(folder, minimize="reach_min_mm", top=1).save_spec(f"{folder}.yaml")
+    assert Path("merged.yaml").read_bytes() == Path("out.yaml").read_bytes()
+
+
+def test_axes_that_are_tables(folder: Path) -> None:
+    """Their keys are not in the sweep's words, but in those of its columns."""
+    pd.DataFrame({STROKE: [2.0, 3.5], "finger.units": [2, 3]}).to_csv("axis.csv", index=False)
+    dpg.sweep({"base": "study.yaml", "space": [{"table": "axis.csv"}]}, "out", **SERIAL)
+    states = dpg.predict("out", design=1).to_pandas()
+    expected = dpg.predict("study.yaml", settings={STROKE: 3.5, "finger.units": 3}).to_pandas()
+    pd.testing.assert_frame_equal(states, expected)
+
+
+def test_predicting_a_design_is_predicting_its_spec(swept: Any) -> None:
+    states = swept.states.to_pandas()
+    for design in (0, 5):
+        found = dpg.predict("out", design=design, patterns="1*").to_pandas()
+        own = states[(states.design == design) & states.pattern.str.startswith("1")]
+        np.testing.assert_allclose(found.tip_y_mm, own.tip_y_mm, rtol=1e-12, atol=1e-12)
+    with pytest.raises(dpg.UsageError, match=r"design 8: out/designs\.parquet has 0 to 7"):
+        dpg.predict("out", design=8)
+
+
+def test_values_without_their_keys_have_no_spec(swept: Any) -> None:
+    """A data frame keeps no base; a table that lost a column would be another design."""
+    found = dpg.pick(swept.designs.to_pandas(), top=1)
+    with pytest.raises(dpg.UsageError, match="no base spec is kept"):
+        found.save_spec("best.yaml")
+    arrow = swept.designs.to_arrow().drop_columns(["units"])
+    found = dpg.pick(arrow, top=1)
+    with pytest.raises(dpg.UsageError, match=r"design 0: no column of finger\.units"):
+        found.save_spec("best.yaml")
+    assert not Path("best.yaml").exists()
+
+
+def test_nothing_left_says_why(swept: Any) -> None:
+    with pytest.raises(dpg.NothingSelectedError, match=r"stroke_mm > 9: met by 0 of 8 designs"):
+        dpg.pick("out", ["stroke_mm > 9", "n_units == 3"])
+    excluded = swept.designs.to_pandas().assign(status="excluded")
+    with pytest.raises(dpg.NothingSelectedError, match="0 with stable states, 8 excluded"):
+        dpg.pick(excluded)
+
+
+def test_saved_rows_are_not_put_over_what_they_come_from(swept: Any) -> None:
+    found = dpg.pick("out", top=2)
+    for name in ("out/designs.parquet", "out/states.parquet"):
+        with pytest.raises(dpg.UsageError, match="is the spec or data that is read"):
+            found.save(name)
+    found.save("two.parquet")
+    assert pd.read_parquet("two.parquet").equals(found.to_pandas())
+
+
+def test_integers_with_gaps_are_numbers(swept: Any) -> None:
+    """As pandas has them: a missing one is NaN, and not chosen by."""
+    frame = swept.designs.to_pandas().assign(rank=pd.array([3, None, 1, 2] * 2, dtype="Int64"))
+    found = dpg.pick(frame, minimize="rank", top=3)
+    assert found.table["design"].tolist() == [2, 6, 3]
+    assert found.lines[-1] == "rank: 2 designs left out without a value"
+
+
+def test_rows_come_in_order_from_all_groups_of_a_file(swept: Any) -> None:
+    frame = swept.designs.to_pandas()
+    frame.to_parquet("groups.parquet", row_group_size=3)
+    found = dpg.pick("groups.parquet", maximize="design", columns="all").to_pandas()
+    pd.testing.assert_frame_equal(found, frame[::-1].reset_index(drop=True))
+    some = dpg.pick("groups.parquet", "n_units == 3", minimize="reach_min_mm", columns="all")
+    expected = frame[frame.n_units == 3].sort_values("reach_min_mm", kind="stable")
+    pd.testing.assert_frame_equal(some.to_pandas(), expected.reset_index(drop=True))
