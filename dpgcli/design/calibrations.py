@@ -108,6 +108,11 @@ class Calibration:
     warnings: Sequence[str] = ()
 
     @property
+    def source(self) -> str:
+        """The name of its file, or the key that it stands at."""
+        return self.file or "finger.calibration"
+
+    @property
     def shape_error(self) -> KnownError | None:
         """That of tips, as shares of their deflection."""
         if self.leave_one_out is None:

@@ -76,7 +76,7 @@ def domes_of(law: str | None, calibrations: tuple[str | Calibration, ...]) -> Do
     stiffness, stroke = (calibration.values.get(key) for key in NORMALS)
     if stiffness is None or stroke is None:
         expected = f"{BISTABLE_STIFFNESS.key} and {STROKE.key} beside the curve"
-        return Issue(WHERE, expected, f"not both in {calibration.file}", HINT)
+        return Issue(WHERE, expected, f"not both in {calibration.source}", HINT)
     if law == "tabulated":
         return _tabulated(calibration, calibration.curve, stiffness.value, stroke.value)
     return _pushing(curves, calibration.curve, stiffness.value)
@@ -91,7 +91,7 @@ def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
         n_points = 1 + int((travels > AT_REST * np.ptp(travels)).sum())
     if n_points < FEWEST_POINTS:
         from_rest = " from rest on" if begins_before else ""
-        found = f"{n_points}{from_rest} in {calibration.file}"
+        found = f"{n_points}{from_rest} in {calibration.source}"
         return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
     start, energy = travels[0], energies[0]
     if start <= 0.0 or abs(energy) <= NEXT_TO_NOTHING * np.ptp(energies):
@@ -101,12 +101,12 @@ def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
     if abs(energy) <= STEEPER * steepest * start:
         return None
     expected = "a curve that begins at rest, travel 0, or whose energies are counted from there"
-    found = f"{energy:g} mJ at {start:g} mm in {calibration.file}"
+    found = f"{energy:g} mJ at {start:g} mm in {calibration.source}"
     return Issue(WHERE, expected, found, "add the point at travel 0 to the curve")
 
 
 def _no_well(calibration: Calibration) -> Issue:
-    return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.file}", HINT)
+    return Issue(WHERE, "a curve with an inverted well", f"none in {calibration.source}", HINT)
 
 
 def _tabulated(

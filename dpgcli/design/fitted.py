@@ -28,7 +28,7 @@ def from_file(
         assert grid is not None, "the calibration has the value"
         over = grid.over
         if missing := [key for key in over if key not in group.geometry]:
-            why = f"{calibration.file} is over {listed(over)}"
+            why = f"{calibration.source} is over {listed(over)}"
             problems.everywhere(missing_from(derivation, group, missing, why))
             return None
         base = _from_grid(derivation, group, grid)
@@ -79,7 +79,7 @@ def _brought(
     over: tuple[str, ...],
 ) -> Value:
     """A file's value, scaled by the rule where dimensions that it is not over are others."""
-    names = tuple(f"{rule} {calibration.file}" for rule in base.rules)
+    names = tuple(f"{rule} {calibration.source}" for rule in base.rules)
     name = names[0]
     own = sizes_of({key: np.array([size]) for key, size in calibration.geometry.items()})
     own |= {key: group.geometry[key] for key in over}

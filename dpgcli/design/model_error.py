@@ -93,9 +93,9 @@ def _left_out(file: Calibration, known: KnownError, own: Sequence[Value], place:
     """The errors of states that a fit has not seen, or of others, as its calibration says."""
     rms = known.largest if known.rms is None else known.rms
     sizes = f"{100.0 * rms:.2g} % of the deflection (rms), {100.0 * known.largest:.2g} % at most"
-    text = f"states that {file.file} was not fitted to are off by {sizes}"
+    text = f"states that {file.source} was not fitted to are off by {sizes}"
     if known.against:
-        text = f"shapes by {file.file} are off by {sizes}, against {known.against}"
+        text = f"shapes by {file.source} are off by {sizes}, against {known.against}"
     if any(ORIGINS[int(of_design(value.origin, place))] in MOVED for value in own):
         text += ", at the geometry of the fit, which is another"
     return ModelError(text, rms)

@@ -374,7 +374,9 @@ def _fitted(key: str, group: UnitGroup) -> Value | None:
     for place, calibration in enumerate(group.calibrations):
         if isinstance(calibration, Calibration) and key in calibration.values:
             fitted = calibration.values[key]
-            value = all_by(np.array([fitted.value]), Origin.CALIBRATED, f"from {calibration.file}")
+            value = all_by(
+                np.array([fitted.value]), Origin.CALIBRATED, f"from {calibration.source}"
+            )
             error = fitted.standard_error
             return replace(
                 value, standard_error=None if error is None else np.array([error]), file=place

@@ -67,7 +67,7 @@ def warnings_of(case: DesignCase) -> tuple[str, ...]:
     """
     used = {value.file for each in case.values.values() for value in each}
     said = tuple(
-        f"{_name(file)}: {warning}"
+        f"{file.source}: {warning}"
         for place, file in enumerate(case.design.calibrations)
         if isinstance(file, Calibration) and (place in used or file is case.domes.calibration)
         for warning in file.warnings
@@ -75,12 +75,7 @@ def warnings_of(case: DesignCase) -> tuple[str, ...]:
     curve, calibration = case.domes.law.curve, case.domes.calibration
     if curve is None or calibration is None or curve.rest == 0.0:
         return said
-    return (*said, f"{_name(calibration)}: {BENDS_DOWN}")
-
-
-def _name(calibration: Calibration) -> str:
-    """The file of a calibration, or where one stands that has none."""
-    return calibration.file or "finger.calibration"
+    return (*said, f"{calibration.source}: {BENDS_DOWN}")
 
 
 def _shapes(case: DesignCase) -> Trust:
@@ -105,7 +100,7 @@ def _under_load(case: DesignCase) -> Trust:
 
 def _energies(case: DesignCase) -> Trust:
     lead, curve = case.gravest(*DOMES), case.domes.calibration
-    source = str(lead) if curve is None else f"curve of {curve.file}, {lead}"
+    source = str(lead) if curve is None else f"curve of {curve.source}, {lead}"
     if case.has_published_domes:
         found = Trust(Output.ENERGIES, lead.basis, SHALLOW, source)
         return replace(found, doubt=SHALLOW_DOUBT, instead=TAKE_A_CURVE)
@@ -227,7 +222,7 @@ def _unasked_pressures(case: DesignCase) -> Trust:
         found = Trust(Output.PRESSURES, Basis.ASSUMED, UNKNOWN, ASSUMED_AREA)
         return replace(found, doubt=ASSUMED_AREA, instead=TAKE_A_CURVE)
     error = case.known_error(Output.PRESSURES, BISTABLE_STIFFNESS.key) or UNKNOWN
-    source = f"curve of {curve.file}, {spring}"
+    source = f"curve of {curve.source}, {spring}"
     return _checked(Trust(Output.PRESSURES, spring.basis, error, source), spring)
 
 

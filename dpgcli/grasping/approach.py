@@ -19,6 +19,7 @@ from dpgcli.grasping.shapes import ContactShapes
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
 MOST_HALTS = 40  # by unit
+MOST_KINKS, KINK_ROOM = 8, 1e-3  # kinks one after the other: of the way between two of them
 MOST_CHANGES, OUT_OF_ORDER = 8, 1e-12  # of contacts in the end; of a stroke
 LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
@@ -87,6 +88,7 @@ def approach(
     """
     shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
     resets: list[Reset] = []
+    n_kinks, last_kink = np.zeros(len(load), int), np.full(len(load), -np.inf)
     lanes = np.flatnonzero(shapes.is_there & (here < end))
     for _ in range(MOST_HALTS * len(start.inverted)):
         if not len(lanes):
@@ -102,7 +104,12 @@ def approach(
         if len(changed):
             which = flipped[:, changed], push[:, changed]
             resets.append(Reset(lanes[changed], ends.load[changed], *which))
-        goes_on = moved.is_there & (ends.outcome != PathEnd.ARRIVED)
+        kinked = lanes[ends.outcome == PathEnd.FAILED]
+        is_near = here[kinked] - last_kink[kinked] < KINK_ROOM
+        n_kinks[kinked] = np.where(is_near, n_kinks[kinked] + 1, 0)
+        last_kink[kinked] = here[kinked]
+        shapes.is_there[lanes] &= n_kinks[lanes] < MOST_KINKS  # contacts that close and open on end
+        goes_on = shapes.is_there[lanes] & (ends.outcome != PathEnd.ARRIVED)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     _put_right(obstructed, shapes, here)

@@ -110,9 +110,9 @@ def together(
     few = [part.grown.shapes.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
     alone = [part.own.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
     bodies = tuple(own.bodies[0] for own in alone)
-    depth = np.max([own.depth for own in alone], axis=0)
-    own = replace(alone[0], bodies=bodies, depth=depth, motion=motion)
     n = len(lanes[0])
+    depth = np.max([np.broadcast_to(own.depth, n) for own in alone], axis=0)  # one for all, or not
+    own = replace(alone[0], bodies=bodies, depth=depth, motion=motion)
     coordinates = np.stack([shapes.coordinates for shapes in few], axis=1).reshape(-1, n)
     shapes = ContactShapes(
         np.concatenate((coordinates, np.zeros((motion.n, n)))),

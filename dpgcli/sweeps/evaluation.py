@@ -154,12 +154,16 @@ class DesignEvaluation:
             return {}
         from dpgcli.grasping.frames import begins_in_base
 
-        scene = found.batch(designs)
-        if scene.layer_thickness is None:
-            return dict.fromkeys(designs.tolist(), NO_FACE)
-        assert scene.body is not None, "the base has one"
-        begin = begins_in_base(scene, scene.body)
-        return dict.fromkeys(designs[begin].tolist(), IN_BASE)
+        reasons: dict[int, str] = {}
+        for alike in found.alike(designs):
+            scene = found.batch(alike)
+            if scene.layer_thickness is None:
+                reasons |= dict.fromkeys(alike.tolist(), NO_FACE)
+                continue
+            assert scene.body is not None, "the base has one"
+            begin = begins_in_base(scene, scene.body)
+            reasons |= dict.fromkeys(alike[begin].tolist(), IN_BASE)
+        return reasons
 
     def _designs(self, values: DesignValues, places: Indices) -> Iterator[tuple[Indices, Design]]:
         """The designs at some places, by their number of units."""

@@ -150,3 +150,11 @@ def test_nothing_of_grasping_is_loaded_without_a_body(tmp_path: Path) -> None:
         [sys.executable, "run.py"], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert ran.stdout.splitlines() == ["[]", "[]", "[]"]
+
+
+def test_rigid_and_elastic_bars_meet_a_body_in_one_sweep() -> None:
+    disc = {"disc": {"diameter_mm": 12.0}, "at_mm": [4.0, 0.0]}
+    bars = ("finger.linear_stiffness_N_per_mm", [1e4, float("inf")])
+    places = ("object.at_y_mm", [-9.0, 0.0])  # the second is in the base
+    found = swept(ALONE | {"object": disc}, places, bars)
+    assert [status == "invalid" for status in found.designs["status"]] == [False, False, True, True]

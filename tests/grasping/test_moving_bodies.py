@@ -211,6 +211,19 @@ def test_a_body_that_nothing_keeps_leaves(reference_finger: Fingers) -> None:
     assert fixed["status"].tolist() == [Status.STABLE] and fixed["n_contacts"].tolist() == [0]
 
 
+def test_one_state_of_a_finger_meets_several_of_the_other(reference_finger: Fingers) -> None:
+    """A part of one lane is not taken for the same of all."""
+    scene = gripper_of(reference_finger(5))
+    beside = replace(CAN, center=CAN.center + np.array([0.0, 0.5]))
+    pairs = "00001/00000", "00001/00001"
+    together = grasp_rows(grasped(scene, beside, Held.GUIDED, *pairs))
+    alone = [grasp_rows(grasped(scene, beside, Held.GUIDED, pair)) for pair in pairs]
+    assert (together["status"] == Status.STABLE).any()
+    for name in ("status", "object_x_mm", "squeeze_N"):
+        single = np.concatenate([rows[name] for rows in alone])
+        assert together[name] == pytest.approx(single, rel=1e-9, nan_ok=True)
+
+
 def test_a_guided_body_is_pushed_along_x_only(reference_finger: Fingers) -> None:
     scene = gripper_of(reference_finger(5))
     found = grasped(scene, CAN, Held.GUIDED, "00001/00000", "00001/00001")

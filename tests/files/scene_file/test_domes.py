@@ -396,3 +396,9 @@ def test_what_is_no_law(problem, law):
 def test_a_table_without_a_second_well_is_refused(scene, law, energy):
     with pytest.raises(SpecError, match="expected a curve with an inverted well"):
         scene(law, dome=calibration(energy=energy.tolist()))
+
+
+def test_a_calibration_in_the_spec_is_named_by_its_key(problem):
+    inline = json.dumps(calibration(energy=(TRAVEL**2).tolist()))
+    said = problem("tabulated", f"finger.calibration={inline}")
+    assert "a curve with an inverted well, found none in finger.calibration" in said
