@@ -107,6 +107,13 @@ def check_body(scene: Scene, body: Body) -> None:
         )
 
 
+def pressure_lines(scene: Scene) -> Iterator[str]:
+    """What pressures rest on."""
+    for trust in scene.trusts:
+        if trust.output is Output.PRESSURES:
+            yield f"pressures: {trust.basis_text}, {trust.source}; error {trust.known_error}"
+
+
 def force_lines(scene: Scene) -> Iterator[str]:
     """What the forces of fingers on bodies rest on, and warnings."""
     for trust in scene.trusts:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import check_body, force_lines, with_body
+from dpgcli.api.bodies import check_body, force_lines, pressure_lines, with_body
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -26,6 +26,7 @@ from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
+from dpgcli.grasping.closing import Closing
 from dpgcli.grasping.costs import Work
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
@@ -36,6 +37,8 @@ from dpgcli.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from dpgcli.api.histories import PressureInput
 
 MOST_ROWS, MOST_LANES, MOST_BYTES = 2**20, 2**14, 2**30
 MOST_DRAWN = 64
@@ -51,7 +54,7 @@ class GraspResult:
     @property
     def columns(self) -> tuple[Column, ...]:
         """The columns of the rows."""
-        return columns_of(self.grasps.scene)
+        return columns_of(self.grasps.scene, self.grasps.closing)
 
     @cached_property
     def rows(self) -> Columns:
@@ -89,6 +92,13 @@ class GraspResult:
                 f"{counted(int(rows['overlaps'].sum()), 'state')} in which the fingers overlap "
                 "each other: their contact with each other is not in the model"
             )
+        if "tie" in rows and (n_tied := int((rows["tie"] != "").sum())):
+            yield (
+                f"ties in {counted(n_tied, 'state')}: the model does not say which of the units "
+                "goes first, and another order may end in another state"
+            )
+        if self.grasps.closing is not None:
+            yield from pressure_lines(self.given.scene)
         yield from force_lines(self.given.scene)
 
     def to_arrow(self) -> Any:
@@ -138,9 +148,10 @@ def grasp(
     *,
     object: str | None = None,
     at: Sequence[float] | None = None,
-    patterns: str | Sequence[str] = "*",
+    patterns: str | Sequence[str] | None = None,
     both: bool = False,
     approach: str = "place",
+    pressure: "PressureInput | None" = None,
     settings: Settings = (),
 ) -> GraspResult:
     """What the fingers of a spec do with a body in their way.
@@ -150,9 +161,11 @@ def grasp(
     of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
     for the upper and the lower finger, "111*/11100"; with `both` every pattern meets every other.
     With the `approach` "place" the body grows from nothing at its place, with "insert" it comes in
-    along −x from beyond the fingers; then it is let go of, if the spec says that it is not fixed.
-    Raises SpecError for a wrong spec, UsageError for what is no body, pattern or approach, a body
-    that begins in a base, and for too many states.
+    along −x from beyond the fingers, and with "close" the fingers then go through pressures, as
+    `actuate` takes them, until there is none; in the end the body is let go of, if the spec says
+    that it is not fixed. Patterns are all of them, or that of a finger at rest with "close", unless
+    given. Raises SpecError for a wrong spec or history, UsageError for what is no body, pattern or
+    approach, a body that begins in a base, and for too many states.
 
     >>> from dpgcli.design.scene import Gripper, Scene
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
@@ -163,30 +176,61 @@ def grasp(
     (['001', '011'], [0, 2])
     """
     check_flags(both=both)
-    given = scene_input(spec, settings)
     way = chosen(Way, "approach", approach)
+    given, closing = grasp_input(spec, settings, way, pressure)
     with_it = with_body(given, object, at)
-    return grasp_of(with_it, as_texts("patterns", patterns), both, way)
+    said = None if patterns is None else as_texts("patterns", patterns)
+    return grasp_of(with_it, patterns_of(given.scene, way, said), both, way, closing)
+
+
+def grasp_input(
+    spec: SpecInput, settings: Settings, way: Way, pressure: "PressureInput | None"
+) -> tuple[SceneInput, Closing | None]:
+    """A spec, and the pressures by which its fingers close, if they do.
+
+    Raises SpecError for a wrong spec or history, UsageError for pressures that have no use.
+    """
+    if way is Way.CLOSE:
+        from dpgcli.api.closing import closing_input
+
+        return closing_input(spec, settings, pressure)
+    if pressure is not None:
+        raise UsageError(Field("pressure"), " goes with ", Field("approach"), f" {Way.CLOSE}")
+    return scene_input(spec, settings), None
+
+
+def patterns_of(scene: Scene, way: Way, patterns: Sequence[str] | None) -> tuple[str, ...]:
+    """Patterns as given, else all of them; fingers that close are at rest before."""
+    if patterns is not None:
+        return tuple(patterns)
+    return ("0" * scene.finger.n_units if way is Way.CLOSE else "*",)
 
 
 def grasp_of(
-    given: SceneInput, patterns: Sequence[str], both: bool = False, way: Way = Way.PLACE
+    given: SceneInput,
+    patterns: Sequence[str],
+    both: bool = False,
+    way: Way = Way.PLACE,
+    closing: Closing | None = None,
 ) -> GraspResult:
     """The same, of a scene with a body that was read before."""
     scene = given.scene
     assert scene.body is not None, "a scene with a body"
     check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
-    check_work(work_of(scene, pairs, way))
+    check_work(work_of(scene, pairs, way, closing))
     keep_freed_memory()
-    return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way))
+    return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way, closing))
 
 
-def work_of(scene: Scene, pairs: Sequence[Codes], way: Way = Way.PLACE) -> Work:
+def work_of(
+    scene: Scene, pairs: Sequence[Codes], way: Way = Way.PLACE, closing: Closing | None = None
+) -> Work:
     """What pairs of states will take."""
+    n_ramps = 0 if closing is None else len(closing.history.pressure)
     n_states = sum(len(distinct(codes)) for codes in pairs)
     is_moving = scene.held is not Held.FIXED
-    return Work(n_states, len(pairs[0]), scene.finger.n_units, len(pairs), is_moving, way)
+    return Work(n_states, len(pairs[0]), scene.finger.n_units, len(pairs), is_moving, way, n_ramps)
 
 
 def check_work(work: Work) -> None:

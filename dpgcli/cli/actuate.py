@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.options import Quiet, Settings, SpecPath, check_plot, check_table_name
+from dpgcli.cli.options import (
+    Pressures,
+    Quiet,
+    Settings,
+    SpecPath,
+    check_plot,
+    check_table_name,
+)
 from dpgcli.cli.printing import Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
@@ -14,14 +21,6 @@ from dpgcli.cli.streams import say
 if TYPE_CHECKING:
     from dpgcli.api.actuate import ActuateResult
 
-Pressures = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--pressure",
-        metavar="MPA",
-        help="MPa: 0:0.15:0, or A=0:0.15:0 for each line, or a CSV file  [default: the spec's]",
-    ),
-]
 Start = Annotated[
     str, typer.Option("--from", metavar="PATTERN", help="Pattern to start from  [default: 0...0]")
 ]

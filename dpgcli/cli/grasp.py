@@ -10,6 +10,7 @@ import typer
 from dpgcli.cli.options import (
     LONG,
     Patterns,
+    Pressures,
     Quiet,
     Settings,
     SpecPath,
@@ -24,6 +25,7 @@ from dpgcli.cli.streams import say
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
+    from dpgcli.api.grasp import GraspResult
     from dpgcli.api.inputs import SceneInput
     from dpgcli.grasping.costs import Work
 
@@ -47,9 +49,10 @@ JawGaps = Annotated[
 
 
 class ApproachName(StrEnum):
-    """How a body comes to where it is grasped."""
+    """How fingers and a body come to touch."""
 
     PLACE = "place"
+    CLOSE = "close"
     INSERT = "insert"
 
 
@@ -57,7 +60,7 @@ Coming = Annotated[
     ApproachName,
     typer.Option(
         "--approach",
-        help="How the body comes: it grows at its place, or is moved in along -x from beyond",
+        help="It grows at its place, fingers close on it by --pressure, or it moves in along -x",
     ),
 ]
 Plot = Annotated[
@@ -73,6 +76,7 @@ def grasp(
     patterns: Patterns = None,
     both: Both = False,
     approach: Coming = ApproachName.PLACE,
+    pressure: Pressures = None,
     jaws: JawGaps = None,
     settings: Settings = None,
     printed_as: Annotated[
@@ -84,36 +88,51 @@ def grasp(
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
     from dpgcli.api.bodies import with_body
-    from dpgcli.api.grasp import check_drawable, check_work, grasp_of, pairs_of, work_of
-    from dpgcli.api.inputs import scene_input
+    from dpgcli.api.grasp import (
+        check_drawable,
+        check_work,
+        grasp_input,
+        grasp_of,
+        pairs_of,
+        patterns_of,
+        work_of,
+    )
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.grasping.approach import Way
 
     if plot is not None:
         check_plot(plot)
     check_table_name(output)
-    given = scene_input(spec, settings or ())
+    way = Way(approach.value)
     if jaws is not None:
-        _check_alone(body, both, approach)
+        _check_alone(body, both, approach, pressure)
+    given, closing = grasp_input(spec, settings or (), way, pressure)
+    if jaws is not None:
         _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
         return
     given = with_body(given, body, point("--at", at))
-    chosen, way = tuple(patterns or ("*",)), Way(approach.value)
+    chosen = patterns_of(given.scene, way, patterns or None)
     pairs = pairs_of(chosen, given.scene, both)
     if plot is not None:
         check_drawable(len(pairs[0]))
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
-    work = work_of(given.scene, pairs, way)
+    work = work_of(given.scene, pairs, way, closing)
     check_work(work)
     if work.seconds > LONG and not quiet:
         say(_expected(work))
     with under_way("closing the fingers", quiet=quiet):
-        found = grasp_of(given, chosen, both, way)
+        found = grasp_of(given, chosen, both, way, closing)
     if output is not None:
         found.save(output)
     if plot is not None:
         found.draw(plot)
-    if printed_as is not None or output is None or len(found.rows["pattern"]) <= ROWS_SHOWN:
+    is_shown = printed_as is not None or output is None
+    _tell(found, printed_as, is_shown or len(found.rows["pattern"]) <= ROWS_SHOWN, quiet)
+
+
+def _tell(found: "GraspResult", printed_as: Format | None, is_shown: bool, quiet: bool) -> None:
+    """Rows, and what is said of them."""
+    if is_shown:
         print_rows(found.columns, found.rows, printed_as or Format.TABLE)
     sys.stdout.flush()
     if not quiet:
@@ -131,7 +150,9 @@ def _expected(work: "Work") -> str:
     )
 
 
-def _check_alone(body: str | None, both: bool, approach: ApproachName) -> None:
+def _check_alone(
+    body: str | None, both: bool, approach: ApproachName, pressure: list[str] | None
+) -> None:
     """Raise UsageError for options that jaws have no use for."""
     from dpgcli.errors import UsageError
 
@@ -139,6 +160,7 @@ def _check_alone(body: str | None, both: bool, approach: ApproachName) -> None:
         "--object": body is not None,
         "--both": both,
         "--approach": approach is not ApproachName.PLACE,
+        "--pressure": bool(pressure),
     }
     if idle := [option for option, is_given in given.items() if is_given]:
         raise UsageError(

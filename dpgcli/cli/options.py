@@ -21,6 +21,14 @@ Patterns = Annotated[
     list[str] | None,
     typer.Option("--pattern", metavar="GLOB", help="Only these states: 101, 1*1, 1??; repeatable"),
 ]
+Pressures = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pressure",
+        metavar="MPA",
+        help="MPa: 0:0.15:0, or A=0:0.15:0 for each line, or a CSV file  [default: the spec's]",
+    ),
+]
 ColumnNames = Annotated[
     str,
     typer.Option(

@@ -11,7 +11,7 @@ from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices, total
+from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import (
     Measure,
     Measured,
@@ -131,7 +131,8 @@ class LoadedPotential(Generic[System, Law]):
     Of the terms in `growing` the load is the share that acts. Paths are followed by the scalars
     `followed`. `scale` (cell, 1 or batch) is the measure of a large change of each, `stiffness`
     (same shape) that of a spring which keeps a cell where it is, however its own law softens. A
-    minimum has as many negative pivots as there are multipliers.
+    minimum has as many negative pivots as there are multipliers. Lanes that `may_kink`, (batch,),
+    are those with constraints that may slide over corners, None where there are none.
     """
 
     coordinates: System
@@ -143,6 +144,7 @@ class LoadedPotential(Generic[System, Law]):
     stiffness: Array
     growing: tuple[Term, ...] = ()
     n_multipliers: int = 0
+    may_kink: Flags | None = None
 
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
         """The same potential for some lanes of the batch."""
@@ -157,6 +159,7 @@ class LoadedPotential(Generic[System, Law]):
             take_lanes(self.stiffness, index),
             tuple(term.take_lanes(index) for term in self.growing),
             self.n_multipliers,
+            None if self.may_kink is None else take_lanes(self.may_kink, index),
         )
 
     @property

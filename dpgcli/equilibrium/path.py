@@ -226,15 +226,17 @@ def _one_step(
     to_root = walk.slope / (walk.slope - slope)
     part = np.where(is_over, dip, np.where(is_event, first, SHRINKING))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
-    is_kinked = (walk.cell < 0) & (family.n_multipliers > 0) & ~is_event
+    is_kinked = (walk.cell < 0) & _may_kink(family, len(end)) & ~is_event
     is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     walk.step = np.where(accepted, longer, shorter)
     walk.is_beyond = is_event
-    if family.n_multipliers:
-        _go_by_load(walk, ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK))
+    by_load = ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK)
+    by_load &= _may_kink(family, len(end))
+    if by_load.any():
+        _go_by_load(walk, by_load)
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
@@ -247,6 +249,10 @@ def _one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _may_kink(family: LoadedPotential[Coordinates, LoadedLaw], n: int) -> Flags:
+    return np.zeros(n, bool) if family.may_kink is None else family.may_kink
 
 
 def _go_by_load(walk: _Walk, which: Flags) -> None:
@@ -281,7 +287,7 @@ def _tried(
     target = walk.values[place] + walk.sign * step * scale[place]
     there = corrected(family, guess, load, cell, target, depth, fewest=1)
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
-    nearest = KINK if family.n_multipliers else FOLD_DISTANCE
+    nearest = np.where(_may_kink(family, len(end)), KINK, FOLD_DISTANCE)
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, there, slope, _margin(family, there), is_fine)

@@ -15,6 +15,7 @@ from dpgcli.equilibrium.path import Ends, PathEnd, follow
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished, relaxed
 from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.grasping.ties import tied
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over
@@ -28,13 +29,30 @@ LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: befo
 class Reset:
     """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,).
 
-    `push` (cell, lane) are the pushes, N, at the fold.
+    `push` (cell, lane) are the pushes, N, at the fold; `snapped` are those that are inverted now.
+    Where it is pressures that changed, `pressure` (unit, lane), MPa, is that of each unit, and
+    `tied` (unit, lane) are those whose thresholds are the same, if there are several.
     """
 
     lanes: Indices
     load: Array
     flipped: Flags
     push: Array
+    snapped: Flags
+    tied: Flags
+    pressure: Array | None = None
+
+    def take(self, index: Indices) -> "Reset":
+        """The same of some of the lanes, by their places here."""
+        parts = {key: part[..., index] for key, part in vars(self).items() if part is not None}
+        return replace(self, **parts)
+
+    def take_units(self, units: slice) -> "Reset":
+        """The same of some units only."""
+        pressure = None if self.pressure is None else self.pressure[units]
+        flags = self.flipped, self.snapped, self.tied
+        flipped, snapped, tied = (part[units] for part in flags)
+        return replace(self, flipped=flipped, snapped=snapped, tied=tied, pressure=pressure)
 
 
 @dataclass(frozen=True)
@@ -50,9 +68,10 @@ class Approach:
 
 
 class Way(StrEnum):
-    """How a body comes to where it is grasped."""
+    """How fingers and a body come to touch."""
 
     PLACE = "place"
+    CLOSE = "close"
     INSERT = "insert"
 
 
@@ -100,10 +119,8 @@ def approach(
         moved, flipped, push = _gone_on(own, few, ends, end[lanes])
         here[lanes] = np.minimum(ends.load + _beyond(ends), end[lanes])
         shapes.put(lanes, moved)
-        changed = np.flatnonzero(flipped.any(axis=0))
-        if len(changed):
-            which = flipped[:, changed], push[:, changed]
-            resets.append(Reset(lanes[changed], ends.load[changed], *which))
+        if flipped.any():
+            resets.append(_reset(own, few, ends, moved, flipped, push, lanes))
         kinked = lanes[ends.outcome == PathEnd.FAILED]
         is_near = here[kinked] - last_kink[kinked] < KINK_ROOM
         n_kinks[kinked] = np.where(is_near, n_kinks[kinked] + 1, 0)
@@ -114,6 +131,26 @@ def approach(
     shapes.is_there[lanes] = False
     _put_right(obstructed, shapes, here)
     return Approach(shapes, here, tuple(resets))
+
+
+def _reset(
+    own: Obstructed,
+    before: ContactShapes,
+    ends: Ends,
+    after: ContactShapes,
+    flipped: Flags,
+    push: Array,
+    lanes: Indices,
+) -> Reset:
+    """What happened at the ends of paths, with the pushes there, to the `lanes` that flipped."""
+    which = np.flatnonzero(flipped.any(axis=0))
+    load, cell, flipped = ends.load[which], ends.cell[which], flipped[:, which]
+    snapped, are_tied = flipped & own.is_open(after)[:, which], np.zeros(flipped.shape, bool)
+    if own.ramp is not None:
+        coordinates = ends.coordinates[: len(before.coordinates)]
+        at_fold = replace(before, coordinates=coordinates, push=push).take_lanes(which)
+        are_tied = tied(own.take_lanes(which), at_fold, load, cell)
+    return Reset(lanes[which], load, flipped, push[:, which], snapped, are_tied)
 
 
 def _put_right(obstructed: Obstructed, shapes: ContactShapes, load: Array) -> None:

@@ -29,11 +29,12 @@ from dpgcli.equilibrium.contracts import (
 from dpgcli.equilibrium.joined import Joined, OfPart, Together, terms_of_part
 from dpgcli.equilibrium.loaded import LoadedPotential, ShareOfLaw
 from dpgcli.equilibrium.potential import Potential
-from dpgcli.grasping.shapes import ContactShapes, Motion
+from dpgcli.grasping.shapes import ContactShapes, Motion, Ramp
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
@@ -51,7 +52,9 @@ class Obstructed:
     are interleaved (`equilibrium.joined`), those of the body's `motion` behind them.
 
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
-    they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm.
+    they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm. A `ramp` changes the
+    pressures on their domes by the load; without it there are none. Points of bodies deeper behind
+    a face than the `reach` (batch,), mm, are beyond the finger.
     """
 
     units: UnitSolutions
@@ -60,6 +63,8 @@ class Obstructed:
     bodies: tuple[Obstacle, ...]
     depth: Array
     motion: Motion | None = None
+    ramp: Ramp | None = None
+    reach: Array | None = None
 
     @property
     def n_fingers(self) -> int:
@@ -83,8 +88,10 @@ class Obstructed:
         thickness, depth = take_lanes(self.thickness, index), take_lanes(self.depth, index)
         bodies = tuple(body.take_lanes(index) for body in self.bodies)
         motion = self.motion and self.motion.take_lanes(index)
+        ramp = self.ramp and self.ramp.take_lanes(index)
+        reach = None if self.reach is None else take_lanes(self.reach, index)
         units = self.units.take_lanes(index)
-        return Obstructed(units, self.formulate, thickness, bodies, depth, motion)
+        return Obstructed(units, self.formulate, thickness, bodies, depth, motion, ramp, reach)
 
     def of_finger(self, values: Array, finger: int) -> Array:
         """What belongs to a finger of coordinates (size, …)."""
@@ -118,7 +125,7 @@ class Obstructed:
             bare = FaceGaps(face, body)
             n = sum(measure.n_cells for measure in gaps)
             own = None if first is None else first[n : n + bare.n_cells]
-            gaps.append(replace(bare, first=own))
+            gaps.append(replace(bare, first=own, reach=self.reach))
         if self.motion is None and len(gaps) == 1:
             return gaps[0]
         return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
@@ -177,9 +184,9 @@ class Obstructed:
         return tuple(self.formulate(self.units.finger.with_domes(part)) for part in parts)
 
     def bare(self, inverted: Flags, load: Array) -> Potential[Coordinates]:
-        """The energy without contact: of fingers and of what the body's motion costs."""
+        """The energy without contact: of fingers, pressures and what the body's motion costs."""
         own = self.potentials(inverted)
-        if self.motion is None and len(own) == 1:
+        if self.motion is None and self.ramp is None and len(own) == 1:
             return own[0]
         joined = Joined[FingerCoordinates](tuple(potential.coordinates for potential in own))
         system: Coordinates = joined
@@ -187,7 +194,7 @@ class Obstructed:
             soft = self.stiffness / STIFFER
             system = Extended[Coordinates](joined, self.motion.n, self.large, soft)
         terms = self._terms_of(own)
-        grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing)
+        grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing_of(own))
         return Potential(system, (*terms, *grown))
 
     def _terms_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
@@ -199,13 +206,31 @@ class Obstructed:
         resisting = () if resistance is None else (Term("body", last, resistance),)
         hold = None if self.motion is None else self.motion.hold
         holding = () if hold is None else (Term("hold", self._motions, DeadLoad(hold)),)
-        return (*(term for part in terms for term in part), *resisting, *holding)
+        pressing = () if self.ramp is None else self._pressing(own, self.ramp.begin)
+        return (*(term for part in terms for term in part), *resisting, *holding, *pressing)
 
-    @property
-    def _growing(self) -> tuple[Term, ...]:
-        """The terms of which the load is the share that acts: what held the body lets go."""
+    def _growing_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
+        """The terms of which the load is the share that acts.
+
+        What held the body lets go, and pressures change.
+        """
         hold = None if self.motion is None else self.motion.hold
-        return () if hold is None else (Term("hold", self._motions, DeadLoad(-hold)),)
+        letting_go = () if hold is None else (Term("hold", self._motions, DeadLoad(-hold)),)
+        pressing = () if self.ramp is None else self._pressing(own, self.ramp.change)
+        return (*letting_go, *pressing)
+
+    def _pressing(self, own: tuple[FingerPotential, ...], pressure: Array) -> tuple[Term, ...]:
+        """The work of pressures, (unit, 1) in MPa, on the domes of every finger."""
+        assert self.ramp is not None, "volumes are known"
+        work = PressureWork(pressure, self.ramp.volumes, self.units.finger.domes)
+        return tuple(Term("pressure", dome, work) for dome in self._domes_of(own))
+
+    def _domes_of(self, own: tuple[FingerPotential, ...]) -> tuple[OfPart, ...]:
+        """Extensions of the domes' springs of each finger."""
+        n, size = len(own), self.n_own
+        return tuple(
+            OfPart(alone.coordinates.dome, place, n, size) for place, alone in enumerate(own)
+        )
 
     def pressed(self, inverted: Flags, push: Array, load: Array) -> Potential[Coordinates]:
         """The augmented Lagrangian for some pushes, (cell, batch), N."""
@@ -219,16 +244,14 @@ class Obstructed:
     ) -> LoadedPotential[Constrained, ActiveConstraints]:
         """The Lagrangians of active contacts, (cell, batch), by the load."""
         own = self.potentials(inverted)
-        size, finger, n = self.n_own, self.units.finger, self.n_fingers
+        finger = self.units.finger
         frame = self.bare(inverted, np.zeros(1)).coordinates
         gaps, multiplied = self.gaps(), Multiplied.of(active)
         system = Extended(frame, multiplied.n, self.large, self.stiffness)
         law = ActiveConstraints(active, self.stiffness, self._deep, self.large[0], self.are_kept)
         terms = (*self._terms_of(own), multiplier_term(system))
-        domes = tuple(
-            OfPart(alone.coordinates.dome, place, n, size) for place, alone in enumerate(own)
-        )
-        followed = domes[0] if n == 1 else Together(domes, size)
+        domes = self._domes_of(own)
+        followed = domes[0] if len(domes) == 1 else Together(domes, self.n_own)
         scale, stiffness = (
             self._by_finger(finger.stroke),
             self._by_finger(self.units.holding_stiffness),
@@ -242,8 +265,9 @@ class Obstructed:
             followed,
             scale,
             stiffness,
-            self._growing,
+            self._growing_of(own),
             n_multipliers=multiplied.n,
+            may_kink=np.asarray(active.any(axis=0)),
         )
 
     def _by_finger(self, values: Array) -> Array:

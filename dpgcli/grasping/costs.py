@@ -6,7 +6,8 @@ from dpgcli.grasping.approach import Way
 from dpgcli.grasping.grasp import BLOCK, LANE
 
 # Measured on one core of a 2020s server, in seconds, times the square of the number of units.
-STATE_SECONDS = {Way.PLACE: 6e-5, Way.INSERT: 3e-4}
+STATE_SECONDS = {Way.PLACE: 6e-5, Way.CLOSE: 6e-5, Way.INSERT: 3e-4}
+RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 JAW_SECONDS = 0.03  # of a state at all apertures; with a calibration's curve several times as much
 START_SECONDS, ROW_SECONDS = 1.0, 3e-5
@@ -24,6 +25,7 @@ class Work:
     n_fingers: int
     is_moving: bool
     way: Way = Way.PLACE
+    n_ramps: int = 0
 
     @property
     def seconds(self) -> float:
@@ -34,7 +36,8 @@ class Work:
         """
         square = self.n_units**2
         let_go = self.n_rows * MOVING_SECONDS * square if self.is_moving else 0.0
-        placed = self.n_states * STATE_SECONDS[self.way] * square
+        one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
+        placed = self.n_states * one * square
         return START_SECONDS + placed + let_go + self.n_rows * ROW_SECONDS
 
     @property

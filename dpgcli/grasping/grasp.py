@@ -13,6 +13,7 @@ from dpgcli.design.bodies import Body
 from dpgcli.design.scene import Scene
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.grasping.approach import Approach, Reset, Way, approach, moved_in
+from dpgcli.grasping.closing import Closing, closed, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame
@@ -134,17 +135,19 @@ def placed(
     frame: FingerFrame,
     codes: Codes,
     way: Way = Way.PLACE,
+    closing: Closing | None = None,
 ) -> Placed:
     """Let fingers in these states meet a body that grows at its place, or moves to it.
 
-    Raises ValueError for a scene without the thickness of its layer.
+    Then they close on it, if that is given. Raises ValueError for a scene without the thickness of
+    its layer.
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
     thickness = np.reshape(scene.layer_thickness, -1)
     units = UnitSolutions.of(scene.finger)
     parts = [
-        met(units, formulate, thickness, body, frame, codes[some], way)
+        met(units, formulate, thickness, body, frame, codes[some], way, closing)
         for some in blocks(len(codes), scene.finger.n_units)
     ]
     return Placed.joined(parts)
@@ -158,6 +161,7 @@ def met(
     frame: FingerFrame,
     codes: Codes,
     way: Way = Way.PLACE,
+    closing: Closing | None = None,
 ) -> Placed:
     """The same of units and layers of some thickness, mm, (1,) or (batch,).
 
@@ -170,7 +174,10 @@ def met(
     depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
     is_stable = np.asarray(free.status == Status.STABLE)
-    came = (_grown if way is Way.PLACE else _inserted)(own, body, frame, x, pattern, is_stable)
+    came = (_inserted if way is Way.INSERT else _grown)(own, body, frame, x, pattern, is_stable)
+    if closing is not None:
+        own = with_reach(own)
+        came = closed(own, came, closing)
     is_lost = is_stable & ~came.shapes.is_there
     return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
 
@@ -285,8 +292,7 @@ def told(part: Placed) -> Grasped:
 
 def _of_finger(resets: tuple[Reset, ...], own: Obstructed, finger: int) -> tuple[Reset, ...]:
     n = own.units.finger.n_units
-    parts = [(reset, reset.flipped[finger * n : (finger + 1) * n]) for reset in resets]
-    return tuple(replace(reset, flipped=flipped) for reset, flipped in parts)
+    return tuple(reset.take_units(slice(finger * n, (finger + 1) * n)) for reset in resets)
 
 
 def _certified(own: Obstructed, grown: Approach, there: Equilibrium, finger: int) -> Settled:

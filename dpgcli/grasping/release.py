@@ -5,7 +5,7 @@ each of its motions; as that goes to nothing the body and its fingers move on, a
 they must. A body that no finger keeps from moving on leaves them: there is no rest.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.bodies import Body, Jaws
 from dpgcli.design.scene import Held
-from dpgcli.grasping.approach import Approach, approach
+from dpgcli.grasping.approach import Approach, Reset, approach
+from dpgcli.grasping.closing import Closing, closed, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described
@@ -58,20 +59,22 @@ def let_go(
     lanes: Sequence[Indices],
     motion: Motion,
     held: Held,
+    closing: Closing | None = None,
     *,
     with_margins: bool = True,
 ) -> tuple[tuple[Grasped, ...], Array]:
     """Fingers at `lanes` of each part with a body between them that is let go of.
 
-    Also how far the bodies have moved, (motion, lane), mm. The motion is one for all, or by lane.
-    A body that is not fixed, and that nothing touches, is not held.
+    On jaws that give way they close before that, if a closing is given. Also how far the bodies
+    have moved, (motion, lane), mm. The motion is one for all, or by lane. A body that is not fixed,
+    and that nothing touches, is not held.
     """
     n = len(lanes[0])
     chunks = []
     for at in range(0, max(n, 1), LANES):
         some = [index[at : at + LANES] for index in lanes]
         own = motion.take_lanes(np.arange(at, at + len(some[0])))
-        chunks.append(_let_go(parts, some, own, held, with_margins=with_margins))
+        chunks.append(_let_go(parts, some, own, held, closing, with_margins=with_margins))
     fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, _ in chunks), strict=True))
     return fingers, np.concatenate([moved for _, moved in chunks], axis=1)
 
@@ -81,11 +84,14 @@ def _let_go(
     lanes: Sequence[Indices],
     motion: Motion,
     held: Held,
+    closing: Closing | None,
     *,
     with_margins: bool,
 ) -> tuple[tuple[Grasped, ...], Array]:
-    own, start = together(parts, lanes, motion)
+    own, start = together(parts, lanes, motion if closing is None else _of_jaws(motion))
     gone = released(own, start)
+    if closing is not None:
+        own, gone = _closed_on_jaws(own, gone, motion, closing)
     codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
     before = [part.status[index] for part, index in zip(parts, lanes, strict=True)]
     status = np.max(before, axis=0)
@@ -95,7 +101,39 @@ def _let_go(
     is_lost = (status == Status.STABLE) & ~is_there
     status = np.where(is_lost, np.uint8(lost), status)
     fingers = described(own, codes, gone, status, with_margins=with_margins)
+    events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
+    told = zip(fingers, events, strict=True)
+    fingers = tuple(replace(finger, resets=(*own, *finger.resets)) for finger, own in told)
     return fingers, gone.shapes.coordinates[own.n_own :]
+
+
+def _events(resets: Sequence[Reset], index: Indices) -> Iterator[Reset]:
+    """What happened as fingers closed, by the rows whose lanes are at `index`."""
+    for reset in resets:
+        if reset.pressure is not None:
+            rows = np.flatnonzero(np.isin(index, reset.lanes))
+            yield replace(reset.take(np.searchsorted(reset.lanes, index[rows])), lanes=rows)
+
+
+def _of_jaws(motion: Motion) -> Motion:
+    """The aperture alone, the last of the motions."""
+    return replace(motion, directions=tuple(along[:, -1:] for along in motion.directions))
+
+
+def _closed_on_jaws(
+    own: Obstructed, beside: Approach, motion: Motion, closing: Closing
+) -> tuple[Obstructed, Approach]:
+    """Fingers closed on jaws that give way all the while, and then are let go of."""
+    own = with_reach(own)
+    came = closed(own, beside, closing)
+    if motion.n == 1:
+        return own, came
+    fingers, aperture = np.split(came.shapes.coordinates, [own.n_own])
+    kept = np.zeros((motion.n - 1, fingers.shape[1]))
+    shapes = replace(came.shapes, coordinates=np.concatenate((fingers, kept, aperture)))
+    own = replace(own, motion=motion)
+    gone = released(own, shapes)
+    return own, replace(gone, resets=(*came.resets, *gone.resets))
 
 
 def _is_held(shapes: ContactShapes) -> NDArray[np.bool_]:

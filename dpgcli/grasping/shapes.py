@@ -1,4 +1,4 @@
-"""Shapes of fingers against bodies, and how bodies may move."""
+"""Shapes of fingers against bodies, how bodies may move, and pressures that change."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
+from dpgcli.mechanics.pressure import DomeVolumes
 
 
 @dataclass(frozen=True)
@@ -60,3 +61,17 @@ class Motion:
             None if self.hold is None else take_lanes(self.hold, index),
             None if self.travel is None else take_lanes(self.travel, index),
         )
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Pressures on the domes of each finger, p = p₀ + λ Δp by a load λ, (unit, 1) in MPa."""
+
+    volumes: DomeVolumes
+    begin: Array
+    change: Array
+
+    def take_lanes(self, index: Indices) -> "Ramp":
+        """Those of some lanes."""
+        volumes = self.volumes.take_lanes(index)
+        return Ramp(volumes, take_lanes(self.begin, index), take_lanes(self.change, index))

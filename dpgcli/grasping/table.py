@@ -7,11 +7,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Codes, Columns, distinct
+from dpgcli.arrays import Array, Codes, Columns, Indices, distinct
 from dpgcli.design.bodies import Body, Jaws
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
+from dpgcli.grasping.closing import Closing, event_text
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, blocks, placed, told
 from dpgcli.grasping.release import let_go, motion_of, moved_by
@@ -29,6 +30,8 @@ COLUMNS = (
     Column("status", "", "result of certification, with the body there", kind=Kind.STATUS),
     Column("pattern_after", "", "state with the body there", kind=Kind.TEXT),
     Column("resets", "", "units that left their wells, at which share of the load", kind=Kind.TEXT),
+    Column("events", "", "units that snapped and reset, at which pressure", kind=Kind.TEXT),
+    Column("tie", "", "units whose threshold is the same within 1e-6", kind=Kind.TEXT),
     Column("n_contacts", "", "places that touch the body", kind=Kind.COUNT),
     Column("touching", "", "phalanges that touch it, from the base", kind=Kind.TEXT),
     Column("finger_force_x_N", "N", "force of the upper finger on the body", outputs=FORCES),
@@ -46,6 +49,7 @@ COLUMNS = (
     Column("numerical_error_mm", "mm", "error of the tip by solving the equations"),
 )
 JAW_GAP = "jaw_gap_mm"
+OF_CLOSING = ("events", "tie")
 OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
 
 
@@ -54,7 +58,7 @@ class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
     `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
-    is, and by so much jaws have `opened`, (row,), mm.
+    is, and by so much jaws have `opened`, (row,), mm. `closing` is how they closed, if they did.
     """
 
     scene: Scene
@@ -64,6 +68,7 @@ class Grasps:
     pairs: NDArray[np.int64]
     centers: Array
     opened: Array | float = 0.0
+    closing: Closing | None = None
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
@@ -76,57 +81,65 @@ def grasps(
     body: Body,
     pairs: Sequence[Codes],
     way: Way = Way.PLACE,
+    closing: Closing | None = None,
 ) -> Grasps:
     """Pairs of states, (row,) each for the upper and the lower finger, against a body.
 
-    Of a finger alone one. Where the body is on the axis a state is solved once for both fingers.
+    Fingers that close do so while the body is kept in its place; jaws that give way do. Of a finger
+    alone one. Where the body is on the axis a state is solved once for both fingers.
     """
     seen_from = frames(scene.gripper)
     is_alike = bool(body.is_mirrored) and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
+    gives_way = isinstance(body, Jaws) and body.stiffness is not None
+    before, later = (None, closing) if gives_way else (closing, None)
     parts: list[Placed] = []
     for frame, codes in zip(seen_from, needed, strict=True):
         if parts and is_alike:
             parts.append(parts[0])
         else:
-            parts.append(placed(scene, formulate, body, frame, codes, way))
+            parts.append(placed(scene, formulate, body, frame, codes, way, before))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
     motion = motion_of(body, scene.held, seen_from)
     if motion is None:
         different = parts[:1] if is_alike else parts
         fingers = [told(part) for part in different] * (len(parts) // len(different))
-        return Grasps(scene, body, seen_from, tuple(fingers), np.array(lanes), centers)
-    found, moved = let_go(parts, lanes, motion, scene.held)
+        rows = np.array(lanes)
+        return Grasps(scene, body, seen_from, tuple(fingers), rows, centers, closing=closing)
+    found, moved = let_go(parts, lanes, motion, scene.held, later)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
     away = _rounded(moved_by(scene.held, moved), scene.finger.straight_length)
     centers = np.where(is_there, centers + away, np.nan)
     opened = np.where(is_there, moved[-1], np.nan)
-    return Grasps(scene, body, seen_from, found, rows, centers, opened)
+    return Grasps(scene, body, seen_from, found, rows, centers, opened, closing)
 
 
-def columns_of(scene: Scene) -> tuple[Column, ...]:
+def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
     """The columns of a gripper, or those of a finger alone."""
     left_out = set() if scene.gripper is not None else set(OF_PAIRS)
     if not isinstance(scene.body, Jaws):
         left_out.add(JAW_GAP)
+    if closing is None:
+        left_out.update(OF_CLOSING)
     return tuple(column for column in COLUMNS if column.name not in left_out)
 
 
 def grasp_rows(found: Grasps) -> Columns:
     """Rows by column, (row,). What is not known of states that are not stable is NaN."""
-    resets, n_rows = [_resets(finger) for finger in found.fingers], found.pairs.shape[1]
+    happened = [_happened(finger, found.closing) for finger in found.fingers]
+    n_rows = found.pairs.shape[1]
     parts = []
     for some in blocks(n_rows, found.scene.finger.n_units):
         few = replace(found, pairs=found.pairs[:, some], centers=found.centers[:, some])
-        parts.append(_rows(few, resets))
+        parts.append(_rows(few, happened))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _rows(found: Grasps, resets: Sequence[NDArray[np.str_]]) -> Columns:
-    """The same of few rows; `resets` are texts by finger and lane."""
+def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
+    """The same of few rows; what `happened` are texts by finger, column and lane."""
     n_units = found.scene.finger.n_units
     of_fingers = [
         {name: getattr(finger, name)[..., lanes] for name in Grasped.BY_LANE}
@@ -147,10 +160,6 @@ def _rows(found: Grasps, resets: Sequence[NDArray[np.str_]]) -> Columns:
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
         "pattern_after": _joined([_texts(own["after"], n_units) for own in of_fingers], is_there),
-        "resets": _joined(
-            [own[lanes] for own, lanes in zip(resets, found.pairs, strict=True)],
-            is_there,
-        ),
         "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
         "touching": _joined(
             [_touching(t, f) for t, f in zip(touches, found.fingers, strict=True)], is_there
@@ -166,11 +175,15 @@ def _rows(found: Grasps, resets: Sequence[NDArray[np.str_]]) -> Columns:
         "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),
         "numerical_error_mm": known(np.max([own["error"] for own in of_fingers], axis=0)),
     }
+    for name in happened[0]:
+        told = zip(happened, found.pairs, strict=True)
+        mask = None if name in OF_CLOSING else is_there  # whatever became of it afterwards
+        rows[name] = _joined([own[name][lanes] for own, lanes in told], mask)
     if isinstance(found.body, Jaws):
         rows[JAW_GAP] = found.body.gap + found.opened + np.zeros(len(status))
     if found.scene.gripper is not None:
         rows.update(_between(found, is_there))
-    return {column.name: rows[column.name] for column in columns_of(found.scene)}
+    return {column.name: rows[column.name] for column in columns_of(found.scene, found.closing)}
 
 
 def _rounded(values: Array, scale: Array | float) -> Array:
@@ -217,17 +230,34 @@ def _joined(
     return joined if is_there is None else np.where(is_there, joined, "")
 
 
-def _resets(finger: Grasped) -> NDArray[np.str_]:
-    """What happened to each lane on the way: "1 at 0.672; 2 at 0.91"."""
-    words: list[list[str]] = [[] for _ in range(len(finger.code))]
+def _happened(finger: Grasped, closing: Closing | None) -> Columns:
+    """What happened to each lane on the way, by column.
+
+    Such as "1 at 0.672; 2 at 0.91" and, as pressures changed, "snap 1,2 at 0.1495 MPa".
+    """
+    n = len(finger.code)
+    words: dict[str, list[list[str]]] = {
+        name: [[] for _ in range(n)] for name in ("resets", *OF_CLOSING)
+    }
     for reset in finger.resets:
         for place, lane in enumerate(reset.lanes):
-            units = ",".join(str(unit + 1) for unit in np.flatnonzero(reset.flipped[:, place]))
-            words[lane].append(f"{units} at {reset.load[place]:.4g}")
-    return np.array(["; ".join(lane) for lane in words])
+            if not reset.flipped[:, place].any():  # it is the other finger's
+                continue
+            if closing is None or reset.pressure is None:
+                units = _numbers(np.flatnonzero(reset.flipped[:, place]))
+                words["resets"][lane].append(f"{units} at {reset.load[place]:.4g}")
+                continue
+            words["events"][lane].append(event_text(reset, place, closing.pressure))
+            if tied := _numbers(np.flatnonzero(reset.tied[:, place])):
+                words["tie"][lane].append(tied)
+    return {name: np.array(["; ".join(lane) for lane in of]) for name, of in words.items()}
 
 
 def _touching(touches: NDArray[np.bool_], finger: Grasped) -> NDArray[np.str_]:
     """The phalanges that touch the body in each row, from the base: "3,4"."""
-    numbers = [distinct(finger.phalanges[row]) for row in touches.T]
-    return np.array([",".join(str(k + 1) for k in row) for row in numbers])
+    return np.array([_numbers(distinct(finger.phalanges[row])) for row in touches.T])
+
+
+def _numbers(places: Indices) -> str:
+    """Units or phalanges as people count them, from the base."""
+    return ",".join(str(place + 1) for place in places)

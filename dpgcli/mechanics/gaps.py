@@ -58,12 +58,14 @@ class FaceGaps:
 
     Behind these are those of its plates: all nodes of the face for the first, then the next. With
     `first` (cell, batch) only one gap of those at one place is there, the others are far away: one
-    of the first, or else that of the cell itself.
+    of the first, or else that of the cell itself. Points that are behind a side by more than the
+    `reach` (batch,), mm, are beyond the finger, and far away.
     """
 
     face: Face
     obstacle: Obstacle
     first: Flags | None = None
+    reach: Array | None = None
 
     @property
     def n_cells(self) -> int:
@@ -126,6 +128,8 @@ class FaceGaps:
         """The gap of each side and point, (cell, batch); none where no side can touch."""
         own = near.distance - self.obstacle.radii[:, None]
         own = np.where(self.obstacle.is_reentrant[:, None], FAR, own)
+        if self.reach is not None:
+            own = np.where(near.distance < -self.reach, FAR, own)
         return np.asarray(own.reshape(-1, own.shape[-1]))
 
     def _at_plates(self, plates: PlateGaps, at_points: Indices) -> Indices:
@@ -171,7 +175,9 @@ class FaceGaps:
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
         first = None if self.first is None else take_lanes(self.first, index)
-        return type(self)(self.face.take_lanes(index), self.obstacle.take_lanes(index), first)
+        reach = None if self.reach is None else take_lanes(self.reach, index)
+        face, obstacle = self.face.take_lanes(index), self.obstacle.take_lanes(index)
+        return type(self)(face, obstacle, first, reach)
 
 
 def _pushed(plates: PlateGaps) -> Array:

@@ -75,16 +75,22 @@ class Own:
             face.append(Plane(x + half * np.sin(tau), y - half * np.cos(tau)))
         return base, top, face
 
+    def extensions(self, q: Array) -> list[Array]:
+        """Of the domes' springs, walls counted in, by unit."""
+        v, top = self.by_unit(q)[0], self.nodes(q)[1]
+        soft = np.sqrt(self.value("wall_compliance") * self.value("bistable_stiffness"))
+        spans = [np.sqrt((b.x - a.x) ** 2 + (b.y - a.y) ** 2) for a, b in pairwise(top)]
+        lengths = self.value("segment_length")
+        return [x - lengths[i] + soft[i] * v[i] for i, x in enumerate(spans)]
+
     def energy(self, q: Array) -> Array:
         """Domes, walls, corners and bars, N mm, (batch,)."""
         v, e, a, b, s = self.by_unit(q)
-        top, result = self.nodes(q)[1], 0.0 * q[0]
+        xs, result = self.extensions(q), 0.0 * q[0]
         k_b, alpha, d = map(self.value, ("bistable_stiffness", "force_linearity", "stroke"))
-        k_t, c_w = self.value("hinge_stiffness"), self.value("wall_compliance")
+        k_t = self.value("hinge_stiffness")
         k_l = float(self.finger.linear_stiffness[0, 0])
-        for i in range(self.finger.n_units):
-            span = np.sqrt((top[i + 1].x - top[i].x) ** 2 + (top[i + 1].y - top[i].y) ** 2)
-            x = span - self.value("segment_length")[i] + np.sqrt(c_w[i] * k_b[i]) * v[i]
+        for i, x in enumerate(xs):
             result = result + self._dome(i, x, k_b[i], alpha[i], d[i]) + 0.5 * k_b[i] * v[i] ** 2
             result = result + k_t[i] * (a[i] ** 2 + b[i] ** 2)
             if np.isfinite(k_l):

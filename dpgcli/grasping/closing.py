@@ -1,0 +1,71 @@
+"""Fingers that close on bodies: pressures go through a history with the body there.
+
+Domes snap and reset at folds, as without a body, but those of the finger with its contacts, which
+begin and end on the way.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dpgcli.actuation.folding import folded
+from dpgcli.arrays import Flags
+from dpgcli.design.pressure import History, Pressure
+from dpgcli.grasping.approach import Approach, Reset, approach
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.shapes import ContactShapes, Ramp
+from dpgcli.mechanics.pressure import DomeVolumes
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Pressures that the lines of each finger go through, from none; domes sweep `volumes`."""
+
+    volumes: DomeVolumes
+    pressure: Pressure
+    history: History
+
+
+def closed(own: Obstructed, start: Approach, closing: Closing) -> Approach:
+    """Let pressures change beside bodies; what flips is told by pressures."""
+    shapes, resets, n = start.shapes, list(start.resets), len(start.load)
+    by_unit = closing.history.pressure[:, closing.pressure.line_of]
+    before = 0.0 * by_unit[0]
+    for target in by_unit:
+        ramp = Ramp(closing.volumes, before[:, None], (target - before)[:, None])
+        under = replace(own, depth=np.zeros(1), ramp=ramp)
+        came = approach(under, shapes, np.zeros(n), np.ones(n))
+        begin, change = (np.tile(p, (own.n_fingers, 1)) for p in (ramp.begin, ramp.change))
+        resets += [replace(told, pressure=begin + told.load * change) for told in came.resets]
+        is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
+        shapes, before = replace(came.shapes, is_there=is_sound), target
+    return replace(start, shapes=shapes, resets=tuple(resets))
+
+
+def _are_folded(own: Obstructed, shapes: ContactShapes) -> Flags:
+    """Lanes in which a finger has folded onto itself."""
+    systems = [potential.coordinates for potential in own.potentials(shapes.inverted)]
+    mine = [own.of_finger(shapes.coordinates, finger) for finger in range(own.n_fingers)]
+    are_folded = [folded(*finger) for finger in zip(systems, mine, strict=True)]
+    return np.asarray(np.any(are_folded, axis=0))
+
+
+def with_reach(own: Obstructed) -> Obstructed:
+    """Fingers that may close in front of bodies: what is behind their domes they do not touch."""
+    height = own.units.finger.segment_height.max(axis=0)
+    return replace(own, reach=height + 0.5 * own.thickness[0])
+
+
+def event_text(told: Reset, place: int, lines: Pressure) -> str:
+    """What happened to a lane as pressures changed, by the line of each unit if there are several.
+
+    Such as "snap 1,2 at 0.1495 MPa", or "snap 1 at A 0.15 MPa, reset 4 at B -0.02 MPa".
+    """
+    assert told.pressure is not None, "pressures changed"
+    parts: dict[tuple[str, str], list[str]] = {}
+    for unit in np.flatnonzero(told.flipped[:, place]):
+        kind = "snap" if told.snapped[unit, place] else "reset"
+        line = f"{lines.lines[lines.line_of[unit]]} " if len(lines.lines) > 1 else ""
+        at = f"{line}{told.pressure[unit, place]:.6g} MPa"
+        parts.setdefault((kind, at), []).append(str(unit + 1))
+    return ", ".join(f"{kind} {','.join(units)} at {at}" for (kind, at), units in parts.items())

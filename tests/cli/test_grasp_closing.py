@@ -1,0 +1,99 @@
+"""`dpg grasp --approach close`: fingers that close on a body by pressure."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+import dpgcli as dpg
+from dpgcli.cli.exits import ExitCode
+
+SPEC = """\
+finger:
+  units: 3
+  calibration: published
+  linear_stiffness_N_per_mm: .inf
+  geometry:
+    dome_height_mm: 6.5
+    dome_thickness_mm: 0.75
+    unit_cell_mm: 22
+    chamber_length_mm: 9
+    channel_width_mm: 10
+    limiting_layer_thickness_mm: 1.5
+    unit_separation_mm: 3
+    elastic_modulus_MPa: 26
+gripper: {base_spacing_mm: 40, mounting_angle_deg: 0}
+"""
+DISC = ("--object", "disc:28", "--at", "28.35,0")
+CLOSE = ("--approach", "close")
+
+
+@pytest.fixture
+def spec(folder: Path) -> str:
+    (folder / "g.yaml").write_text(SPEC, encoding="utf-8")
+    return "g.yaml"
+
+
+def test_rows_say_what_snapped_at_which_pressure(call: Any, folder: Path, spec: str) -> None:
+    options = ("--pressure", "0:0.2:0", "-o", "g.parquet", "--plot", "g.svg")
+    result = call("grasp", spec, *DISC, *CLOSE, *options, "--format", "json")
+    assert result.exit_code == ExitCode.DONE
+    (row,) = json.loads(result.stdout)
+    assert (row["pattern"], row["status"], row["resets"]) == ("000", "stable", "")
+    assert re.match(r"snap [123,]+ at 0\.1495 MPa; snap [123,]+ at 0\.1\d+ MPa", row["events"])
+    assert row["tie"] == "1,2,3"
+    assert "ties in 1 state: the model does not say which of the units goes first" in result.stderr
+    assert "pressures: assumed, snap pressure" in result.stderr
+    table = pq.read_table(folder / "g.parquet")
+    assert table["events"].to_pylist() == [row["events"]]
+    found = dpg.grasp(
+        spec, object="disc:28", at=(28.35, 0), approach="close", pressure=[0.0, 0.2, 0.0]
+    )
+    assert found.table["events"].tolist() == [row["events"]]
+
+
+def test_lines_are_named_and_histories_are_those_of_actuate(
+    call: Any, folder: Path, spec: str
+) -> None:
+    """A unit is told with the pressure of its own line; a table of pressures is read, and kept."""
+    lines = ("--set", "pressure.lines={A: 1-2, B: 3}", "--pattern", "0??", "-q", "--format", "json")
+    ramps = ("--pressure", "A=0:0:0.16:0", "--pressure", "B=0:0.16:0.16:0")
+    rows = json.loads(call("grasp", spec, *DISC, *CLOSE, *ramps, *lines).stdout)
+    assert [row["pattern"] for row in rows] == ["000", "001", "010", "011"]
+    assert rows[0]["events"].startswith("snap 3 at B 0.1495")
+    table = "A (kPa),B (kPa)\n0,0\n0,160\n160,160\n0,0\n"
+    (folder / "p.csv").write_text(table, encoding="utf-8")
+    again = call("grasp", spec, *DISC, *CLOSE, "--pressure", "p.csv", *lines)
+    assert json.loads(again.stdout) == rows
+    over = call("grasp", spec, *DISC, *CLOSE, "--pressure", "p.csv", *lines[:2], "-o", "p.csv")
+    assert over.exit_code != ExitCode.DONE
+    assert (folder / "p.csv").read_text(encoding="utf-8") == table
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ((*DISC, *CLOSE), "--pressure: expected pressures in MPa such as 0:0.15:0"),
+        (
+            (*DISC, *CLOSE, "--pressure", "0:0.16"),
+            "--pressure ends at 0.16 MPa: expected 0 at the end",
+        ),
+        ((*DISC, *CLOSE, "--pressure", "0:x:0"), 'found "x"'),
+        ((*DISC, "--pressure", "0:0.16:0"), "--pressure goes with --approach close"),
+        (
+            (*DISC, *CLOSE, "--pressure", "0:0.16:0", "--set", "finger.law=push_only"),
+            "--approach close: domes that only push leave their neighbors",
+        ),
+        (
+            ("--jaws", "30:40", "--at", "28,0", *CLOSE, "--pressure", "0:0.1:0"),
+            "--jaws goes without --approach and --pressure",
+        ),
+    ],
+)
+def test_refusals(call: Any, spec: str, options: tuple[str, ...], said: str) -> None:
+    result = call("grasp", spec, *options)
+    assert result.exit_code == ExitCode.USAGE
+    assert said in result.stderr and not result.stdout
