@@ -51,7 +51,7 @@ def _are_folded(own: Obstructed, shapes: ContactShapes) -> Flags:
 
 
 def with_reach(own: Obstructed) -> Obstructed:
-    """Fingers that may close in front of bodies: what is behind their domes they do not touch."""
+    """Fingers that may close in front of bodies: they touch nothing that is behind their domes."""
     height = own.units.finger.segment_height.max(axis=0)
     return replace(own, reach=height + 0.5 * own.thickness[0])
 

@@ -103,7 +103,7 @@ def _let_go(
     fingers = described(own, codes, gone, status, with_margins=with_margins)
     events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
     told = zip(fingers, events, strict=True)
-    fingers = tuple(replace(finger, resets=(*own, *finger.resets)) for finger, own in told)
+    fingers = tuple(replace(finger, resets=(*before, *finger.resets)) for finger, before in told)
     return fingers, gone.shapes.coordinates[own.n_own :]
 
 
