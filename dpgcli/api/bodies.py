@@ -51,8 +51,9 @@ def with_body(given: SceneInput, said: str | None, at: Sequence[float] | None) -
         body = spec.known if at is None else replace(spec.known, center=_known(place))
         body = _giving_way(body, known)
         held = Held(spec.held) if "held" in spec.model_fields_set else scene.held
-        files = (*given.files, path.absolute())
-        return replace(given, scene=replace(scene, body=body, held=held), files=files)
+        friction = spec.known_friction or scene.friction
+        scene = replace(scene, body=body, held=held, friction=friction)
+        return replace(given, scene=scene, files=(*given.files, path.absolute()))
     body = _giving_way(_of_text(said, place), known)
     return replace(given, scene=replace(scene, body=body))
 

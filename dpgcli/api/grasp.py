@@ -23,6 +23,8 @@ from dpgcli.api.inputs import (
 )
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
+from dpgcli.design.bodies import Friction
+from dpgcli.design.loads import direction_text
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
@@ -100,6 +102,31 @@ class GraspResult:
         if self.grasps.closing is not None:
             yield from pressure_lines(self.given.scene)
         yield from force_lines(self.given.scene)
+        if self.grasps.scene.friction is not None:
+            yield from self._payload_lines(self.grasps.scene.friction)
+
+    def _payload_lines(self, friction: Friction) -> Iterator[str]:
+        """What payloads rest on, the largest, and which states do not bear the weight."""
+        payload, pattern = self.rows["payload_N"], self.rows["pattern"]
+        yield (
+            f"payload: pull along {direction_text(self.grasps.scene.gravity)}, where gravity acts "
+            f"to; rests on the friction of {friction.coefficient:g} that is given, and on these "
+            "forces"
+        )
+        is_known = ~np.isnan(payload)
+        if not is_known.any():
+            return
+        best = int(np.nanargmax(payload))
+        most, weight = payload[best], friction.weight
+        if weight is None:
+            yield f"largest payload {most:.4g} N, in {pattern[best]}"
+            return
+        yield (
+            f"largest payload {most:.4g} N, in {pattern[best]}: {most / weight:.3g} times the "
+            f"weight of {weight:.4g} N"
+        )
+        if n_less := int((payload[is_known] < weight).sum()):
+            yield f"warning: {counted(n_less, 'state')} not bearing the weight of {weight:.4g} N"
 
     def to_arrow(self) -> Any:
         """The rows as a `pyarrow.Table`."""
@@ -230,7 +257,8 @@ def work_of(
     n_ramps = 0 if closing is None else len(closing.history.pressure)
     n_states = sum(len(distinct(codes)) for codes in pairs)
     is_moving = scene.held is not Held.FIXED
-    return Work(n_states, len(pairs[0]), scene.finger.n_units, len(pairs), is_moving, way, n_ramps)
+    sizes = n_states, len(pairs[0]), scene.finger.n_units, len(pairs)
+    return Work(*sizes, is_moving, way, n_ramps, scene.friction is not None)
 
 
 def check_work(work: Work) -> None:

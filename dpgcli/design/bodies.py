@@ -9,10 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.design.loads import GRAVITY
 
 DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
 COMPLIANCE = "compliance.stiffness_N_per_mm"
 PLACES = "at_x_mm", "at_y_mm"  # these are keys of a spec's object
+FRICTION, MASS = "friction", "mass_g"
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class Disc:
     def inner_radius(self) -> float | Array:
         """The radius of the largest circle in it, mm."""
         return self.radius
+
+    @property
+    def middle(self) -> Array:
+        """Its center of area, (2,) or (2, design), mm."""
+        return self.center
 
     @property
     def nearest_x(self) -> float | Array:
@@ -89,6 +96,14 @@ class Polygon:
         """The corners in the gripper's frame, (2, corner), mm."""
         around = self.around if self.center.ndim == 1 else self.around[..., None]
         return np.asarray(self.center[:, None] + around)
+
+    @property
+    def middle(self) -> Array:
+        """Its center of area, (2,) or (2, design), mm."""
+        import shapely
+
+        from_center = shapely.get_coordinates(shapely.centroid(shapely.Polygon(self.around.T)))[0]
+        return np.asarray((self.center.T + from_center).T)
 
     @property
     def nearest_x(self) -> float | Array:
@@ -155,6 +170,11 @@ class Jaws:
         return np.asarray(self.center[:, None] + around)
 
     @property
+    def middle(self) -> Array:
+        """Its center of area, (2,) or (2, design), mm."""
+        return self.center
+
+    @property
     def nearest_x(self) -> float | Array:
         """The least x of it, mm."""
         nearest: float | Array = self.corners[0].min(axis=0)
@@ -173,6 +193,31 @@ class Jaws:
 
 
 Body = Disc | Jaws | Polygon
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Friction between a body and fingers: its coefficient, and the body's mass, g, if known.
+
+    Numbers, or arrays by design.
+    """
+
+    coefficient: float | Array
+    mass: float | Array | None = None
+
+    @property
+    def weight(self) -> float | Array | None:
+        """The weight of the body, N, if its mass is known."""
+        return None if self.mass is None else GRAVITY * self.mass
+
+    def with_value(self, key: str, column: Array) -> "Friction":
+        """With values of designs, (design,), at a key of a spec's object."""
+        return replace(self, **{"coefficient" if key == FRICTION else "mass": column})
+
+    def take_lanes(self, index: Indices) -> "Friction":
+        """That of some designs of a batch; one that is alike in all is repeated."""
+        mass = None if self.mass is None else _sizes(self.mass, index)
+        return Friction(_sizes(self.coefficient, index), mass)
 
 
 def _moved(center: Array, key: str, column: Array) -> Array:

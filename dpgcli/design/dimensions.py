@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.design.bodies import PLACES, Body
+from dpgcli.design.bodies import FRICTION, PLACES, Body, Friction
+from dpgcli.design.bodies import MASS as BODY_MASS
 from dpgcli.design.calibrations import Calibration
 from dpgcli.design.geometry import chamber_width
 from dpgcli.design.loads import FORCES, MASS, MOMENT, GivenLoads
@@ -36,7 +37,7 @@ BOUNDS = {  # where they are not those of a length
     HINGE_COUPLING: (-LARGEST, LARGEST),
     "mounting_angle_deg": (-90.0, 90.0),
     **dict.fromkeys((*FORCES, MOMENT, *PLACES), (-LARGEST, LARGEST)),
-    MASS: (0.0, LARGEST),
+    **dict.fromkeys((MASS, FRICTION), (0.0, LARGEST)),
 }
 SUFFIXES = {  # units in the names of keys
     "_N_mm_per_rad": "N mm/rad",
@@ -112,8 +113,8 @@ class Design:
     `overrides` are the sections of units as a spec names them ("4", "4-5"), `gripper` has its
     values by key, none without one. The calibrations are in the order in which they count.
     `tolerances` are by key; the model error is a share of the deflection, or `LEAVE_ONE_OUT`.
-    `pressure`, `loads` and `body` are None where the spec says nothing of them; the body is `held`
-    so.
+    `pressure`, `loads`, `body` and its `friction` are None where the spec says nothing of them; the
+    body is `held` so.
     """
 
     units: int
@@ -131,6 +132,7 @@ class Design:
     loads: GivenLoads | None = None
     body: Body | None = None
     held: Held = Held.FIXED
+    friction: Friction | None = None
 
     def with_values(self, columns: Sizes) -> "Design":
         """The designs with values (design,) at dotted keys of a spec, but its number of units.
@@ -154,6 +156,9 @@ class Design:
             return replace(self, pressure=given.with_value(path[1:], column))
         if parents == ["loads"]:
             return replace(self, loads=(self.loads or GivenLoads()).with_value(key, column))
+        if path in (["object", FRICTION], ["object", BODY_MASS]):
+            assert self.friction is not None, "keys of a base that has it"
+            return replace(self, friction=self.friction.with_value(key, column))
         if parents[0] == "object":
             assert self.body is not None, "keys of a base that has one"
             return replace(self, body=self.body.with_value(".".join(path[1:]), column))

@@ -82,6 +82,16 @@ class GivenLoads:
         }
 
 
+def direction_text(along: tuple[float, float]) -> str:
+    """A direction of length 1 as specs have it.
+
+    >>> direction_text((-1.0, 0.0)), direction_text((0.6, -0.8))
+    ('-x', '[0.6, -0.8]')
+    """
+    words = {way: word for word, way in DIRECTIONS.items()}
+    return words.get(along, "[{:.4g}, {:.4g}]".format(*along))
+
+
 def load_issues(given: GivenLoads, n_units: int) -> Iterator[Issue]:
     """What is wrong between loads and the number of units."""
     if given.masses and len(given.masses) != n_units:

@@ -132,6 +132,7 @@ class Resolution:
             self.trusts,
             self.warnings,
             batch.pressure,
+            gravity=batch.gravity,
         )
 
     @property
@@ -172,8 +173,11 @@ class Resolution:
         thickness = None if layer is None else _picked(layer, designs)
         gripper, pressure = self._gripper(designs), self._pressure(designs)
         body = self.design.body and self.design.body.take_lanes(designs)
-        held = self.design.held
-        return Scene(finger, (), gripper, thickness, pressure=pressure, body=body, held=held)
+        friction = self.design.friction and self.design.friction.take_lanes(designs)
+        found = Scene(finger, (), gripper, thickness, pressure=pressure, body=body)
+        found = replace(found, held=self.design.held, friction=friction)
+        loads = self.design.loads
+        return found if loads is None else replace(found, gravity=loads.along)
 
     def _loads(self, designs: Indices) -> dict[str, Array]:
         """The dead loads by name; none where the spec says nothing of them."""

@@ -7,7 +7,8 @@ from enum import StrEnum
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
-from dpgcli.design.bodies import Body
+from dpgcli.design.bodies import Body, Friction
+from dpgcli.design.loads import DOWN
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
@@ -156,7 +157,8 @@ class Scene:
     fitted values, of tolerances and of the model, as far as there are any; `model_error` is what
     is known of the last; `chambers` are those of a finger given by its geometry. `trusts` say what
     its outputs rest on, `warnings` are those of the calibrations in use; none of mere values.
-    `pressure` and `body` are None where the spec says nothing of them; the body is `held` so.
+    `pressure`, `body` and its `friction` are None where the spec says nothing of them; the body is
+    `held` so. `gravity` is the direction in which it acts, of length 1.
     """
 
     finger: Finger
@@ -171,6 +173,8 @@ class Scene:
     pressure: Pressure | None = None
     body: Body | None = None
     held: Held = Held.FIXED
+    friction: Friction | None = None
+    gravity: tuple[float, float] = DOWN
 
     def take_lanes(self, index: Indices) -> "Scene":
         """Some designs of a batch, without what is said of a single one."""
@@ -188,4 +192,6 @@ class Scene:
             pressure=pressure,
             body=body,
             held=self.held,
+            friction=self.friction and self.friction.take_lanes(index),
+            gravity=self.gravity,
         )

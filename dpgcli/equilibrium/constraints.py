@@ -216,7 +216,7 @@ class ActiveConstraints:
 
     `active` (cell, batch), `stiffness` σ (1, 1 or batch) in N/mm, `depth` D (…, batch) in mm and
     what is `large` of a gap (batch,), mm. Cells that `are_kept`, (cell, 1), stay active whatever
-    the sign of y.
+    the sign of y; with `limits` (kept cell, cell, 1 or batch) up to |y| = Σ limit · y of all.
     """
 
     active: Flags
@@ -224,6 +224,7 @@ class ActiveConstraints:
     depth: Array
     large: Array
     are_kept: Flags = field(default_factory=lambda: np.zeros((1, 1), bool))
+    limits: Array | None = None
 
     @property
     def is_smooth(self) -> bool:
@@ -242,7 +243,7 @@ class ActiveConstraints:
         """y of active constraints and t of the others, over what is large.
 
         Infinite for t at a place that an active constraint is at, or that is another one's own, and
-        for cells that are kept.
+        for cells that are kept: with limits how far active ones are from these.
         """
         assert isinstance(measured, WideMeasured), "places are known"
         slack = measured.value - (load - 1.0) * self.depth
@@ -252,14 +253,21 @@ class ActiveConstraints:
         is_elsewhere = place != numbers[:, None]
         other = np.where(is_held | is_elsewhere, np.inf, slack)
         margin = np.where(self.active, -slack, other) / self.large
-        return np.where(self.are_kept, np.inf, margin)
+        margin = np.where(self.are_kept, np.inf, margin)
+        if self.limits is not None:
+            y, kept = np.where(self.active, -slack, 0.0), np.flatnonzero(self.are_kept)
+            most = total(np.moveaxis(self.limits * y, 1, 0))
+            left = np.where(self.active[kept], most - np.abs(y[kept]), np.inf)
+            margin[kept] = left / self.large
+        return margin
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""
         parts = (self.stiffness, self.depth, self.large)
         stiffness, depth, large = (take_lanes(part, index) for part in parts)
         active = take_lanes(self.active, index)
-        return type(self)(active, stiffness, depth, large, self.are_kept)
+        limits = None if self.limits is None else take_lanes(self.limits, index)
+        return type(self)(active, stiffness, depth, large, self.are_kept, limits)
 
 
 @dataclass(frozen=True)

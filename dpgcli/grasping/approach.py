@@ -103,7 +103,8 @@ def approach(
 ) -> Approach:
     """Let bodies grow from one load to another, (batch,), about fingers in balance.
 
-    With `to_reset` only as far as to where a first unit resets or snaps.
+    With `to_reset` only as far as to where a first unit resets or snaps; nowhere beyond where a
+    place that sticks begins to slide.
     """
     shapes, here = start.take_lanes(np.arange(len(load))), load.copy()
     resets: list[Reset] = []
@@ -127,6 +128,7 @@ def approach(
         last_kink[kinked] = here[kinked]
         shapes.is_there[lanes] &= n_kinks[lanes] < MOST_KINKS  # contacts that close and open on end
         goes_on = shapes.is_there[lanes] & (ends.outcome != PathEnd.ARRIVED)
+        goes_on &= (moved.active | ~own.are_kept).all(axis=0)
         lanes = lanes[goes_on & ~(to_reset & flipped.any(axis=0))]
     shapes.is_there[lanes] = False
     _put_right(obstructed, shapes, here)

@@ -4,6 +4,7 @@ A body that may move has coordinates of its own, behind those of the fingers tha
 it does not, fingers know nothing of each other, and each is a scene by itself.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -35,6 +36,7 @@ from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.pressure import PressureWork
+from dpgcli.mechanics.sticking import Sticking
 from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
@@ -54,7 +56,8 @@ class Obstructed:
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm. A `ramp` changes the
     pressures on their domes by the load; without it there are none. Points of bodies deeper behind
-    a face than the `reach` (batch,), mm, are beyond the finger.
+    a face than the `reach` (batch,), mm, are beyond the finger. Places that are `sticking` to a
+    body that is there in full do not slide along it.
     """
 
     units: UnitSolutions
@@ -65,6 +68,7 @@ class Obstructed:
     motion: Motion | None = None
     ramp: Ramp | None = None
     reach: Array | None = None
+    sticking: tuple[Sticking, ...] = ()
 
     @property
     def n_fingers(self) -> int:
@@ -91,7 +95,9 @@ class Obstructed:
         ramp = self.ramp and self.ramp.take_lanes(index)
         reach = None if self.reach is None else take_lanes(self.reach, index)
         units = self.units.take_lanes(index)
-        return Obstructed(units, self.formulate, thickness, bodies, depth, motion, ramp, reach)
+        sticking = tuple(place.take_lanes(index) for place in self.sticking)
+        bare = Obstructed(units, self.formulate, thickness, bodies, depth, motion, ramp, reach)
+        return replace(bare, sticking=sticking)
 
     def of_finger(self, values: Array, finger: int) -> Array:
         """What belongs to a finger of coordinates (size, …)."""
@@ -118,7 +124,7 @@ class Obstructed:
     def gaps(self, first: Flags | None = None) -> WideMeasure:
         """Gaps to the bodies in full; at each place only one, if it is said which come first.
 
-        Behind them the motions that are prescribed.
+        Behind them what is prescribed: motions, and places that stick.
         """
         gaps: list[WideMeasure] = []
         for face, body in zip(self.faces, self.bodies, strict=True):
@@ -130,6 +136,14 @@ class Obstructed:
             return gaps[0]
         return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
 
+    def each(self, push: Array) -> Iterator[tuple[FaceGaps, Array]]:
+        """The gaps of each finger, and what belongs to them of pushes (cell, …)."""
+        n_before = 0
+        for face, body in zip(self.faces, self.bodies, strict=True):
+            gaps = FaceGaps(face, body, reach=self.reach)
+            yield gaps, push[n_before : n_before + gaps.n_cells]
+            n_before += gaps.n_cells
+
     @property
     def _n_motions(self) -> int:
         return 0 if self.motion is None else self.motion.n
@@ -139,9 +153,9 @@ class Obstructed:
         return OwnCoordinate(Row(1, self.n_own), self._n_motions)
 
     @property
-    def _prescribed(self) -> tuple[OwnCoordinate, ...]:
+    def _prescribed(self) -> tuple[OwnCoordinate | Sticking, ...]:
         is_told = self.motion is not None and self.motion.travel is not None
-        return (self._motions,) if is_told else ()
+        return (*((self._motions,) if is_told else ()), *self.sticking)
 
     @property
     def is_free(self) -> bool:
@@ -172,6 +186,19 @@ class Obstructed:
         )
         n_lanes = max(own.shape[1], travel.shape[1])
         return np.concatenate([np.broadcast_to(d, (len(d), n_lanes)) for d in (own, travel)])
+
+    @property
+    def _limits(self) -> Array | None:
+        """How much of its finger's pushes a place that sticks bears, (place, cell, 1 or lane)."""
+        if not self.sticking:
+            return None
+        n_lanes = max(place.friction.shape[1] for place in self.sticking)
+        limits, n_before = np.zeros((len(self.sticking), len(self.are_kept), n_lanes)), 0
+        for finger, (place, face) in enumerate(zip(self.sticking, self.faces, strict=True)):
+            n = FaceGaps(face, self.bodies[finger]).n_cells
+            limits[finger, n_before : n_before + n] = place.friction
+            n_before += n
+        return limits
 
     def bound(self, load: Array) -> Array:
         """b = (λ − 1) D, mm."""
@@ -248,7 +275,9 @@ class Obstructed:
         frame = self.bare(inverted, np.zeros(1)).coordinates
         gaps, multiplied = self.gaps(), Multiplied.of(active)
         system = Extended(frame, multiplied.n, self.large, self.stiffness)
-        law = ActiveConstraints(active, self.stiffness, self._deep, self.large[0], self.are_kept)
+        law = ActiveConstraints(
+            active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
+        )
         terms = (*self._terms_of(own), multiplier_term(system))
         domes = self._domes_of(own)
         followed = domes[0] if len(domes) == 1 else Together(domes, self.n_own)

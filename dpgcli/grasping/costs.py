@@ -9,6 +9,7 @@ from dpgcli.grasping.grasp import BLOCK, LANE
 STATE_SECONDS = {Way.PLACE: 6e-5, Way.CLOSE: 6e-5, Way.INSERT: 3e-4}
 RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
+PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
 JAW_SECONDS = 0.03  # of a state at all apertures; with a calibration's curve several times as much
 START_SECONDS, ROW_SECONDS = 1.0, 3e-5
 LIBRARY_BYTES = 2**26
@@ -26,6 +27,7 @@ class Work:
     is_moving: bool
     way: Way = Way.PLACE
     n_ramps: int = 0
+    has_friction: bool = False
 
     @property
     def seconds(self) -> float:
@@ -38,7 +40,8 @@ class Work:
         let_go = self.n_rows * MOVING_SECONDS * square if self.is_moving else 0.0
         one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
         placed = self.n_states * one * square
-        return START_SECONDS + placed + let_go + self.n_rows * ROW_SECONDS
+        pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
+        return START_SECONDS + placed + let_go + pulled + self.n_rows * ROW_SECONDS
 
     @property
     def peak_bytes(self) -> int:

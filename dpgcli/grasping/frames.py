@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.obstacle import Obstacle
@@ -24,6 +24,11 @@ class FingerFrame(NamedTuple):
     angle: float | Array
     offset: float | Array
     side: int
+
+    def take_lanes(self, index: Indices) -> "FingerFrame":
+        """The frames of some lanes; one for all stays."""
+        angle, offset = (np.take(v, index) if np.ndim(v) else v for v in self[:2])
+        return FingerFrame(angle, offset, self.side)
 
     def inside(self, point: Array) -> Array:
         """A point of the gripper's frame, (2, …), in the finger's."""
@@ -44,9 +49,8 @@ class FingerFrame(NamedTuple):
 
     def placed(self, point: Array) -> Array:
         """A point of the finger's frame, (2, …), in the gripper's."""
-        shift = np.zeros((2,) + (1,) * (point.ndim - 1))
-        shift[1] = self.side * self.offset
-        return self.outside(point) + shift
+        x, y = self.outside(point)
+        return np.stack((x, y + self.side * self.offset))
 
     def obstacle(self, body: Body) -> Obstacle:
         """What a body is to the finger."""

@@ -109,16 +109,26 @@ class Placed:
     @classmethod
     def joined(cls, parts: Sequence["Placed"]) -> "Placed":
         """Those of several batches as one, of the same fingers and body."""
-        lanes = [[*vars(part.grown.shapes).values(), part.grown.load] for part in parts]
-        *shapes, load = (np.concatenate(values, axis=-1) for values in zip(*lanes, strict=True))
+        shapes = ContactShapes.joined([part.grown.shapes for part in parts])
+        load = np.concatenate([part.grown.load for part in parts])
         sizes = [len(part.codes) for part in parts]
         resets = _resets_of([part.grown.resets for part in parts], sizes)
         return cls(
             np.concatenate([part.codes for part in parts]),
             replace(parts[0].own, depth=np.concatenate([part.own.depth for part in parts])),
-            Approach(ContactShapes(*shapes), load, resets),
+            Approach(shapes, load, resets),
             np.concatenate([part.status for part in parts]),
         )
+
+    def with_lanes(self, index: Indices, others: "Placed") -> "Placed":
+        """With the lanes at `index` replaced, but for what happened to them on the way."""
+        shapes = self.grown.shapes.take_lanes(np.arange(len(self.codes)))
+        shapes.put(index, others.grown.shapes)
+        status = self.status.copy()
+        depth = np.broadcast_to(self.own.depth, len(status)).copy()
+        status[index], depth[index] = others.status, others.own.depth
+        own, grown = replace(self.own, depth=depth), replace(self.grown, shapes=shapes)
+        return Placed(self.codes, own, grown, status)
 
 
 def blocks(n_lanes: int, n_units: int) -> Iterator[slice]:

@@ -54,6 +54,12 @@ def moved_by(held: Held, motions: Array) -> Array:
     return np.asarray(ways @ motions[: ways.shape[1]])
 
 
+def opened_by(body: Body, motions: Array) -> Array:
+    """How far jaws have opened, (lane,), mm; other bodies, and rigid ones, do not."""
+    gives_way = isinstance(body, Jaws) and body.stiffness is not None
+    return np.asarray(motions[-1] if gives_way else 0.0 * motions[-1])
+
+
 def let_go(
     parts: Sequence[Placed],
     lanes: Sequence[Indices],
@@ -62,12 +68,12 @@ def let_go(
     closing: Closing | None = None,
     *,
     with_margins: bool = True,
-) -> tuple[tuple[Grasped, ...], Array]:
+) -> tuple[tuple[Grasped, ...], Array, ContactShapes]:
     """Fingers at `lanes` of each part with a body between them that is let go of.
 
     On jaws that give way they close before that, if a closing is given. Also how far the bodies
-    have moved, (motion, lane), mm. The motion is one for all, or by lane. A body that is not fixed,
-    and that nothing touches, is not held.
+    have moved, (motion, lane), mm, and the shapes of all of a lane. The motion is one for all, or
+    by lane. A body that is not fixed, and that nothing touches, is not held.
     """
     n = len(lanes[0])
     chunks = []
@@ -75,8 +81,9 @@ def let_go(
         some = [index[at : at + LANES] for index in lanes]
         own = motion.take_lanes(np.arange(at, at + len(some[0])))
         chunks.append(_let_go(parts, some, own, held, closing, with_margins=with_margins))
-    fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, _ in chunks), strict=True))
-    return fingers, np.concatenate([moved for _, moved in chunks], axis=1)
+    fingers = tuple(Grasped.joined(own) for own in zip(*(f for f, *_ in chunks), strict=True))
+    moved = np.concatenate([by for _, by, _ in chunks], axis=1)
+    return fingers, moved, ContactShapes.joined([shapes for *_, shapes in chunks])
 
 
 def _let_go(
@@ -87,7 +94,7 @@ def _let_go(
     closing: Closing | None,
     *,
     with_margins: bool,
-) -> tuple[tuple[Grasped, ...], Array]:
+) -> tuple[tuple[Grasped, ...], Array, ContactShapes]:
     own, start = together(parts, lanes, motion if closing is None else _of_jaws(motion))
     gone = released(own, start)
     if closing is not None:
@@ -104,7 +111,7 @@ def _let_go(
     events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
     told = zip(fingers, events, strict=True)
     fingers = tuple(replace(finger, resets=(*before, *finger.resets)) for finger, before in told)
-    return fingers, gone.shapes.coordinates[own.n_own :]
+    return fingers, gone.shapes.coordinates[own.n_own :], gone.shapes
 
 
 def _events(resets: Sequence[Reset], index: Indices) -> Iterator[Reset]:
@@ -142,7 +149,7 @@ def _is_held(shapes: ContactShapes) -> NDArray[np.bool_]:
 
 
 def together(
-    parts: Sequence[Placed], lanes: Sequence[Indices], motion: Motion
+    parts: Sequence[Placed], lanes: Sequence[Indices], motion: Motion | None
 ) -> tuple[Obstructed, ContactShapes]:
     """The fingers of a lane as one, with a body that may move: those at `lanes` of each part."""
     few = [part.grown.shapes.take_lanes(index) for part, index in zip(parts, lanes, strict=True)]
@@ -153,7 +160,7 @@ def together(
     own = replace(alone[0], bodies=bodies, depth=depth, motion=motion)
     coordinates = np.stack([shapes.coordinates for shapes in few], axis=1).reshape(-1, n)
     shapes = ContactShapes(
-        np.concatenate((coordinates, np.zeros((motion.n, n)))),
+        np.concatenate((coordinates, np.zeros((0 if motion is None else motion.n, n)))),
         np.concatenate([shapes.push for shapes in few]),
         np.concatenate([shapes.active for shapes in few]),
         np.concatenate([shapes.inverted for shapes in few]),

@@ -1,5 +1,6 @@
 """Shapes of fingers against bodies, how bodies may move, and pressures that change."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,12 @@ class ContactShapes:
     active: Flags
     inverted: Flags
     is_there: Flags
+
+    @classmethod
+    def joined(cls, parts: Sequence["ContactShapes"]) -> "ContactShapes":
+        """Those of several batches as one."""
+        values = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(np.concatenate(own, axis=-1) for own in values))
 
     def put(self, index: Indices, others: "ContactShapes") -> None:
         """Replace the lanes at `index`."""

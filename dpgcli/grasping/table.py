@@ -1,7 +1,7 @@
 """Grasps as a table: a row for each state of a finger, or for each pair of states of a gripper."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -15,7 +15,8 @@ from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing, event_text
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, blocks, placed, told
-from dpgcli.grasping.release import let_go, motion_of, moved_by
+from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by
+from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
@@ -38,6 +39,16 @@ COLUMNS = (
     Column("finger_force_y_N", "N", "the same along y", outputs=FORCES),
     Column("squeeze_N", "N", "closing force between the two fingers", outputs=FORCES),
     Column("max_contact_N", "N", "largest force at one place", outputs=FORCES),
+    Column(
+        "payload_N", "N", "largest pull on the body along gravity that is borne", outputs=FORCES
+    ),
+    Column(
+        "fails_first",
+        "",
+        "what ends it: slip or reset; none: the weight is borne",
+        kind=Kind.TEXT,
+        outputs=FORCES,
+    ),
     Column("aperture_mm", "mm", "distance of the two faces at the tips", outputs=SHAPES),
     Column("overlaps", "", "whether the fingers overlap each other", kind=Kind.FLAG),
     Column("object_x_mm", "mm", "x of the body's reference point"),
@@ -50,6 +61,7 @@ COLUMNS = (
 )
 JAW_GAP = "jaw_gap_mm"
 OF_CLOSING = ("events", "tie")
+OF_FRICTION = ("payload_N", "fails_first")
 OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
 
 
@@ -58,7 +70,8 @@ class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
     `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
-    is, and by so much jaws have `opened`, (row,), mm. `closing` is how they closed, if they did.
+    is, and by so much jaws have `opened`, (row,), mm. `closing` is how they closed, if they did;
+    `borne` are columns of what friction bears, if there is any.
     """
 
     scene: Scene
@@ -69,6 +82,7 @@ class Grasps:
     centers: Array
     opened: Array | float = 0.0
     closing: Closing | None = None
+    borne: Columns = field(default_factory=dict)
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
@@ -107,14 +121,35 @@ def grasps(
         different = parts[:1] if is_alike else parts
         fingers = [told(part) for part in different] * (len(parts) // len(different))
         rows = np.array(lanes)
-        return Grasps(scene, body, seen_from, tuple(fingers), rows, centers, closing=closing)
-    found, moved = let_go(parts, lanes, motion, scene.held, later)
+        known = Grasps(scene, body, seen_from, tuple(fingers), rows, centers, closing=closing)
+        return _with_payload(known, parts, lanes, None)
+    found, moved, rest = let_go(parts, lanes, motion, scene.held, later)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
     away = _rounded(moved_by(scene.held, moved), scene.finger.straight_length)
     centers = np.where(is_there, centers + away, np.nan)
-    opened = np.where(is_there, moved[-1], np.nan)
-    return Grasps(scene, body, seen_from, found, rows, centers, opened, closing)
+    opened = np.where(is_there, opened_by(body, moved), np.nan)
+    known = Grasps(scene, body, seen_from, found, rows, centers, opened, closing)
+    return _with_payload(known, parts, lanes, rest)
+
+
+def _with_payload(
+    found: Grasps,
+    parts: Sequence[Placed],
+    lanes: Sequence[NDArray[np.int64]],
+    rest: ContactShapes | None,
+) -> Grasps:
+    """With what friction bears, if there is any."""
+    scene = found.scene
+    if scene.friction is None:
+        return found
+    from dpgcli.grasping.pull import Pulled, borne
+
+    of_fingers = zip(found.fingers, found.pairs, strict=True)
+    status = np.max([finger.status[own] for finger, own in of_fingers], axis=0)
+    pulled = Pulled(found.body, scene.held, found.frames, scene.friction, scene.gravity)
+    is_there = np.asarray(status == Status.STABLE)
+    return replace(found, borne=borne(pulled, parts, lanes, rest, is_there, found.closing))
 
 
 def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
@@ -124,6 +159,8 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
         left_out.add(JAW_GAP)
     if closing is None:
         left_out.update(OF_CLOSING)
+    if scene.friction is None:
+        left_out |= {*OF_FRICTION}
     return tuple(column for column in COLUMNS if column.name not in left_out)
 
 
@@ -133,9 +170,13 @@ def grasp_rows(found: Grasps) -> Columns:
     n_rows = found.pairs.shape[1]
     parts = []
     for some in blocks(n_rows, found.scene.finger.n_units):
+        opened = np.broadcast_to(found.opened, n_rows)[some]
         few = replace(found, pairs=found.pairs[:, some], centers=found.centers[:, some])
+        few = replace(few, opened=opened)
         parts.append(_rows(few, happened))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    rows |= found.borne
+    return {column.name: rows[column.name] for column in columns_of(found.scene, found.closing)}
 
 
 def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
@@ -183,7 +224,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
         rows[JAW_GAP] = found.body.gap + found.opened + np.zeros(len(status))
     if found.scene.gripper is not None:
         rows.update(_between(found, is_there))
-    return {column.name: rows[column.name] for column in columns_of(found.scene, found.closing)}
+    return rows
 
 
 def _rounded(values: Array, scale: Array | float) -> Array:

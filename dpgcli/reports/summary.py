@@ -32,6 +32,7 @@ METRICS = {  # whether the largest value is the best one, or else the one neares
     "aperture_min_mm": False,
     "n_grasps": True,
     "squeeze_max_N": True,
+    "payload_max_N": True,
     "n_reachable": True,
     "snap_pressure_max_MPa": False,
     "reset_pressure_min_MPa": False,

@@ -86,8 +86,12 @@ def _with_body(
     from dpgcli.sweeps.grasps import Encounter, grasp_rows
 
     layer, gripper = np.asarray(around.layer_thickness), around.gripper
-    body = scene.body.take_lanes(lanes)
-    return grasp_rows(Encounter(_designs(units, lanes), layer, gripper, body, scene.held), codes)
+    body, friction = (
+        scene.body.take_lanes(lanes),
+        scene.friction and scene.friction.take_lanes(lanes),
+    )
+    met = _designs(units, lanes), layer, gripper, body, scene.held
+    return grasp_rows(Encounter(*met, friction, scene.gravity), codes)
 
 
 def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:

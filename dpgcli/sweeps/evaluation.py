@@ -76,7 +76,8 @@ class DesignEvaluation:
             return ()
         from dpgcli.sweeps.grasps import grasp_columns
 
-        return grasp_columns(is_pair=bool(self.base.gripper))
+        has_friction = self.base.friction is not None
+        return grasp_columns(is_pair=bool(self.base.gripper), has_friction=has_friction)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

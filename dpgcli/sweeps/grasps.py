@@ -1,19 +1,21 @@
 """What the fingers of many designs do with a body in their way: columns of their states."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Indices
-from dpgcli.design.bodies import Body
+from dpgcli.design.bodies import Body, Friction
+from dpgcli.design.loads import DOWN
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
 from dpgcli.grasping.release import let_go, motion_of, moved_by
-from dpgcli.grasping.table import COLUMNS, OF_PAIRS
+from dpgcli.grasping.table import COLUMNS, OF_FRICTION, OF_PAIRS
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
@@ -26,14 +28,15 @@ NAMES = (
 )
 
 
-def grasp_columns(*, is_pair: bool) -> tuple[Column, ...]:
+def grasp_columns(*, is_pair: bool, has_friction: bool = False) -> tuple[Column, ...]:
     """The columns of states about a body: those of `dpg grasp`, and what became of the grasp.
 
     >>> [column.name for column in grasp_columns(is_pair=False)][:3]
     ['grasp_status', 'pattern_after', 'n_contacts']
     """
     known = {column.name: column for column in COLUMNS}
-    told = [known[name] for name in NAMES if is_pair or name not in OF_PAIRS]
+    names = (*NAMES, *(OF_FRICTION if has_friction else ()))
+    told = [known[name] for name in names if is_pair or name not in OF_PAIRS]
     return (
         Column("grasp_status", "", "status with the body there", Group.GRASP, Kind.STATUS),
         *(
@@ -46,7 +49,8 @@ def grasp_columns(*, is_pair: bool) -> tuple[Column, ...]:
 class Encounter(NamedTuple):
     """Units, layers (mm), grippers if any, and bodies that meet, each by lane; how bodies are held.
 
-    A lane is a state of a design.
+    Friction, if there is any, is by lane as well, the direction of gravity is one for all. A lane
+    is a state of a design.
     """
 
     units: UnitSolutions
@@ -54,25 +58,39 @@ class Encounter(NamedTuple):
     gripper: Gripper | None
     body: Body
     held: Held
+    friction: Friction | None = None
+    gravity: tuple[float, float] = DOWN
 
 
 def grasp_rows(own: Encounter, codes: Codes) -> Columns:
     """The columns of states (lane,): both fingers of a gripper are in the same one."""
     seen_from = frames(own.gripper)
     parts = [_met(own, frame, codes) for frame in seen_from[:1]]
-    motion = motion_of(own.body, own.held, seen_from)
+    motion, rest = motion_of(own.body, own.held, seen_from), None
+    every = np.arange(len(codes))
     if motion is None:
         fingers = [_told(parts[0])]
-        fingers += [_lower(own, frame, codes, fingers[0]) for frame in seen_from[1:]]
+        for frame in seen_from[1:]:
+            part, lower = _lower(own, frame, codes, parts[0], fingers[0])
+            parts.append(part)
+            fingers.append(lower)
         moved = np.zeros((2, len(codes)))
     else:
         parts += [_met(own, frame, codes) for frame in seen_from[1:]]
-        every = np.arange(len(codes))
-        found, by = let_go(parts, [every] * len(parts), motion, own.held, with_margins=False)
+        index = [every] * len(parts)
+        found, by, rest = let_go(parts, index, motion, own.held, with_margins=False)
         fingers = [_Finger.of(finger) for finger in found]
         is_held = fingers[0].status == Status.STABLE
         moved = np.where(is_held, moved_by(own.held, by) + 0.0, np.nan)
-    return _rows(own, seen_from, fingers, moved)
+    rows = _rows(own, seen_from, fingers, moved)
+    if own.friction is None:
+        return rows
+    from dpgcli.grasping.pull import Pulled, borne
+
+    pulled = Pulled(own.body, own.held, seen_from, own.friction, own.gravity)
+    is_there = np.asarray(rows["grasp_status"] == Status.STABLE)
+    found_ = borne(pulled, parts, [every] * len(parts), rest, is_there)
+    return {**rows, **found_, "fails_first": found_["fails_first"].astype("S")}
 
 
 class _Finger(NamedTuple):
@@ -117,17 +135,20 @@ def _told(part: Placed) -> _Finger:
     return _Finger.of(told)
 
 
-def _lower(own: Encounter, frame: FingerFrame, codes: Codes, upper: _Finger) -> _Finger:
+def _lower(
+    own: Encounter, frame: FingerFrame, codes: Codes, part: Placed, upper: _Finger
+) -> tuple[Placed, _Finger]:
     """The lower finger: the upper one's mirror image where the body is on the axis."""
+    body = frame.obstacle(own.body)
+    part = replace(part, own=replace(part.own, bodies=(body,)))
     off = np.flatnonzero(~own.body.is_mirrored)
     if not len(off):
-        return upper
-    angle, offset = (np.broadcast_to(part, len(codes))[off] for part in frame[:2])
+        return part, upper
     few = own._replace(
         units=own.units.take_lanes(off), layer=own.layer[off], body=own.body.take_lanes(off)
     )
-    part = _met(few, FingerFrame(angle, offset, frame.side), codes[off])
-    return upper.with_lanes(off, _told(part))
+    other = _met(few, frame.take_lanes(off), codes[off])
+    return part.with_lanes(off, other), upper.with_lanes(off, _told(other))
 
 
 def _rows(

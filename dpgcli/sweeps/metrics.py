@@ -326,6 +326,14 @@ METRICS = (
         Output.FORCES,
         group=Group.GRASP,
     ),
+    _most(
+        "payload_max_N",
+        "N",
+        "largest pull on the body along gravity that any state bears",
+        "payload_N",
+        Output.FORCES,
+        group=Group.GRASP,
+    ),
     _most("max_residual_N", "N", "largest unbalanced force of any state", "residual_N"),
     _most(
         "max_numerical_error_mm", "mm", "largest numerical error of any tip", "numerical_error_mm"

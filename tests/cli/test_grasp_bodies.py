@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
@@ -55,6 +56,21 @@ def test_polygons_go_either_way_round(call: Any, folder: Path, gripper: str, ord
     assert row["squeeze_N"] == pytest.approx(expected["squeeze_N"], rel=1e-9)
 
 
+def test_payloads_in_every_format(call: Any, folder: Path, gripper: str) -> None:
+    said = "  disc: {diameter_mm: 40}\n  at_mm: [45, 0]\n  friction: 1.0\n  mass_g: 20"
+    spec, chosen = with_object(folder, gripper, said), ("--pattern", "1110?")
+    rows = rows_of(call, spec, *chosen)
+    assert [row["fails_first"] for row in rows] == ["none", "slip"]
+    assert rows[0]["payload_N"] > 0.196 > rows[1]["payload_N"] > 0.0
+    result = call("grasp", spec, *chosen, *RIGID, "-o", "g.parquet")
+    assert result.exit_code == ExitCode.DONE and "fails_first" in result.stdout
+    assert "payload: pull along -x, where gravity acts to" in result.stderr
+    assert "warning: 1 state not bearing the weight of 0.1961 N" in result.stderr
+    written = pq.read_table(folder / "g.parquet")
+    assert written.to_pylist()[0]["payload_N"] == rows[0]["payload_N"]
+    assert b"published" in written.schema.field("payload_N").metadata[b"basis"]
+
+
 def test_figures_have_plates(call: Any, folder: Path, gripper: str) -> None:
     for body, name in (("jaws:30", "j.svg"), (str(CONFIGS / "objects/wedge.yaml"), "w.svg")):
         arguments = ("--object", body, "--at", "40,0", "--pattern", "10000", "--plot", name, "-q")
@@ -100,7 +116,8 @@ def test_refusals(call: Any, gripper: str, arguments: tuple[str, ...], said: str
         ("polygon: [[0, 0], [9], [9, 0]]", "polygon: expected three to 64 corners in mm"),
         ("jaws: {gap_mm: 0, height_mm: 4}", "jaws.gap_mm: expected a length > 0 in mm, found 0"),
         ("jaws: {gap_mm: 3}", "jaws.height_mm: expected a length > 0 in mm, found nothing"),
-        ("disc: {diameter_mm: 9}\nmass_g: 300", "mass_g: expected a known key"),
+        ("disc: {diameter_mm: 9}\nmass_g: 300", "mass_g: expected friction beside it"),
+        ("disc: {diameter_mm: 9}\nfriction: -1", "friction: expected a coefficient >= 0"),
     ],
 )
 def test_wrong_files(call: Any, folder: Path, gripper: str, keys: str, said: str) -> None:

@@ -302,6 +302,27 @@ def test_margins_of_places_that_are_shared() -> None:
     assert margins([0, 1, 2, 2]) == [0.25, 0.25, 0.15, np.inf]
 
 
+def test_margins_of_what_is_kept_up_to_a_limit() -> None:
+    """|y| of the last two, which are kept, is at most a share of the first two, if these act."""
+    are_kept = np.array([[False], [False], [True], [True]])
+    active = np.array([[True, True], [True, False], [True, True], [True, False]])
+    limits = np.zeros((2, 4, 2))
+    limits[0, 0], limits[1, :2] = (0.5, 0.2), 0.4
+    law = ActiveConstraints(active, np.ones((1, 1)), np.zeros(1), np.array([2.0]), are_kept, limits)
+    value = -np.array([[0.6, 0.6], [0.4, 0.4], [-0.5, 0.5], [0.1, 0.1]])  # −y
+    measured = WideMeasured(
+        value, np.zeros((1, 4, 2)), lambda f: f, np.arange(8).reshape(4, 2) // 2
+    )
+    found = law.margin(measured, np.ones(2))
+    assert found[2] == pytest.approx([0.5 * (0.3 - 0.5), 0.5 * (0.12 - 0.5)])
+    assert found[3].tolist() == [pytest.approx(0.5 * (0.4 - 0.1)), np.inf]
+    alone = law.take_lanes(np.array([1]))
+    few = WideMeasured(value[:, 1:], np.zeros((1, 4, 1)), lambda f: f, np.arange(4)[:, None])
+    assert alone.margin(few, np.ones(1))[2:, 0].tolist() == found[2:, 1].tolist()
+    without = replace(law, limits=None).margin(measured, np.ones(2))
+    assert np.isinf(without[2:]).all()
+
+
 def test_lanes_taken(dense: Callable[[Array], Array]) -> None:
     sigma, large = np.array([[7.0, 3.0, 5.0]]), np.ones((1, 3))
     gaps, active = quadrics(5, 4, 2), np.array([[True, False, True], [False, True, True]])

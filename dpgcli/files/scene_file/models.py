@@ -171,6 +171,7 @@ class Spec(Section):
             loads=None if self.loads is None else self.loads.known,
             body=None if self.object is None or self.object.issues else self.object.known,
             held=Held.FIXED if self.object is None else Held(self.object.held),
+            friction=None if self.object is None else self.object.known_friction,
         )
 
 

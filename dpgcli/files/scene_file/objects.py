@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from dpgcli.design.bodies import PLACES, Body, Disc, Jaws, Polygon
+from dpgcli.design.bodies import FRICTION, MASS, PLACES, Body, Disc, Friction, Jaws, Polygon
 from dpgcli.design.problems import Issue
 from dpgcli.files.calibration.models import Bounded
-from dpgcli.files.sections import Positive, Section
+from dpgcli.files.sections import NotNegative, Positive, Section
 from dpgcli.text import KeyPath
 
 PLACE, POLYGON = "at_mm", "polygon"
@@ -21,10 +21,13 @@ EXPECTED = {
     **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
     "stiffness_N_per_mm": "a stiffness > 0 in N/mm",
+    FRICTION: "a coefficient >= 0, such as 0.5",
+    MASS: "a mass > 0 in g",
     POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
-LATER = ("friction", "mass_g")  # keys of objects that nothing is made of yet
-NOT_YET = "not there yet: leave it out"
+NO_FRICTION = Issue(
+    (MASS,), "friction beside it, which bears the weight", "none", "give one such as friction: 0.5"
+)
 
 Corner = list[float]
 Side = tuple[Corner, Corner]
@@ -86,6 +89,19 @@ class ObjectSpec(Section):
     compliance: ComplianceSpec | None = Field(
         default=None, description="Jaws only: what keeps them apart; without it they are rigid."
     )
+    friction: NotNegative | None = Field(
+        default=None,
+        description="Coefficient of friction between fingers and body, for its payload alone: "
+        "contact forces are without.",
+    )
+    mass_g: Positive | None = Field(
+        default=None, description="Its mass in g, the weight of which is held against the payload."
+    )
+
+    @property
+    def known_friction(self) -> Friction | None:
+        """The friction and the mass that it stands for, if there are any."""
+        return None if self.friction is None else Friction(self.friction, self.mass_g)
 
     @property
     def known(self) -> Body:
@@ -110,6 +126,8 @@ class ObjectSpec(Section):
             return [Issue((), "one of disc, jaws and polygon", found)]
         if self.compliance is not None and self.jaws is None:
             return [Issue(("compliance",), "jaws, which only give way", said[0])]
+        if self.mass_g is not None and self.friction is None:
+            return [NO_FRICTION]
         return list(_wrong_sides(self.polygon or []))
 
 

@@ -248,8 +248,6 @@ def unknown_key(path: KeyPath) -> tuple[str, str, str] | None:
 def _unknown(path: KeyPath) -> tuple[str, str, str]:
     """Expected, found and hint for a key that is not known where it stands."""
     key, parent = str(path[-1]), _pattern(path[:-1])
-    if parent == OBJECT and key in objects.LATER:
-        return "a known key", dotted((key,)), objects.NOT_YET
     known = list(SECTIONS[parent].model_fields)
     if "overrides" in parent and key in SHARED:
         why = "segment height is shared by neighboring units: set it for the whole finger"

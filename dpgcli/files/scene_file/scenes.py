@@ -28,7 +28,8 @@ def scene_of(spec: Spec) -> Scene:
     scene = resolution.scene()
     if spec.object is None:
         return scene
-    return replace(scene, body=spec.object.known, held=Held(spec.object.held))
+    held, friction = Held(spec.object.held), spec.object.known_friction
+    return replace(scene, body=spec.object.known, held=held, friction=friction)
 
 
 def body_issues(spec: ObjectSpec | None) -> list[Issue]:

@@ -27,7 +27,7 @@ from dpgcli.files.sweep_file.models import (
     SampleRange,
     SweepSpec,
 )
-from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader
+from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader, sections_in
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
@@ -92,7 +92,8 @@ def sweep_in(
     elif isinstance(document.data.get("base"), str):
         base, base_spec = _base(base_path, settings, problems)
         base_files = (base_path,)
-    reader = SpaceReader(document, folder, OPTIONAL if base is None else base.data)
+    sections = OPTIONAL if base is None else sections_in(base.data)
+    reader = SpaceReader(document, folder, sections)
     axes = [reader.axis(place, axis) for place, axis in _axes(document)]
     known = None if base is None or spec is None else base.data
     rules = [reader.constraint(place, text, known) for place, text in _constraints(document)]

@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
-OPTIONAL = ("gripper", "loads", "object", "pressure")  # sections that a base may leave out
+OF_FRICTION = ("object.friction", "object.mass_g")
+OPTIONAL = ("gripper", "loads", "object", "pressure", *OF_FRICTION)  # what a base may leave out
 ASIDE = ("uncertainty", "model_error")  # sections that a sweep leaves aside
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs, or a folder of such"
@@ -46,7 +47,7 @@ TABLE = "a CSV or Parquet file of designs, or a folder of such"
 class SpaceReader:
     """Makes axes from what a file says; what is wrong gathers in `problems`.
 
-    `sections` are those of the base that it may leave out, and has.
+    `sections` are those of the base that it may leave out, and has, and keys that are like them.
     """
 
     document: Document
@@ -219,8 +220,8 @@ class SpaceReader:
             if unknown := unknown_key(tuple(key.split("."))):
                 expected, found, hint = unknown
                 self.wrong(path, expected, found, INDEX if key.startswith("Unnamed: ") else hint)
-            elif (section := key.split(".")[0]) in OPTIONAL and section not in self.sections:
-                hint = f"the base has no {section}"
+            elif missing := [s for s in _sections(key) if s in OPTIONAL and s not in self.sections]:
+                hint = f"the base has no {missing[0]}"
                 self.wrong(path, "keys of a base that has them", key, hint)
             if key in self.keys:
                 self.wrong(path, "each key on one axis", f"{key} again")
@@ -247,6 +248,18 @@ class SpaceReader:
             expected = "numeric keys, by their last part or, if two share that, in full"
             self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
+
+
+def _sections(key: str) -> tuple[str, str]:
+    """What a key needs in a base, if that may be left out there: its section, perhaps itself."""
+    return key.split(".")[0], key
+
+
+def sections_in(data: dict[str, Any]) -> set[str]:
+    """The sections in the data of a base, and its keys of friction."""
+    body = data.get("object")
+    own = {f"object.{key}" for key in body} if isinstance(body, dict) else set()
+    return {*data, *own}
 
 
 def _size(said: AxisSpec) -> tuple[int, int]:
