@@ -82,10 +82,12 @@ def test_what_does_not_vary_is_no_axis(changes: dict[str, Any], axes: tuple[str,
 
 
 def test_of_too_many_designs_some_are_there_and_the_page_says_so() -> None:
-    many = space(1_000_000)
+    area = np.ones(1_000_000)
+    area[123_456:123_458] = 2.0, 0.5
+    many = space(1_000_000, workspace_area_mm2=area)
     rows = shown_rows(many)
     assert 9_990 < len(rows) <= 10_000
-    assert {0, 999_999} <= {*rows.tolist()}  # the best and the worst
+    assert {0, 123_456, 123_457, 999_999} <= {*rows.tolist()}  # the best and the worst, too
     steps = np.diff(rows)
     assert (steps.min() > 0, steps.max() <= 102) == (True, True)
     shown = said(many)["shown"]
