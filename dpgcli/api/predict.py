@@ -33,6 +33,8 @@ from dpgcli.text import quoted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from dpgcli.reports.outlines import DrawnState
+
 MOST_DRAWN = 64  # shapes that one can tell apart
 
 
@@ -180,10 +182,16 @@ def draw(scene: Scene, patterns: tuple[str, ...], path: Path, *, overlay: bool =
 
 def sketch(scene: Scene, patterns: tuple[str, ...], width: int) -> str:
     """The states with these patterns as braille."""
-    from dpgcli.reports.outlines import drawn_states
     from dpgcli.reports.sketch import sketches
 
-    return sketches(drawn_states(_with_nodes(scene, patterns)), width)
+    return sketches(drawn(scene, patterns), width)
+
+
+def drawn(scene: Scene, patterns: tuple[str, ...]) -> "list[DrawnState]":
+    """What the states with these patterns look like."""
+    from dpgcli.reports.outlines import drawn_states
+
+    return drawn_states(_with_nodes(scene, patterns))
 
 
 def _with_nodes(scene: Scene, patterns: tuple[str, ...]) -> Prediction:

@@ -16,7 +16,7 @@ from dpgcli.studies.sweep import DESIGNS, REPORT
 from dpgcli.sweeps.gate import check_beyond_doubt
 from dpgcli.text import quoted
 
-PAGES = {".md": markdown, ".html": html}
+PAGES = (".md", ".html")
 AT_END = "<!-- written by dpg -->"
 
 Say = Callable[[str], None]
@@ -29,9 +29,10 @@ def silent(_: str) -> None:
 def report(folder: str | Path, *, format: str = "md", strict: bool = False) -> str:
     """Summarize the design space in a sweep's folder: what is best, what failed and why.
 
-    A page of Markdown ("md"), or of HTML that needs no other file ("html"). It says what each
-    output rests on. Raises UsageError for another format, or where the folder has no table of
-    designs; where it is `strict`, also if a ranking is by what no design should be judged by.
+    A page of Markdown ("md"), or of HTML to explore the designs in, which needs no other file
+    ("html"). It says what each output rests on. Raises UsageError for another format, or where the
+    folder has no table of designs; where it is `strict`, also if a ranking is by what no design
+    should be judged by.
 
     >>> report("nowhere")
     Traceback (most recent call last):
@@ -46,11 +47,20 @@ def report(folder: str | Path, *, format: str = "md", strict: bool = False) -> s
 
 def page(folder: Path, kind: str, *, strict: bool = False) -> tuple[DesignSpace, str]:
     """The design space in a folder, and its page: the same for the same table."""
-    table = read_designs(folder / DESIGNS)
-    space = DesignSpace(table.columns, table.units, read_metadata(folder / DESIGNS), table.trusts)
+    space = space_in(folder)
     if strict:
         _check_ranking(space)
-    return space, PAGES[kind](space)
+    if kind == ".md":
+        return space, markdown(space)
+    from dpgcli.api.explorer import explored
+
+    return space, html(space, explored(folder, space))
+
+
+def space_in(folder: Path) -> DesignSpace:
+    """The design space in a folder."""
+    table = read_designs(folder / DESIGNS)
+    return DesignSpace(table.columns, table.units, read_metadata(folder / DESIGNS), table.trusts)
 
 
 def _check_ranking(space: DesignSpace) -> None:

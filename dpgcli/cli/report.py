@@ -15,7 +15,10 @@ def report(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="File, .md or .html  [default: standard output]"
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File: .md, or .html to explore designs in  [default: standard output]",
         ),
     ] = None,
     strict: Strict = False,

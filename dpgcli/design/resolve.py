@@ -128,7 +128,7 @@ class Resolution:
             None if layer is None else np.asarray(layer).item(),
             self._uncertainty(),
             self.model_error,
-            self._chambers(),
+            self.chambers(np.zeros(1, np.int64)),
             self.trusts,
             self.warnings,
             batch.pressure,
@@ -207,13 +207,14 @@ class Resolution:
         kind += 8 * self._are_loaded(designs)
         return [part for part in (designs[kind == k ^ 1] for k in range(16)) if len(part)]
 
-    def _chambers(self) -> Chambers:
-        """Sizes of the chambers of the first design."""
+    def chambers(self, designs: Indices) -> Chambers:
+        """Sizes of the chambers of some designs."""
         groups = [group for group in groups_of(self.design) if group.units]
         keys = ("unit_separation_mm", "chamber_width_mm", "dome_height_mm")
         unknown = np.full(1, np.nan)
         pairs = ([(group, group.geometry.get(key, unknown)) for group in groups] for key in keys)
-        return Chambers(*(_by_unit(self.design.units, sizes)[:, 0] for sizes in pairs))
+        by_unit = (_by_unit(self.design.units, sizes) for sizes in pairs)
+        return Chambers(*(_picked(sizes, designs) for sizes in by_unit))
 
     def _gripper(self, designs: Indices) -> Gripper | None:
         given = self.design.gripper

@@ -140,8 +140,8 @@ class Held(StrEnum):
 class Chambers:
     """Sizes (mm) of a finger's chambers that its lattice does not have, NaN where none is known.
 
-    Each is (unit,), or (1,) for all: the gap to the next chamber, the inner width, the height of
-    the dome. They are for pictures.
+    Each is (1 or unit, design): the gap to the next chamber, the inner width, the height of the
+    dome. They are for pictures.
     """
 
     gap: Array

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dpgcli.reports.drawing import own_figure, svg_text, titled
-from dpgcli.reports.summary import METRICS, STIFFEST, DesignSpace, bars_alone, is_alike
+from dpgcli.reports.summary import METRICS, DesignSpace, varies
 
 COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
@@ -22,8 +22,8 @@ NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
 def figures(space: DesignSpace) -> str:
     """Every metric that varies over the first two swept values, as one inline SVG."""
     every_one = (*COUNTED, *METRICS)
-    metrics = [name for name in every_one if name in space.designs and _varies(space, name)]
-    if not metrics or not space.swept:
+    metrics = [name for name in every_one if name in space.designs and varies(space, name)]
+    if not metrics or not space.varied:
         return "<p>No metric varies.</p>"
     designs = pd.DataFrame(space.designs)
     every = 1 if _is_grid(space, designs) else len(designs) // MOST_POINTS + 1
@@ -31,7 +31,8 @@ def figures(space: DesignSpace) -> str:
         svg = _maps(space, designs[::every], metrics)
     except ImportError:
         return f"<p>{escape(NO_MATPLOTLIB)}</p>"
-    return f"<p>{escape(_caption(space, every))}</p>\n<figure>\n{svg}</figure>"
+    caption = escape(_caption(space, every))
+    return f'<p>{caption}</p>\n<figure class="maps">\n{svg}</figure>'
 
 
 def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> str:
@@ -39,34 +40,27 @@ def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> 
     n_rows = (len(metrics) + 1) // 2
     with own_figure(10.0, 3.6 * n_rows) as figure:
         for place, metric in enumerate(metrics, start=1):
-            axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.swept[0])))
+            axes = figure.add_subplot(n_rows, 2, place, xlabel=titled(space.label(space.varied[0])))
             axes.set_title(titled(_title(space, metric)))
             _draw(axes, space, designs, metric)
-        over = " and ".join(map(space.label, space.swept[:2]))
+        over = " and ".join(map(space.label, space.varied[:2]))
         what = ", ".join(map(space.label, metrics))
         text = svg_text(figure, what, f"{what} over {over}", NO_METADATA)
     return text[text.index("<svg") :]
 
 
-def _varies(space: DesignSpace, metric: str) -> bool:
-    known = space.known(metric, space.usable)
-    if metric == STIFFEST:
-        known = known[~bars_alone(space, known)]
-    return len(known) > 0 and not is_alike(space.designs[metric][known])
-
-
 def _title(space: DesignSpace, metric: str) -> str:
     """What a map shows of designs that share a place; nothing where none do."""
-    if not (hidden := space.swept[2:]):
+    if not (hidden := space.varied[2:]):
         return ""
     which = "largest" if METRICS.get(metric, True) else "nearest zero"
     return f"{space.label(metric)}, {which} over {', '.join(map(space.label, hidden))}"
 
 
 def _caption(space: DesignSpace, every: int) -> str:
-    is_line = len(space.swept) == 1
+    is_line = len(space.varied) == 1
     text = "Designs without a state are left out." if is_line else "Gray: designs without a state."
-    if hidden := space.swept[2:]:
+    if hidden := space.varied[2:]:
         rows = np.arange(len(space))
         named = ", ".join(f"{space.label(name)} {space.span(name, rows)}" for name in hidden)
         text += f" A place stands for all designs there, of every {named}: each map shows the best"
@@ -76,11 +70,11 @@ def _caption(space: DesignSpace, every: int) -> str:
 
 def _draw(axes: Any, space: DesignSpace, designs: pd.DataFrame, metric: str) -> None:
     """A line over one swept value; over two a map if they form a grid, else points."""
-    designs = _ranked(designs, dict(zip(space.swept, (axes.xaxis, axes.yaxis), strict=False)))
+    designs = _ranked(designs, dict(zip(space.varied, (axes.xaxis, axes.yaxis), strict=False)))
     usable = designs[designs["n_stable"] > 0]
     merit = usable[metric] if METRICS.get(metric, True) else -usable[metric].abs()
     usable = usable.loc[merit.sort_values(kind="stable").index]  # the best is drawn last
-    first, *others = space.swept
+    first, *others = space.varied
     if not others:
         line = usable.sort_values(first, kind="stable")
         axes.plot(line[first], line[metric], "o-", color="#31688e", ms=3, lw=1)
@@ -120,6 +114,6 @@ def _ranked(designs: pd.DataFrame, axes: dict[str, Any]) -> pd.DataFrame:
 
 def _is_grid(space: DesignSpace, designs: pd.DataFrame) -> bool:
     """Whether the first two swept values come in all combinations."""
-    places = designs[space.swept[:2]]
+    places = designs[space.varied[:2]]
     sizes = places.nunique()
     return len(sizes) == 2 and sizes.min() > 1 and len(places.drop_duplicates()) == sizes.prod()

@@ -9,7 +9,7 @@ proportions.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,25 +57,43 @@ class Profile:
         >>> profile.gap.round(9).tolist(), profile.dome.round(9).tolist(), profile.layer
         ([3.0, 3.0, 3.0], [6.5, 6.5, 6.5], 1.5)
         """
-        finger = scene.finger
-        length, stroke = (
-            np.broadcast_to(values, (finger.n_units, 1))[:, 0]
-            for values in (finger.segment_length, finger.stroke)
-        )
-        axis = float(finger.segment_height[0, 0])
-        layer = LAYER * axis if scene.layer_thickness is None else float(scene.layer_thickness)
-        layer = min(layer, axis)  # a thicker one would hide the chambers
-        known = scene.chambers or Chambers(*np.full((3, 1), np.nan))
-        gap = _known(known.gap, GAP * length)
-        dome = _known(known.dome_height, gap + stroke)
-        width = _known(known.width, np.full(finger.n_units, 2.0 * axis - layer))
-        height = 0.5 * layer + width * dome / dome.min()
-        return cls(length, gap, dome, np.append(height, height[-1]), axis, layer)
+        *by_unit, axis, layer = (values[..., 0] for values in sizes(scene))
+        length, gap, dome, height = by_unit
+        return cls(length, gap, dome, np.append(height, height[-1]), float(axis), float(layer))
 
     def reach(self) -> tuple[Array, Array]:
         """How far each chamber reaches from its station towards the base and towards the tip."""
         half = 0.5 * np.maximum(self.length - self.gap, GAP * self.length)
         return np.append(half[:1], half), np.append(half, half[-1:])
+
+
+class Sizes(NamedTuple):
+    """What a profile has, of many designs: by (unit, design), and of each design (design,)."""
+
+    length: Array
+    gap: Array
+    dome: Array
+    height: Array
+    axis: Array
+    layer: Array
+
+
+def sizes(scene: Scene) -> Sizes:
+    """The sizes of a batch's designs, all chambers but the last one."""
+    finger = scene.finger
+    shape = (finger.n_units, finger.n_designs)
+    length, stroke, axis = (
+        np.broadcast_to(values, shape)
+        for values in (finger.segment_length, finger.stroke, finger.segment_height[:1])
+    )
+    thickness = LAYER * axis[0] if scene.layer_thickness is None else scene.layer_thickness
+    layer = np.minimum(thickness, axis[0])  # a thicker one would hide the chambers
+    known = scene.chambers or Chambers(*np.full((3, 1, 1), np.nan))
+    gap = _known(known.gap, GAP * length)
+    dome = _known(known.dome_height, gap + stroke)
+    width = _known(known.width, 2.0 * axis - layer)
+    height = 0.5 * layer + width * dome / dome.min(axis=0)
+    return Sizes(length, gap, dome, height, axis[0], layer)
 
 
 def notes(scene: Scene) -> list[str]:

@@ -1,8 +1,11 @@
 """A design space on one page, as Markdown or as HTML that needs no other file."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
+from dpgcli.reports.explorer import explorer, policy, style
+from dpgcli.reports.explorer.content import Explored, shown_rows
+from dpgcli.reports.explorer.drawings import best_designs
 from dpgcli.reports.summary import (
     MOST_ROWS,
     DesignSpace,
@@ -21,17 +24,6 @@ TAGS = {  # a table that is too wide is scrolled alone; a head is told to be one
     "</table>": "</table></div>",
     "<th>": '<th scope="col">',
 }
-STYLE = """
-:root { color-scheme: light dark; --text: #1a1a1a; --page: #fff; --line: #ccc; }
-@media (prefers-color-scheme: dark) { :root { --text: #e6e6e6; --page: #16181c; --line: #444; } }
-body { font: 16px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page);
-  max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }
-div { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.9rem; }
-th, td { text-align: left; padding: 0.25rem 0.75rem; border-bottom: 1px solid var(--line); }
-figure { margin: 1rem 0; padding: 0.5rem; background: #fff; }
-svg { max-width: 100%; height: auto; }
-"""
 
 
 def markdown(space: DesignSpace) -> str:
@@ -39,20 +31,32 @@ def markdown(space: DesignSpace) -> str:
     return _markdown(sections(space))
 
 
-def html(space: DesignSpace) -> str:
-    """The same as a page of HTML that needs no other file, with figures if Matplotlib is there.
+def html(space: DesignSpace, explored: Explored | None = None) -> str:
+    """A page of HTML that needs no other file, with figures if Matplotlib is there.
 
-    The best designs come first, then the figures.
+    The best designs come first and the explorer, where there is anything to explore, then the same
+    as in Markdown, and the figures.
     """
     from dpgcli.reports.maps import figures
 
-    parts = _html(_markdown(sections(space))).split("<h2>", 2)
-    body = "<h2>".join((*parts[:2], f"Figures</h2>\n{figures(space)}\n", *parts[2:]))
+    head, *tables = _html(_markdown(sections(space))).split("<h2>")
+    drawn = f"Figures</h2>\n{figures(space)}\n"
+    body = "<h2>".join((head, *_explorer(space, explored), *tables[:1], drawn, *tables[1:]))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy()}">\n'
         '<meta name="viewport" content="width=device-width">\n<title>Design space</title>\n'
-        f"<style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+        f"<style>{style()}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
+
+
+def _explorer(space: DesignSpace, explored: Explored | None) -> Iterator[str]:
+    if not len(space):
+        return
+    shown = explored or Explored(shown_rows(space))
+    if best := best_designs(space, shown.best, shown.rows.tolist()):
+        yield f"The best designs</h2>\n{best}"
+    yield f"Explorer</h2>\n{explorer(space, shown)}"
 
 
 def verdicts_markdown(verdicts: Sequence[RequirementVerdict]) -> str:

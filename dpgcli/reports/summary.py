@@ -88,6 +88,12 @@ class DesignSpace:
         return swept_names(self.designs)
 
     @cached_property
+    def varied(self) -> list[str]:
+        """The swept columns that have more than one value; all of them where none has."""
+        rows = np.arange(len(self))
+        return [name for name in self.swept if self.n_values(name, rows) > 1] or self.swept
+
+    @cached_property
     def usable(self) -> Indices:
         """Rows of designs that have a state, thus metrics."""
         return np.flatnonzero(self.designs["n_stable"] > 0)
@@ -131,9 +137,13 @@ class DesignSpace:
         'dome height (mm)'
         """
         unit = self.units.get(name, "")
+        return f"{self.words(name)} ({unit})" if unit else self.words(name)
+
+    def words(self, name: str) -> str:
+        """The same without its unit."""
+        unit = self.units.get(name, "")
         spelled = unit.replace("/", "_per_").replace("²", "2").replace(" ", "_").replace("°", "deg")
-        words = name.removesuffix(f"_{spelled}").removeprefix("n_").replace("_", " ")
-        return f"{words} ({unit})" if unit else words
+        return name.removesuffix(f"_{spelled}").removeprefix("n_").replace("_", " ")
 
 
 def sections(space: DesignSpace) -> list[PageSection]:
@@ -301,6 +311,14 @@ def _left_out(space: DesignSpace) -> Iterator[str]:
 def is_alike(values: Any) -> bool:
     """Whether values differ by no more than rounding."""
     return bool(np.isclose(values.max(), values.min(), rtol=RELATIVE_EQUALITY, atol=0))
+
+
+def varies(space: DesignSpace, name: str) -> bool:
+    """Whether a column tells designs apart that have states, by more than an assumption."""
+    known = space.known(name, space.usable)
+    if name == STIFFEST:
+        known = known[~bars_alone(space, known)]
+    return len(known) > 0 and not is_alike(space.designs[name][known])
 
 
 def _failures(space: DesignSpace) -> list[str | PageTable]:

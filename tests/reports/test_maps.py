@@ -39,7 +39,7 @@ def texts(svg: str) -> list[str]:
         ({"stiffness": [1e3, 1e4, INF], "height": [5, 6]}, ["1000", "10000", "inf"]),
         ({"height": [5, 6], "stiffness": [1e3, 1e4, INF]}, ["1000", "10000", "inf"]),
         ({"height": [6, 7, INF]}, ["6", "7", "inf"]),
-        ({"stiffness": [INF], "height": [5, 6]}, ["inf"]),
+        ({"stiffness": [INF], "height": [5, 6]}, ["5.0", "6.0"]),
         ({"stiffness": [1e3, INF], "height": [6, INF]}, ["1000", "inf", "6", "inf"]),
         ({"stiffness": [-INF, 1, INF], "height": [5, 6]}, ["-inf", "1", "inf"]),
         ({"stiffness": [1, 2], "height": [5, 6], "third": [1, INF]}, []),
@@ -52,6 +52,14 @@ def texts(svg: str) -> list[str]:
 def test_an_axis_may_end_nowhere(swept: dict[str, Any], ticks: list[str]) -> None:
     found = texts(figures(DesignSpace(grid(**swept), {})))
     assert [tick for tick in ticks if tick in found] == ticks
+
+
+def test_what_is_swept_and_constant_is_no_axis() -> None:
+    found = texts(figures(DesignSpace(grid(gap=[3], height=[5, 6], length=[1, 2, 3]), {})))
+    assert ("gap" in found, "height" in found, "length" in found) == (False, True, True)
+    (line,) = [figures(DesignSpace(grid(gap=[3], height=[5, 6]), {}))]
+    assert "over height" in line
+    assert "gap" not in texts(line)
 
 
 def test_an_axis_of_numbers_is_one_to_scale() -> None:

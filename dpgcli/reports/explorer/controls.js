@@ -1,0 +1,267 @@
+// What is drawn once a frame; lists and fields, and what mouse and keys do.
+
+const MOST_LISTED = 20;
+const DRAG = 4; // pixels: less is a click
+
+// ---- all of it again, once a frame
+
+let isWaiting = false;
+const redraw = () => {
+  if (isWaiting) return;
+  isWaiting = true;
+  requestAnimationFrame(draw);
+};
+
+const draw = () => {
+  isWaiting = false;
+  judge();
+  const onFront = front();
+  const nPassing = passes.reduce((sum, is) => sum + is, 0);
+  const name = selected < 0 ? "none" : columns[0].values[selected];
+  at("count").textContent =
+    `${nPassing.toLocaleString("en")} of ${n.toLocaleString("en")} designs pass the filters; ` +
+    `${onFront.length.toLocaleString("en")} on the Pareto front. Selected design: ${name}.`;
+  at("scatter").setAttribute(
+    "aria-label",
+    `Scatter of ${chosen.y.label} over ${chosen.x.label}: ${at("count").textContent}`,
+  );
+  at("parallel").setAttribute(
+    "aria-label",
+    `Parallel coordinates of ${[...axes].map((c) => c.label).join(", ")}`,
+  );
+  drawScatter(onFront);
+  drawParallel();
+  listPassing();
+  showFilters();
+};
+
+const listPassing = () => {
+  const merit = BEST[at("y-best").value];
+  const { values } = chosen.y;
+  const rows = [];
+  for (let i = 0; i < n; i++) if (passes[i] && values[i] !== null) rows.push(i);
+  rows.sort((a, b) => merit(values[b]) - merit(values[a]) || a - b);
+  const some = [columns[0], ...new Set([...columns.filter((c) => c.key), chosen.x, chosen.y])];
+  const head = made(
+    "tr",
+    {},
+    ...some.map((c) => made("th", { scope: "col", textContent: c.name })),
+  );
+  const body = made("tbody");
+  for (const i of rows.slice(0, MOST_LISTED)) {
+    const button = made("button", { type: "button", textContent: textOf(some[0], i) });
+    button.dataset.row = i;
+    body.append(
+      made(
+        "tr",
+        {},
+        made("td", {}, button),
+        ...some.slice(1).map((c) => made("td", { textContent: textOf(c, i) })),
+      ),
+    );
+  }
+  const table = at("passing");
+  const caption = `The ${Math.min(MOST_LISTED, rows.length)} best of ${rows.length.toLocaleString("en")} by ${chosen.y.name}`;
+  table.replaceChildren(made("caption", { textContent: caption }), made("thead", {}, head), body);
+};
+
+const showFilters = () => {
+  for (const column of columns) {
+    if (!column.fields) continue;
+    const filter = filters.get(column);
+    column.fields.forEach((field, end) => {
+      if (field === document.activeElement) return;
+      if (column.texts) field.value = filter ? String(filter[0]) : "";
+      else
+        field.value =
+          filter && Number.isFinite(filter[end]) ? String(Number(filter[end].toPrecision(6))) : "";
+    });
+  }
+};
+
+// ---- controls
+
+const filterBy = (column, range) => {
+  if (range) filters.set(column, range);
+  else filters.delete(column);
+  redraw();
+};
+
+const filterRow = (column) => {
+  const cell = (...children) => made("td", {}, ...children);
+  const named = (field, what) => {
+    field.setAttribute("aria-label", `${column.name}, ${what}`);
+    return field;
+  };
+  if (column.texts) {
+    const choice = named(
+      made("select", {}, made("option", { value: "", textContent: "any" })),
+      "value",
+    );
+    column.texts.forEach((text, k) =>
+      choice.append(made("option", { value: String(k), textContent: text || "(empty)" })),
+    );
+    choice.addEventListener("change", () =>
+      filterBy(column, choice.value === "" ? null : [Number(choice.value), Number(choice.value)]),
+    );
+    column.fields = [choice];
+    return [cell(), cell(choice), cell()];
+  }
+  column.fields = ["lowest", "highest"].map((what) =>
+    named(made("input", { type: "number", step: "any" }), what),
+  );
+  column.fields[0].placeholder = shown(column.low);
+  column.fields[1].placeholder = shown(column.high);
+  const range = () => {
+    const ends = column.fields.map(({ value }, end) =>
+      value === "" ? [-Infinity, Infinity][end] : Number(value),
+    );
+    filterBy(column, ends.some(Number.isFinite) ? ends : null);
+  };
+  for (const field of column.fields) field.addEventListener("input", range);
+  const box = named(
+    made("input", { type: "checkbox", checked: axes.has(column) }),
+    "axis of the parallel coordinates",
+  );
+  box.addEventListener("change", () => {
+    if (box.checked) axes.add(column);
+    else axes.delete(column);
+    redraw();
+  });
+  return [cell(box), ...column.fields.map((field) => cell(field))];
+};
+
+const buildControls = () => {
+  for (const column of columns) {
+    const name = made("th", { scope: "row", textContent: column.name });
+    const unit = made("td", { textContent: column.unit });
+    at("filters").tBodies[0].append(made("tr", {}, name, ...filterRow(column), unit));
+  }
+  for (const axis of ["x", "y"]) {
+    const [choice, best] = [at(axis), at(`${axis}-best`)];
+    numbers.forEach((column, k) =>
+      choice.append(made("option", { value: String(k), textContent: column.label })),
+    );
+    Object.keys(BEST).forEach((word) =>
+      best.append(made("option", { value: word, textContent: word })),
+    );
+    const choose = () => {
+      chosen[axis] = numbers[Number(choice.value)];
+      best.value = chosen[axis].best;
+      redraw();
+    };
+    choice.value = String(numbers.indexOf(chosen[axis]));
+    choice.addEventListener("change", choose);
+    best.addEventListener("change", redraw);
+    choose();
+  }
+  at("clear").addEventListener("click", () => {
+    filters.clear();
+    redraw();
+  });
+  at("spec-button").addEventListener("click", () => {
+    at("spec").hidden = !at("spec").hidden;
+    at("spec-button").setAttribute("aria-expanded", String(!at("spec").hidden));
+  });
+  document.addEventListener("click", ({ target }) => {
+    const { row } = target.dataset ?? {};
+    if (row !== undefined) {
+      select(Number(row));
+      at("title").scrollIntoView({ block: "nearest" });
+    }
+  });
+};
+
+// Call back with where a drag began and is; `click` where it did not move.
+const onDrag = (canvas, drag, click) => {
+  let start = null;
+  const place = ({ offsetX, offsetY }) => [offsetX, offsetY];
+  const hasMoved = (end) => Math.hypot(end[0] - start[0], end[1] - start[1]) > DRAG;
+  canvas.addEventListener("pointerdown", (event) => {
+    start = place(event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (start && hasMoved(place(event))) drag(start, place(event));
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    if (start && !hasMoved(place(event))) click(start);
+    start = null;
+  });
+};
+
+const between = (column, a, b) =>
+  [Math.min(a, b), Math.max(a, b)].map((s) =>
+    s <= 0 ? -Infinity : s >= 1 ? Infinity : column.value(s),
+  );
+
+const listenToScatter = () => {
+  const canvas = at("scatter");
+  const shares = ([x, y]) => {
+    const room = inside(canvas);
+    return [(x - frame.left) / room.width, 1 - (y - frame.top) / room.height];
+  };
+  const drag = (start, end) => {
+    const [a, b] = [shares(start), shares(end)];
+    filters.set(chosen.x, between(chosen.x, a[0], b[0]));
+    if (chosen.x !== chosen.y) filters.set(chosen.y, between(chosen.y, a[1], b[1]));
+    redraw();
+  };
+  const click = (place) => {
+    const [x, y] = shares(place);
+    const room = inside(canvas);
+    let [nearest, least] = [-1, Infinity];
+    for (let i = 0; i < n; i++) {
+      const distance = Math.hypot(
+        (chosen.x.places[i] - x) * room.width,
+        (chosen.y.places[i] - y) * room.height,
+      );
+      if (passes[i] && distance < least) [nearest, least] = [i, distance];
+    }
+    if (nearest >= 0) select(nearest);
+  };
+  onDrag(canvas, drag, click);
+  canvas.addEventListener("keydown", (event) => {
+    const moves = {
+      ArrowRight: ["x", 1],
+      ArrowLeft: ["x", -1],
+      ArrowUp: ["y", 1],
+      ArrowDown: ["y", -1],
+    };
+    if (!moves[event.key]) return;
+    event.preventDefault();
+    const [axis, step] = moves[event.key];
+    const { places } = chosen[axis];
+    const rows = [];
+    for (let i = 0; i < n; i++)
+      if (passes[i] && !Number.isNaN(chosen.x.places[i] + chosen.y.places[i])) rows.push(i);
+    rows.sort((a, b) => places[a] - places[b] || a - b);
+    const here = rows.indexOf(selected);
+    if (rows.length)
+      select(rows[here < 0 ? 0 : Math.min(rows.length - 1, Math.max(0, here + step))]);
+  });
+};
+
+const listenToParallel = () => {
+  const canvas = at("parallel");
+  const nearest = (x) =>
+    axisPlaces(canvas).reduce((a, b) => (Math.abs(b.x - x) < Math.abs(a.x - x) ? b : a)).column;
+  const share = (y) => 1 - (y - bar.top) / (canvas.clientHeight - bar.top - bar.bottom);
+  const drag = (start, end) => {
+    const column = nearest(start[0]);
+    filterBy(column, between(column, share(start[1]), share(end[1])));
+  };
+  onDrag(canvas, drag, (start) => filterBy(nearest(start[0]), null));
+};
+
+document.querySelectorAll("[data-row]").forEach((button) => (button.hidden = false));
+at("shown").textContent = data.shown;
+document.getElementById("explorer").hidden = false;
+buildControls();
+listenToScatter();
+listenToParallel();
+window.addEventListener("resize", redraw);
+window.addEventListener("beforeprint", draw);
+for (const media of ["(prefers-color-scheme: dark)", "print"])
+  matchMedia(media).addEventListener("change", draw);
+select(data.selected);
