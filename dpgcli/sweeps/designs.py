@@ -47,7 +47,7 @@ def design_states(
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
-        around = Surroundings(*_placement(scene, n_designs, lanes))
+        around = Surroundings(*placement(scene, n_designs, lanes))
         request = RowRequest(
             chain_potential,
             exactness.tolerance,
@@ -56,14 +56,14 @@ def design_states(
             dropped[lanes],
             has_bars=not exactness.drops_bars,
         )
-        found = solved_rows(_designs(units, lanes), inverted, request)
+        found = solved_rows(units_of(units, lanes), inverted, request)
         return found | _with_body(scene, units, around, lanes, np.tile(codes, len(designs)))
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
     for designs in _groups(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
         pressure = scene.pressure and scene.pressure.take_lanes(designs)
-        metrics = Metrics(_designs(units, designs), len(designs), pressure)
+        metrics = Metrics(units_of(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [
@@ -87,10 +87,10 @@ def _with_body(
 
     layer, gripper = np.asarray(around.layer_thickness), around.gripper
     body = scene.body.take_lanes(lanes)
-    return grasp_rows(Encounter(_designs(units, lanes), layer, gripper, body, scene.held), codes)
+    return grasp_rows(Encounter(units_of(units, lanes), layer, gripper, body, scene.held), codes)
 
 
-def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
+def units_of(units: UnitSolutions, index: Indices) -> UnitSolutions:
     """Units of the designs at `index`; what there is one design of stays one."""
     return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 
@@ -114,7 +114,7 @@ def _groups(designs: Indices, size: int) -> Iterator[Indices]:
         yield designs[first : first + size]
 
 
-def _placement(
+def placement(
     scene: Scene, n_designs: int, lanes: Indices
 ) -> tuple[Gripper | None, float | Array]:
     """The gripper and the layer's thickness of each lane's design."""

@@ -135,7 +135,7 @@ class DesignEvaluation:
             place: self.reason_against({k: _said(k, v[place].item()) for k, v in values.items()})
             for place in np.flatnonzero(allowed & ~possible).tolist()
         }
-        for places, design in self._designs(values, np.flatnonzero(possible)):
+        for places, design in by_units(self.base, values, np.flatnonzero(possible)):
             found = resolve(design)
             for index in np.flatnonzero(found.are_wrong).tolist():
                 issues = found.problems.of(index)
@@ -164,16 +164,6 @@ class DesignEvaluation:
             begin = begins_in_base(scene, scene.body)
             reasons |= dict.fromkeys(alike[begin].tolist(), IN_BASE)
         return reasons
-
-    def _designs(self, values: DesignValues, places: Indices) -> Iterator[tuple[Indices, Design]]:
-        """The designs at some places, by their number of units."""
-        columns = {key: column[places] for key, column in values.items()}
-        units = columns.pop(UNITS, np.full(len(places), self.base.units))
-        for n_units in distinct(units).tolist():
-            here = np.flatnonzero(units == n_units)
-            own = {key: column[here] for key, column in columns.items()}
-            base = replace(self.base, units=int(n_units), n_designs=len(here))
-            yield places[here], base.with_values(own)
 
     def _are_possible(self, values: DesignValues) -> Flags:
         """Which designs have only values that their keys can have."""
@@ -215,7 +205,7 @@ class DesignEvaluation:
         """Which designs meet all constraints, and which of these can exist; nothing is solved."""
         allowed = self.allowed(values)
         right = allowed & self._are_possible(values)
-        for places, design in self._designs(values, np.flatnonzero(right)):
+        for places, design in by_units(self.base, values, np.flatnonzero(right)):
             found = resolve(design)
             possible = ~found.are_wrong
             possible[[*self._reasons_against_bodies(found, np.flatnonzero(possible))]] = False
@@ -234,7 +224,7 @@ class DesignEvaluation:
     def kinds_of_trust(self, values: DesignValues) -> Iterator[tuple[tuple[Trust, ...], int]]:
         """What outputs of designs that will be solved rest on, and how many of them."""
         right = self.allowed(values) & self._are_possible(values)
-        for _, design in self._designs(values, np.flatnonzero(right)):
+        for _, design in by_units(self.base, values, np.flatnonzero(right)):
             found = resolve(design)
             yield from found.kinds_of_trust(np.flatnonzero(~found.are_wrong))
 
@@ -297,6 +287,19 @@ class DesignEvaluation:
         reason[list(reasons)] = texts
         rows["reason"] = reason
         return {column.name: rows[column.name] for column in self.design_columns}
+
+
+def by_units(
+    base: Design, values: DesignValues, places: Indices
+) -> Iterator[tuple[Indices, Design]]:
+    """The designs around a base at some places of these values, by their number of units."""
+    columns = {key: column[places] for key, column in values.items()}
+    units = columns.pop(UNITS, np.full(len(places), base.units))
+    for n_units in distinct(units).tolist():
+        here = np.flatnonzero(units == n_units)
+        own = {key: column[here] for key, column in columns.items()}
+        alike = replace(base, units=int(n_units), n_designs=len(here))
+        yield places[here], alike.with_values(own)
 
 
 NO_FACE = (

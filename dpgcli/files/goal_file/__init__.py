@@ -1,0 +1,191 @@
+"""The file of a goal: a base spec, what may vary around it, what states should be like."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from math import isfinite, prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from dpgcli.design.dimensions import LINEAR_STIFFNESS, MAX_UNITS, UNITS, are_possible
+from dpgcli.errors import Problem, SpecError
+from dpgcli.files.content import beside
+from dpgcli.files.goal_file.models import MOST_TARGETS, VARIED, GoalSpec
+from dpgcli.files.goal_file.targets import TargetReader
+from dpgcli.files.places import in_order, shown
+from dpgcli.files.scene_file import Spec
+from dpgcli.files.sweep_file import checked_base, read_base, varied
+from dpgcli.files.sweep_file.models import MOST_KEYS
+from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader
+from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.search.goal import Goal, Range
+from dpgcli.text import KeyPath
+
+__all__ = ["GoalFile", "goal_in", "goal_of", "read_goal"]
+
+MOST_CHOICES = 1000  # combinations of listed values
+MOST_STATES_UNITS = 16  # units of a finger all of whose states may match a pattern
+
+
+@dataclass(frozen=True)
+class GoalFile:
+    """A goal with its base spec, the data of that with what files hold, and the files read."""
+
+    goal: Goal
+    base: Spec
+    base_document: Document
+    base_path: Path
+    files: tuple[Path, ...]
+
+
+def read_goal(path: Path, settings: Sequence[str] = ()) -> GoalFile:
+    """Read and check a goal; `settings` change its base spec.
+
+    Raises SpecError with all problems of both files at once.
+    """
+    return goal_of(read_document(path), path, settings)
+
+
+def goal_of(document: Document, path: Path, settings: Sequence[str] = ()) -> GoalFile:
+    """The same, of a document that was read from this path."""
+    found = goal_in(document, path.parent, settings)
+    return replace(found, files=(path, *found.files))
+
+
+def goal_in(
+    document: Document, folder: Path, settings: Sequence[str] = (), base: Document | None = None
+) -> GoalFile:
+    """The goal in a document; names of files are relative to a folder.
+
+    `base` is the base spec where no file holds it. Raises SpecError as `read_goal` does.
+    """
+    problems = [*document.problems, *_form_problems(document)]
+    base_path = beside(folder, str(document.data.get("base")))
+    base_spec, own = None, ()
+    if base is not None:
+        base_spec = checked_base(base, problems)
+    elif isinstance(document.data.get("base"), str):
+        base, base_spec = read_base(base_path, settings, problems)
+        own = (base_path,)
+    reader = SpaceReader(document, folder, OPTIONAL if base is None else base.data)
+    ranges, lists = _varied(reader, document.data.get("vary"))
+    targets = []
+    if base_spec is not None:
+        units = [int(n) for n in lists.get(UNITS, (base_spec.finger.units,))]
+        possible = [n for n in units if 1 <= n <= MAX_UNITS]
+        of_targets = TargetReader(reader, possible, base_spec.gripper is not None)
+        targets = [of_targets.target(*pair) for pair in _listed(document, "targets")]
+    problems += [*reader.problems, *varied(settings, reader.keys)]
+    if problems or base is None or base_spec is None:
+        raise SpecError(in_order(problems))
+    goal = Goal(base_spec.design, ranges, lists, tuple(t for t in targets if t is not None))
+    files = tuple(dict.fromkeys((*own, *base.files)))
+    return GoalFile(goal, base_spec, base, base_path, files)
+
+
+def _listed(document: Document, key: str) -> Iterator[tuple[int, Any]]:
+    said = document.data.get(key)
+    yield from enumerate(said if isinstance(said, list) else ())
+
+
+def _form_problems(document: Document) -> Iterator[Problem]:
+    """What is wrong with the keys of the top level."""
+    try:
+        GoalSpec.model_validate(document.data)
+    except ValidationError as error:
+        for found in error.errors(include_url=False):
+            yield _form_problem(document, found)
+        return
+    for key in ("vary", "targets"):
+        if not document.data[key]:
+            yield document.problem((key,), f"one of the {key} or more", "none")
+    if len(document.data["targets"]) > MOST_TARGETS:
+        n = f"{len(document.data['targets']):,}"
+        yield document.problem(("targets",), f"at most {MOST_TARGETS} targets", n)
+
+
+def _form_problem(document: Document, found: Any) -> Problem:
+    path: KeyPath = found["loc"][:1]
+    fields = GoalSpec.model_fields
+    if found["type"] == "extra_forbidden":
+        close = get_close_matches(str(path[0]), fields, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"known here: {', '.join(fields)}"
+        return document.problem(path, "a known key", shown(path[0]), hint)
+    missing = found["type"] == "missing"
+    value = "nothing" if missing else shown(document.data.get(str(path[0])))
+    return document.problem(path, fields[str(path[0])].description or "", value)
+
+
+def _varied(
+    reader: SpaceReader, said: Any
+) -> tuple[tuple[Range, ...], dict[str, tuple[float, ...]]]:
+    """The ranges, and values by key of what has a list of them."""
+    ranges: list[Range] = []
+    lists: dict[str, tuple[float, ...]] = {}
+    for key, values in said.items() if isinstance(said, dict) else ():
+        path: KeyPath = ("vary", key)
+        n_before = len(reader.problems)
+        reader.check_keys(path, [key])
+        if len(reader.problems) > n_before:
+            continue
+        if isinstance(values, list):
+            if _are_values(reader, path, key, values):
+                lists[key] = tuple(dict.fromkeys(values))
+        elif (ends := _ends(reader, path, key, values)) is None:
+            continue
+        elif key == UNITS:
+            lists[key] = tuple(range(int(ends[0]), int(ends[1]) + 1))
+        else:
+            ranges.append(Range(key, *ends))
+    n_choices = prod(map(len, lists.values()))
+    if n_choices > MOST_CHOICES:
+        expected = f"at most {MOST_CHOICES:,} combinations of listed values"
+        reader.wrong(("vary",), expected, f"{n_choices:,}", "give ranges, or fewer values")
+    if len(ranges) + len(lists) > MOST_KEYS:
+        reader.wrong(("vary",), f"at most {MOST_KEYS} keys", f"{len(ranges) + len(lists)}")
+    return tuple(ranges), lists
+
+
+def _are_values(reader: SpaceReader, path: KeyPath, key: str, values: list[Any]) -> bool:
+    """Whether a list has values that the key can have; else with a problem."""
+    rigid = LINEAR_STIFFNESS if key.endswith(LINEAR_STIFFNESS) else ""
+    wrong = [v for v in values if not _is_number(v) and not (rigid and v == float("inf"))]
+    if wrong or not values:
+        reader.wrong(path, VARIED, shown(wrong[0]) if wrong else "no values")
+        return False
+    return _are_possible(reader, path, key, values)
+
+
+def _ends(
+    reader: SpaceReader, path: KeyPath, key: str, said: Any
+) -> tuple[float, float] | None:
+    """Both ends of a range; None, with a problem, where it is none."""
+    if not (isinstance(said, dict) and set(said) == {"from", "to"}):
+        found = f"keys {', '.join(map(str, said)) or 'none'}" if isinstance(said, dict) else shown(said)
+        reader.wrong(path, VARIED, found)
+        return None
+    for end, value in said.items():
+        if not _is_number(value):
+            reader.wrong((*path, end), "a number", shown(value))
+            return None
+    low, high = said["from"], said["to"]
+    if not low < high:
+        reader.wrong(path, "a range from less to more", f"{low:g} to {high:g}")
+        return None
+    return (float(low), float(high)) if _are_possible(reader, path, key, [low, high]) else None
+
+
+def _are_possible(reader: SpaceReader, path: KeyPath, key: str, values: Sequence[float]) -> bool:
+    possible = are_possible(key.rsplit(".", 1)[-1], np.array(values, float))
+    if possible.all():
+        return True
+    first = values[int(np.argmin(possible))]
+    reader.wrong(path, "values that the key can have", f"{first:g}", "dpg help spec")
+    return False
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

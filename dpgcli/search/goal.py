@@ -1,0 +1,88 @@
+"""What designs are searched for: what may vary, and what states should be like."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from dpgcli.arrays import Array
+from dpgcli.design.dimensions import Design
+
+TIP = "tip"
+OF_TIP = ("tip_x_mm", "tip_y_mm")
+Choice = Mapping[str, float]  # a value for each key that has a list of them
+
+
+@dataclass(frozen=True)
+class Range:
+    """A key that may have any value between two."""
+
+    key: str
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a quantity of a state should be, to within a tolerance in the quantity's unit.
+
+    One of the states that match the `pattern` has to meet it. `quantity` is a column of states, or
+    the tip, whose place has two parts and is missed by its distance.
+    """
+
+    pattern: str
+    quantity: str
+    values: tuple[float, ...]
+    tolerance: float
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that it is about, one for each of its values."""
+        return OF_TIP if self.quantity == TIP else (self.quantity,)
+
+    @property
+    def text(self) -> str:
+        """What is asked for, in words."""
+        return f"{self.quantity} of {self.pattern}"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A base, the keys that may vary around it, and targets for the states of what results.
+
+    `lists` are values by key: whole numbers of units, or any others, of which all combinations are
+    tried. Designs (range, design) are in parts of the ranges' widths, from 0 to 1.
+    """
+
+    base: Design
+    ranges: tuple[Range, ...]
+    lists: Mapping[str, tuple[float, ...]]
+    targets: tuple[Target, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """All keys that vary."""
+        return (*self.lists, *(each.key for each in self.ranges))
+
+    @property
+    def n_parts(self) -> int:
+        """How many numbers the targets ask for."""
+        return sum(len(target.values) for target in self.targets)
+
+    def choices(self) -> Iterator[Choice]:
+        """Every combination of the listed values, the last list fastest."""
+        for values in product(*self.lists.values()):
+            yield dict(zip(self.lists, values, strict=True))
+
+    def values(self, choice: Mapping[str, Array], points: Array) -> dict[str, Array]:
+        """Values by key of designs at points (range, design), with listed ones by design."""
+        spread = {
+            each.key: np.clip(each.low + each.width * row, each.low, each.high)
+            for each, row in zip(self.ranges, points, strict=True)
+        }
+        return {**choice, **spread}
