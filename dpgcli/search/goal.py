@@ -8,10 +8,30 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.design.dimensions import Design
+from dpgcli.mechanics.terms import LOAD
+from dpgcli.states.columns import Kind
+from dpgcli.states.quantities import Quantity, declared
 
 TIP = "tip"
 OF_TIP = ("tip_x_mm", "tip_y_mm")
+KINDS = ("bistable", "wall", "hinge", "bar", LOAD)
 Choice = Mapping[str, float]  # a value for each key that has a list of them
+
+
+def state_quantities(n_units: int, *, is_gripper: bool) -> dict[str, Quantity]:
+    """The quantities of states that can be targets, by name: numbers that show the model's."""
+    every = declared(n_units, KINDS, is_gripper)
+    return {q.name: q for q in every if q.kind is Kind.NUMBER and q.outputs}
+
+
+def suffix_of(unit: str) -> str:
+    """A unit at the end of a name.
+
+    >>> suffix_of("mm"), suffix_of("rad/(N mm)"), suffix_of("")
+    ('_mm', '_rad_per_N_mm', '')
+    """
+    spelled = unit.replace("(", "").replace(")", "").replace("/", "_per_").replace(" ", "_")
+    return f"_{spelled}" if unit else ""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dpgcli.design.resolve import resolve
 from dpgcli.errors import NothingSelectedError
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.search.descent import Residuals
-from dpgcli.search.goal import Goal, Target
+from dpgcli.search.goal import KINDS, Goal, Target
 from dpgcli.search.slopes import EXACT, StateSlopes, key_steps
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
@@ -84,8 +84,7 @@ class _Batch:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Those that the targets are about, as far as fingers of so many units have them."""
-        kinds = ("bistable", "wall", "hinge", "bar")
-        every = declared(self.design.units, kinds, bool(self.design.gripper))
+        every = declared(self.design.units, KINDS, bool(self.design.gripper))
         names = ("status", *self.evaluation.names)
         return tuple(quantity for quantity in every if quantity.name in names)
 

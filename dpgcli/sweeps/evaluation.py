@@ -1,6 +1,6 @@
 """Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -333,16 +333,29 @@ def value_columns(space: Space) -> dict[str, Column]:
 
     What some units override keeps its whole key: the last part is that of the others too.
     """
-    last = [key.rsplit(".", 1)[-1] for key in space.keys]
     first = space.designs(0, 1)
+    whole = {key for key in space.keys if first[key].dtype.kind in "iu"}
     return {
         key: Column(
-            short if last.count(short) == 1 and ".overrides." not in key else key,
+            name,
             unit_of(key),
             f"{VALUE_OF}{key}",
-            kind=Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
+            kind=Kind.COUNT if key in whole else Kind.NUMBER,
         )
-        for key, short in zip(space.keys, last, strict=True)
+        for key, name in short_names(space.keys).items()
+    }
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Names of columns for keys: the last part where that is enough.
+
+    >>> short_names(["finger.units", "finger.overrides.4-5.geometry.dome_height_mm"])["finger.units"]
+    'units'
+    """
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    return {
+        key: short if last.count(short) == 1 and ".overrides." not in key else key
+        for key, short in zip(keys, last, strict=True)
     }
 
 

@@ -9,15 +9,9 @@ from typing import Any
 from dpgcli.errors import NothingSelectedError, UsageError
 from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.space import SpaceReader
-from dpgcli.mechanics.terms import LOAD
-from dpgcli.search.goal import OF_TIP, TIP, Target
-from dpgcli.states.columns import Column, Kind
+from dpgcli.search.goal import OF_TIP, TIP, Target, state_quantities, suffix_of
 from dpgcli.states.patterns import select
-from dpgcli.states.quantities import declared
 from dpgcli.text import KeyPath, quoted
-
-KINDS = ("bistable", "wall", "hinge", "bar", LOAD)
-TOLERANCE = "tolerance"
 
 
 @dataclass
@@ -29,9 +23,8 @@ class TargetReader:
     is_gripper: bool
 
     def __post_init__(self) -> None:
-        every = declared(max(self.n_units, default=1), KINDS, self.is_gripper)
-        own = (column for column in every if column.kind is Kind.NUMBER and column.outputs)
-        self.columns: dict[str, Column] = {column.name: column for column in own}
+        longest = max(self.n_units, default=1)
+        self.columns = state_quantities(longest, is_gripper=self.is_gripper)
 
     def target(self, place: int, said: Any) -> Target | None:
         """A target, or None with a problem."""
@@ -42,7 +35,7 @@ class TargetReader:
         quantity, n_before = said.get("quantity"), len(self.space.problems)
         if not self._is_known(path, quantity):
             return None
-        tolerance_key = tolerance_of(self._unit(str(quantity)))
+        tolerance_key = f"tolerance{suffix_of(self._unit(str(quantity)))}"
         for key in said:
             if key not in (known := ("pattern", "quantity", "value", tolerance_key)):
                 close = get_close_matches(key, known, n=1)
@@ -97,16 +90,6 @@ class TargetReader:
                 yield bool(select((pattern,), n_units))
             except NothingSelectedError:
                 yield False
-
-
-def tolerance_of(unit: str) -> str:
-    """The key of a tolerance in a unit.
-
-    >>> tolerance_of("mm"), tolerance_of("rad/(N mm)"), tolerance_of("")
-    ('tolerance_mm', 'tolerance_rad_per_N_mm', 'tolerance')
-    """
-    spelled = unit.replace("(", "").replace(")", "").replace("/", "_per_").replace(" ", "_")
-    return f"{TOLERANCE}_{spelled}" if unit else TOLERANCE
 
 
 def _is_number(value: Any) -> bool:
