@@ -32,13 +32,13 @@ MOST_STATES_UNITS = 16  # units of a finger all of whose states may match a patt
 
 @dataclass(frozen=True)
 class GoalFile:
-    """A goal with its base spec, the data of that with what files hold, and the files read."""
+    """A goal, its base spec, the data of that with what files hold, the files read, and its words."""
 
     goal: Goal
     base: Spec
     base_document: Document
-    base_path: Path
     files: tuple[Path, ...]
+    said: dict[str, Any]
 
 
 def read_goal(path: Path, settings: Sequence[str] = ()) -> GoalFile:
@@ -83,7 +83,7 @@ def goal_in(
         raise SpecError(in_order(problems))
     goal = Goal(base_spec.design, ranges, lists, tuple(t for t in targets if t is not None))
     files = tuple(dict.fromkeys((*own, *base.files)))
-    return GoalFile(goal, base_spec, base, base_path, files)
+    return GoalFile(goal, base_spec, base, files, dict(document.data))
 
 
 def _listed(document: Document, key: str) -> Iterator[tuple[int, Any]]:

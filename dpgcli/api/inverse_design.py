@@ -1,0 +1,215 @@
+"""`inverse_design`: designs whose states are as a goal asks for."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dpgcli.api.given import GoalInput, goal_input
+from dpgcli.api.inputs import Settings, check_numbers, check_whole, path_of
+from dpgcli.api.tables import Table
+from dpgcli.arrays import Columns, keep_freed_memory
+from dpgcli.design.outputs import doubts_about
+from dpgcli.errors import Field, NothingSelectedError, UsageError
+from dpgcli.files.design_spec import design_spec
+from dpgcli.files.goal_file import GoalFile
+from dpgcli.files.scene_file import Spec, scene_of
+from dpgcli.search.goal import state_quantities
+from dpgcli.search.search import Limits, Searched, search
+from dpgcli.search.table import GoalTables, Reached
+from dpgcli.search.targets import TargetEvaluation
+from dpgcli.search.unmet import how_slopes_are_found, unmet_lines
+from dpgcli.states.columns import Column
+from dpgcli.states.patterns import inverted_units, texts
+from dpgcli.states.plan import Request
+from dpgcli.states.predict import predict
+from dpgcli.text import counted
+
+AGREEMENT = 1e-9  # of a number: a design's, and that of predict from its spec
+BEST, TRACE = "best.parquet", "trace.parquet"
+
+
+@dataclass(frozen=True)
+class InverseDesignResult:
+    """The best designs, each certified anew from its spec, and how they were found.
+
+    `specs` are those of the designs, the best first, and `reached` what their states come to.
+    """
+
+    given: GoalFile
+    searched: Searched
+    specs: tuple[Spec, ...]
+    reached: tuple[Reached, ...]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of designs."""
+        return self._tables.columns
+
+    @cached_property
+    def rows(self) -> Columns:
+        """Designs by column."""
+        return self._tables.rows(self.searched.best, self.reached)
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each design, the best first."""
+        return Table.of(self.columns, self.rows)
+
+    @cached_property
+    def trace(self) -> Table:
+        """A row for each step of each descent."""
+        return Table.of(self._tables.trace_columns, self._tables.trace(self.searched.trace))
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the best design meets all targets."""
+        return bool(self.rows["meets_targets"][0])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Of the calibrations in use, and of targets by what no design should be chosen by."""
+        scene = scene_of(self.specs[0])
+        known = {trust.output: trust for trust in scene.trusts}
+        of_targets = {
+            quantity.name: [known[output] for output in quantity.outputs if output in known]
+            for name, quantity in self._tables.quantities.items()
+            if name in TargetEvaluation(self.given.goal).names
+        }
+        return (*scene.warnings, *(f"targets: {why}" for why in doubts_about(of_targets)))
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """How many designs meet the targets, what is in the way, how slopes are found: lines."""
+        return tuple(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        goal, found = self.given.goal, self.searched
+        n_met, n = int(self.rows["meets_targets"].sum()), len(self.specs)
+        met = f"{n_met:,} of {counted(n, 'design')}" if n_met else "no design"
+        meets = "meets" if n_met < 2 else "meet"
+        yield f"{met} {meets} all targets; each is certified anew from its spec"
+        misses = self.reached[0].misses(goal.targets)
+        units = [self._tables.quantities[target.columns[0]].unit for target in goal.targets]
+        yield from unmet_lines(goal, found.best, misses, units)
+        tried = f"{counted(found.n_starts, 'start')}, {counted(found.n_evaluated, 'design')} evaluated"
+        empty = f", {found.n_empty:,} of them without such states" if found.n_empty else ""
+        stopped = f"; {counted(found.n_stopped, 'descent')} stopped by the limit" if found.n_stopped else ""
+        yield f"{tried}{empty}{stopped}"
+        if said := how_slopes_are_found(TargetEvaluation(goal).by_differences):
+            yield said
+
+    @property
+    def _tables(self) -> GoalTables:
+        goal = self.given.goal
+        longest = int(max(goal.lists.get("finger.units", (goal.base.units,))))
+        return GoalTables(goal, state_quantities(longest, is_gripper=bool(goal.base.gripper)))
+
+    def save(self, folder: str | Path) -> None:
+        """Write the designs, the trace and a spec for each design into a folder.
+
+        They are `best.parquet`, `trace.parquet` and `design_1.yaml` and so on. Raises OutputError,
+        and UsageError for files that the designs come from.
+        """
+        from dpgcli.files.goal_output import write_designs
+
+        path = path_of("output", folder)
+        tables = (BEST, self.columns, self.rows), (
+            TRACE,
+            self._tables.trace_columns,
+            self._tables.trace(self.searched.trace),
+        )
+        write_designs(path, self.given, tables, self.specs, scene_of(self.specs[0]))
+
+
+def inverse_design(
+    goal: GoalInput,
+    output: str | Path | None = None,
+    *,
+    settings: Settings = (),
+    seed: int = 1,
+    evaluations: int | None = None,
+    budget: float | None = None,
+) -> InverseDesignResult:
+    """Search for designs whose states meet the targets of a goal: its file, or its data.
+
+    In data the `base` may be a spec's data, too; `settings` change it. The search descends from
+    random starts, 32 for each combination of listed values, by `seed`. With `evaluations`, a number
+    of designs, or a `budget` in seconds it goes on with further starts until that is used up.
+    Tables and specs go into the folder `output`, if there is one.
+    Raises SpecError for a wrong goal, UsageError for wrong choices, OutputError, and
+    NothingSelectedError where no start has certified states of the patterns.
+
+    >>> lattice = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
+    ...            "bistable_stiffness_N_per_mm": 12.84, "force_linearity": 0.043,
+    ...            "hinge_stiffness_N_mm_per_rad": 24.2}
+    >>> finger = {"units": 2, "linear_stiffness_N_per_mm": 1e4, "lattice": lattice}
+    >>> target = {"pattern": "11", "quantity": "tip_y_mm", "value": -8.0, "tolerance_mm": 0.1}
+    >>> goal = {"base": {"finger": finger}, "targets": [target],
+    ...         "vary": {"finger.lattice.stroke_mm": {"from": 2.5, "to": 4.5}}}
+    >>> found = inverse_design(goal)
+    >>> found.table["stroke_mm"].round(4).tolist(), found.table["target_1_tip_y_mm"].round(9)
+    """
+    check_whole(seed=seed, evaluations=evaluations)
+    check_numbers(budget=budget)
+    found = found_for(goal_input(goal, settings), seed, evaluations, budget)
+    if output is not None:
+        found.save(output)
+    return found
+
+
+def found_for(
+    given: GoalFile, seed: int = 1, evaluations: int | None = None, budget: float | None = None
+) -> InverseDesignResult:
+    """The same, of a goal that was read before."""
+    if seed < 0:
+        raise UsageError(Field("seed"), f" {seed}: expected a whole number from 0 on")
+    if evaluations is not None and evaluations < 1:
+        raise UsageError(Field("evaluations"), f" {evaluations}: expected 1 design or more")
+    if budget is not None and not 0.0 < budget < float("inf"):
+        raise UsageError(Field("budget"), f" {budget:g}: expected a time > 0 s")
+    keep_freed_memory()
+    searched = search(given.goal, seed, Limits(evaluations, budget))
+    best = searched.best
+    if not len(best):
+        patterns = ", ".join(dict.fromkeys(target.pattern for target in given.goal.targets))
+        n = counted(searched.n_starts, "start")
+        raise NothingSelectedError(f"none of {n} is a finger with certified states of {patterns}")
+    values = given.goal.values(best.choice, best.points)
+    designs = [{key: _plain(key, column[k]) for key, column in values.items()} for k in range(len(best))]
+    specs = tuple(design_spec(given.base_document, own) for own in designs)
+    reached = tuple(_reached(given, spec, searched, k) for k, spec in enumerate(specs))
+    return InverseDesignResult(given, searched, specs, reached)
+
+
+def _plain(key: str, value: Any) -> float | int:
+    """A value as a spec has it: numbers of units are whole."""
+    return int(value) if key == "finger.units" else float(value)
+
+
+def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Reached:
+    """What predict finds for a spec; it has to be what the search found."""
+    goal, best = given.goal, searched.best
+    codes = best.codes[:, place]
+    patterns = tuple(texts(inverted_units(codes, spec.finger.units)).astype(str).tolist())
+    names = TargetEvaluation(goal).names
+    rows = predict(scene_of(spec), Request(tuple(dict.fromkeys(patterns)), ("status", *names))).arrays()
+    index = {pattern: row for row, pattern in enumerate(rows["pattern"].tolist())}
+    values = tuple(
+        tuple(float(rows[name][index[pattern]]) for name in target.columns)
+        for target, pattern in zip(goal.targets, patterns, strict=True)
+    )
+    _check_agreement(goal.targets, values, best.residuals.values[:, place])
+    return Reached(patterns, values)
+
+
+def _check_agreement(targets: Sequence[Any], values: Sequence[Sequence[float]], found: Any) -> None:
+    """A broken invariant: both are the same states of the same finger."""
+    told = np.concatenate(values)
+    tolerances = np.concatenate([[t.tolerance] * len(t.values) for t in targets])
+    searched = np.concatenate([t.values for t in targets]) + found * tolerances
+    size = np.maximum(1.0, np.abs(told))
+    assert (np.abs(told - searched) <= AGREEMENT * size).all(), "predict finds the same states"
