@@ -1,7 +1,7 @@
 """What designs are searched for: what may vary, and what states should be like."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -11,6 +11,7 @@ from dpgcli.design.dimensions import Design
 from dpgcli.mechanics.terms import LOAD
 from dpgcli.states.columns import Kind
 from dpgcli.states.quantities import Quantity, declared
+from dpgcli.sweeps.expressions import Expression
 
 TIP = "tip"
 OF_TIP = ("tip_x_mm", "tip_y_mm")
@@ -72,22 +73,40 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Objective:
+    """A column of designs, or a key, that should be as small as can be, or as large."""
+
+    name: str
+    is_maximized: bool = False
+
+
+@dataclass(frozen=True)
 class Goal:
-    """A base, the keys that may vary around it, and targets for the states of what results.
+    """A base, the keys that may vary around it, and what is asked of what results.
 
     `lists` are values by key: whole numbers of units, or any others, of which all combinations are
-    tried. Designs (range, design) are in parts of the ranges' widths, from 0 to 1.
+    tried. Designs (range, design) are in parts of the ranges' widths, from 0 to 1. Targets are for
+    states; constraints and objectives are over columns of designs, keys, and numbers of the base
+    by key, which are `known`.
     """
 
     base: Design
     ranges: tuple[Range, ...]
     lists: Mapping[str, tuple[float, ...]]
-    targets: tuple[Target, ...]
+    targets: tuple[Target, ...] = ()
+    constraints: tuple[Expression, ...] = ()
+    objectives: tuple[Objective, ...] = ()
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def keys(self) -> tuple[str, ...]:
         """All keys that vary."""
         return (*self.lists, *(each.key for each in self.ranges))
+
+    @property
+    def has_maps(self) -> bool:
+        """Whether whole maps matter, and not only states."""
+        return bool(self.constraints or self.objectives)
 
     @property
     def n_parts(self) -> int:

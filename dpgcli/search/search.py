@@ -1,22 +1,24 @@
-"""A search: descents from random starts for every choice of listed values, and the best of them."""
+"""A search: from random starts for every choice of listed values to the best designs."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import monotonic
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dpgcli.arrays import Array, Codes, Columns, Flags, Indices
+from dpgcli.arrays import Array, Columns, Indices
 from dpgcli.search.descent import Descent, Residuals, Step, descend
+from dpgcli.search.designs import Designs, best_of
 from dpgcli.search.goal import Choice, Goal
 from dpgcli.search.targets import TargetEvaluation
+
+if TYPE_CHECKING:
+    from dpgcli.search.optima import Asked
 
 STARTS = 32  # for each choice of listed values, in each round
 MOST_LANES = 2**10  # at once
 DRAWS = 8  # of a start, until it is a finger that has the states
-MOST_FOUND = 10
-ALIKE = 1e-6  # of the box: closer designs are one
-SAME_MISFIT = 1e-6  # tolerances: which of two is less by so little says nothing
 
 
 @dataclass
@@ -36,48 +38,16 @@ class Limits:
 
     @property
     def ends_after_a_round(self) -> bool:
+        """Whether there is none."""
         return self.evaluations is None and self.seconds is None
-
-
-@dataclass(frozen=True)
-class Designs:
-    """Designs at points (range, design), with listed values by key, and how they do.
-
-    `held` (range, design) are bounds beyond which the targets would be missed by less.
-    """
-
-    choice: Mapping[str, Array]
-    points: Array
-    residuals: Residuals
-    codes: Codes
-    held: Flags
-
-    def __len__(self) -> int:
-        return self.points.shape[1]
-
-    @property
-    def misfits(self) -> Array:
-        """The norm of each one's misses in tolerances, (design,)."""
-        return np.asarray(np.sqrt((self.residuals.values**2).sum(axis=0)))
-
-    def take(self, index: Indices) -> "Designs":
-        """Some of them."""
-        values, slopes = self.residuals
-        return Designs(
-            {key: column[index] for key, column in self.choice.items()},
-            self.points[:, index],
-            Residuals(values[:, index], slopes[..., index]),
-            self.codes[:, index],
-            self.held[:, index],
-        )
 
 
 @dataclass(frozen=True)
 class Searched:
     """The best designs, the best first, and how they were found.
 
-    `trace` has a row for each step of each descent. `n_empty` starts are no finger with certified
-    states of all patterns; `n_stopped` descents were under way when time was up.
+    `trace` has a row for each step of each search. `n_empty` starts are no finger with certified
+    states of all patterns; `is_stopped` where searches were under way when a limit was reached.
     """
 
     goal: Goal
@@ -85,7 +55,7 @@ class Searched:
     trace: Columns
     n_starts: int
     n_empty: int
-    n_stopped: int
+    is_stopped: bool
     n_evaluated: int
 
 
@@ -101,22 +71,22 @@ def search(goal: Goal, seed: int = 1, limits: Limits | None = None) -> Searched:
             if rounds and not limits.may_go_on():
                 break
             some = choices[first : first + n_at_once]
-            number = sum(each.n_starts for each in rounds)
+            number = sum(each.n_searches for each in rounds)
             rounds.append(_Round(goal, some, limits, number).run(stream))
     return Searched(
         goal,
-        _best([each.found for each in rounds]),
-        _joined([part for each in rounds for part in each.trace]),
+        best_of(goal, Designs.joined([each.found for each in rounds])),
+        _joined([part for each in rounds for part in (each.begin, *each.trace)]),
         sum(each.n_starts for each in rounds),
         sum(each.n_empty for each in rounds),
-        sum(each.n_stopped for each in rounds),
+        any(each.is_stopped for each in rounds),
         limits.n_evaluated,
     )
 
 
 @dataclass
 class _Round:
-    """Descents from starts of some choices, all in one batch."""
+    """Searches from starts of some choices, all in one batch."""
 
     goal: Goal
     choices: Sequence[Choice]
@@ -124,34 +94,42 @@ class _Round:
     first: int
     trace: list[Columns] = field(init=False, default_factory=list)
     n_empty: int = field(init=False, default=0)
-    n_stopped: int = field(init=False, default=0)
+    is_stopped: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         self.evaluation = TargetEvaluation(self.goal)
         self.n_each = STARTS if self.goal.ranges else 1
+        self.n_starts = self.n_searches = len(self.choices) * self.n_each
+        self.n_asked: dict[int, int] = {}
         self.lists = {
             key: np.repeat([choice[key] for choice in self.choices], self.n_each)
             for key in self.goal.lists
         }
 
-    @property
-    def n_starts(self) -> int:
-        return len(self.choices) * self.n_each
-
     def run(self, stream: np.random.Generator) -> "_Round":
-        """Descend from drawn starts, to where each ends or time is up."""
-        start = self._starts(stream)
+        """Search from drawn starts, to where each search ends or time is up."""
+        points = self._starts(stream)
+        if self.goal.targets:
+            points = self._descended(points)
+        found = Designs.at(self.goal, self.lists, points)
+        self.begin = self._row(0, Step(np.arange(0), points[:, :0], np.zeros(0)))
+        self.n_empty = int((~found.exist).sum())
+        self.found = found.take(np.flatnonzero(found.exist))
+        if self.goal.has_maps and self.goal.ranges and len(self.found):
+            from dpgcli.search.optima import Optima
+
+            optima = Optima(self.goal, self.found, self._told).found()
+            self.found = Designs.joined([self.found, optima])
+        return self
+
+    def _descended(self, start: Array) -> Array:
+        """Points where the targets are missed by least, as far as one gets from each start."""
         steps = descend(self._evaluate, start, self.limits.may_go_on)
         for number, (descent, step) in enumerate(steps):
             self.trace.append(self._row(number, step))
             last: Descent = descent
-        self.n_stopped = int((~last.is_done).sum())
-        self.n_empty = int(np.isnan(last.misfits).sum())
-        values = self._values(last.points, np.arange(self.n_starts))
-        residuals, codes = self.evaluation(values)
-        found = Designs(self.lists, last.points, residuals, codes, last.held())
-        self.found = found.take(np.flatnonzero(~np.isnan(found.misfits)))
-        return self
+        self.is_stopped |= not last.is_done.all()
+        return last.points
 
     def _values(self, points: Array, lanes: Indices) -> dict[str, Array]:
         return self.goal.values({key: own[lanes] for key, own in self.lists.items()}, points)
@@ -164,7 +142,7 @@ class _Round:
         """Points at random, drawn again where there is no finger with states to begin with."""
         start = stream.random((len(self.goal.ranges), self.n_starts))
         lanes = np.arange(self.n_starts)
-        for _ in range(DRAWS if self.goal.ranges else 0):
+        for _ in range(DRAWS if self.goal.ranges and self.goal.targets else 0):
             found = self._evaluate(start[:, lanes], lanes).values
             lanes = lanes[np.isnan(found).any(axis=0)]
             if not len(lanes):
@@ -172,39 +150,34 @@ class _Round:
             start[:, lanes] = stream.random((len(start), len(lanes)))
         return start
 
+    def _told(self, asked: "Asked") -> None:
+        """Count what a search asked; raises TimeIsUp where that is enough."""
+        from dpgcli.search.optima import TimeIsUp
+
+        signs = [-1.0 if each.is_maximized else 1.0 for each in self.goal.objectives]
+        names = [each.name for each in self.goal.objectives]
+        searches = (self.first + self.n_starts + asked.searches).tolist()
+        for each in searches:
+            self.n_asked[each] = self.n_asked.get(each, 0) + 1
+        self.n_searches = self.n_starts + len(self.n_asked)
+        place = {
+            "search": np.array(searches),
+            "step": np.array([self.n_asked[each] for each in searches]),
+        }
+        told = dict(zip(names, asked.objectives * np.array(signs)[:, None], strict=False))
+        self.trace.append({**place, **asked.values, "misfit": asked.misfits, **told})
+        self.limits.n_evaluated += len(asked.searches) * (2 * len(self.goal.ranges) + 1)
+        if not self.limits.may_go_on():
+            self.is_stopped = True
+            raise TimeIsUp
+
     def _row(self, number: int, step: Step) -> Columns:
         known = ~np.isnan(step.misfits)
         lanes, points = step.lanes[known], step.points[:, known]
-        place = {"start": self.first + lanes, "step": np.full(len(lanes), number)}
-        return {**place, **self._values(points, lanes), "misfit": step.misfits[known]}
-
-
-def _best(found: Sequence[Designs]) -> Designs:
-    """The best of all designs, each once."""
-    every = Designs(
-        {key: np.concatenate([part.choice[key] for part in found]) for key in found[0].choice},
-        np.concatenate([part.points for part in found], axis=1),
-        Residuals(*(np.concatenate(parts, axis=-1) for parts in zip(*_residuals(found), strict=True))),
-        np.concatenate([part.codes for part in found], axis=1),
-        np.concatenate([part.held for part in found], axis=1),
-    )
-    rounded = np.rint(every.misfits / SAME_MISFIT)
-    listed = np.array([*every.choice.values()]).reshape(-1, len(every))
-    order = np.lexsort((*np.round(every.points, 6)[::-1], *listed[::-1], rounded))
-    kept: list[int] = []
-    for place in order.tolist():
-        if len(kept) == MOST_FOUND:
-            break
-        apart = np.abs(every.points[:, kept] - every.points[:, [place]]).max(axis=0, initial=0.0)
-        same = (listed[:, kept] == listed[:, [place]]).all(axis=0) & (apart <= ALIKE)
-        if not same.any():
-            kept.append(place)
-    return every.take(np.array(kept, np.int64))
-
-
-def _residuals(found: Sequence[Designs]) -> Iterator[Residuals]:
-    for part in found:
-        yield part.residuals
+        place = {"search": self.first + lanes, "step": np.full(len(lanes), number)}
+        unknown = np.full(len(lanes), np.nan)
+        told = {each.name: unknown for each in self.goal.objectives}
+        return {**place, **self._values(points, lanes), "misfit": step.misfits[known], **told}
 
 
 def _joined(parts: Sequence[Columns]) -> Columns:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Flags, Indices, distinct
-from dpgcli.design.dimensions import Design
+from dpgcli.design.dimensions import UNITS, Design
 from dpgcli.design.resolve import resolve
 from dpgcli.errors import NothingSelectedError
 from dpgcli.mechanics.terms import chain_potential
@@ -23,10 +23,11 @@ from dpgcli.states.rows import RowRequest, solved_rows
 from dpgcli.states.settle import settle
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
-from dpgcli.sweeps.designs import placement, units_of
+from dpgcli.sweeps.designs import groups_of, placement, units_of
 from dpgcli.sweeps.evaluation import by_units
 
 DIFFERENCE = 1e-4  # of a range, either way
+STATES_AT_ONCE = 2**15
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,13 @@ class TargetEvaluation:
         """Those that have no exact slope."""
         return tuple(name for name in self.names if name not in EXACT)
 
+    @cached_property
+    def most_states(self) -> int:
+        """States of a design that may be nearest, at most."""
+        every = self.goal.lists.get(UNITS, (self.goal.base.units,))
+        found = (sum(len(_matching(t, int(n))) for t in self.goal.targets) for n in every)
+        return max(1, *found)
+
     def __call__(self, values: Mapping[str, Array]) -> tuple[Residuals, Codes]:
         """Residuals over tolerances and slopes by the ranges' widths; the states, (target, design).
 
@@ -57,11 +65,14 @@ class TargetEvaluation:
         n_designs, n_ranges = len(next(iter(values.values()))), len(goal.ranges)
         residuals = np.full((goal.n_parts, n_designs), np.nan)
         slopes = np.full((goal.n_parts, n_ranges, n_designs), np.nan)
+        if not goal.targets:
+            return Residuals(residuals, slopes), np.zeros((0, n_designs), np.uint64)
         codes = np.zeros((len(goal.targets), n_designs), np.uint64)
-        for places, design in by_units(goal.base, values, np.arange(n_designs)):
-            batch = _Batch(self, design, {key: column[places] for key, column in values.items()})
-            residuals[:, places], codes[:, places] = batch.nearest()
-            slopes[..., places] = batch.slopes(codes[:, places])
+        for places in groups_of(np.arange(n_designs), STATES_AT_ONCE // self.most_states):
+            for some, design in by_units(goal.base, values, places):
+                batch = _Batch(self, design, {key: column[some] for key, column in values.items()})
+                residuals[:, some], codes[:, some] = batch.nearest()
+                slopes[..., some] = batch.slopes(codes[:, some])
         return Residuals(residuals, slopes), codes
 
 

@@ -61,14 +61,14 @@ def design_states(
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
-    for designs in _groups(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
+    for designs in groups_of(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
         pressure = scene.pressure and scene.pressure.take_lanes(designs)
         metrics = Metrics(units_of(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [
                 solved(some, codes + np.uint64(first))
-                for some in _groups(designs, size >> n_units)
+                for some in groups_of(designs, size >> n_units)
                 for codes in chunks(n_codes, size)
             ]
             rows = joined_rows(parts)
@@ -107,7 +107,7 @@ def designs_at_once(n_units: int) -> int:
     return max(1, lanes_at_once(n_units) >> n_units)
 
 
-def _groups(designs: Indices, size: int) -> Iterator[Indices]:
+def groups_of(designs: Indices, size: int) -> Iterator[Indices]:
     """So many designs at a time, or one."""
     size = max(size, 1)
     for first in range(0, len(designs), size):

@@ -140,6 +140,38 @@ def _body(spelled: str) -> ast.expr:
     return ast.parse(spelled, mode="eval").body
 
 
+def margins(rule: Expression) -> tuple[Expression, ...]:
+    """What has to be above zero for a comparison to hold, or at zero; none where that does not say.
+
+    As of `or`, `not`, `==` and `!=`.
+
+    >>> [margin.text for margin in margins(expression("2 < a.b <= 4 and c > 1"))]
+    ['a.b - 2', '4 - a.b', 'c - 1']
+    >>> margins(expression("a > 1 or b > 1"))
+    ()
+    """
+    found = _margins(ast.parse(_without_digits(rule.text), mode="eval").body)
+    return () if found is None else tuple(expression(ast.unparse(node)) for node in found)
+
+
+def _margins(node: ast.expr) -> list[ast.expr] | None:
+    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+        parts = [_margins(value) for value in node.values]
+        return None if None in parts else [each for part in parts for each in part or ()]
+    if not isinstance(node, ast.Compare):
+        return None
+    sides = zip(node.ops, [node.left, *node.comparators[:-1]], node.comparators, strict=True)
+    found: list[ast.expr] = []
+    for op, left, right in sides:
+        if isinstance(op, ast.Lt | ast.LtE):
+            found.append(ast.BinOp(right, ast.Sub(), left))
+        elif isinstance(op, ast.Gt | ast.GtE):
+            found.append(ast.BinOp(left, ast.Sub(), right))
+        else:
+            return None
+    return found
+
+
 def _is_comparison(node: ast.expr) -> bool:
     """Whether a node is true or false, and not a number."""
     is_negation = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
