@@ -41,21 +41,25 @@ def any_input(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep |
     >>> any_input({"fingers": {}})
     Traceback (most recent call last):
         ...
-    dpgcli.errors.SpecError: spec: fingers: expected a spec, with the key finger, a sweep, with the \
-keys base and space, or a goal, with the keys base, vary and targets, found fingers (did you mean \
-finger?)
+    dpgcli.errors.SpecError: spec: fingers: expected a spec, with the key finger, a sweep, with \
+the keys base and space, or a goal, with the keys base, vary and targets, found fingers (did you \
+mean finger?)
     """
     texts = setting_texts(settings)
     if isinstance(given, SceneInput | Scene | Finger):
         return scene_input(given, texts)
     if isinstance(given, Mapping):
         own = without_free_keys(by_text("spec", given))
-        read = {FileKind.SWEEP: sweep_input, FileKind.GOAL: goal_input}
-        return read.get(kind_of(Document("spec", own, {})), scene_input)(given, texts)
+        kind = kind_of(Document("spec", own, {}))
+        if kind is FileKind.GOAL:
+            return goal_input(given, texts)
+        return (sweep_input if kind is FileKind.SWEEP else scene_input)(given, texts)
     path = path_of("spec", given)
     document = read_document(given)
-    of = {FileKind.SWEEP: sweep_of, FileKind.GOAL: goal_of}
-    return of.get(kind_of(document), scene_input_in)(document, path, texts)
+    kind = kind_of(document)
+    if kind is FileKind.SPEC:
+        return scene_input_in(document, path, texts)
+    return (sweep_of if kind is FileKind.SWEEP else goal_of)(document, path, texts)
 
 
 def scene_or_sweep(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep:

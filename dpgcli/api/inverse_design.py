@@ -1,6 +1,6 @@
 """`inverse_design`: designs whose states are as a goal asks for."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,17 +11,19 @@ import numpy as np
 from dpgcli.api.given import GoalInput, goal_input
 from dpgcli.api.inputs import Settings, check_numbers, check_whole, path_of
 from dpgcli.api.tables import Table
-from dpgcli.arrays import Columns, keep_freed_memory
+from dpgcli.arrays import Array, Columns, keep_freed_memory
+from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import doubts_about
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
 from dpgcli.search.goal import state_quantities
+from dpgcli.search.maps import MapEvaluation, map_columns
 from dpgcli.search.search import Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
 from dpgcli.search.targets import TargetEvaluation
-from dpgcli.search.unmet import how_slopes_are_found, unmet_lines
+from dpgcli.search.unmet import how_slopes_are_found
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
@@ -66,46 +68,47 @@ class InverseDesignResult:
 
     @property
     def is_met(self) -> bool:
-        """Whether the best design meets all targets."""
-        return bool(self.rows["meets_targets"][0])
+        """Whether the best design meets all that is asked."""
+        return bool(self.rows["meets_all"][0])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Of the calibrations in use, and of targets by what no design should be chosen by."""
-        scene = scene_of(self.specs[0])
+        """Of the calibrations in use, and of what no design should be chosen by."""
+        scene, tables = scene_of(self.specs[0]), self._tables
         known = {trust.output: trust for trust in scene.trusts}
-        of_targets = {
-            quantity.name: [known[output] for output in quantity.outputs if output in known]
-            for name, quantity in self._tables.quantities.items()
-            if name in TargetEvaluation(self.given.goal).names
+        asked = [tables.quantities[name] for name in TargetEvaluation(self.given.goal).names]
+        trusts = {
+            column.name: [known[output] for output in column.outputs if output in known]
+            for column in (*asked, *tables.map_columns)
         }
-        return (*scene.warnings, *(f"targets: {why}" for why in doubts_about(of_targets)))
+        return (*scene.warnings, *(f"goal: {why}" for why in doubts_about(trusts)))
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """How many designs meet the targets, what is in the way, how slopes are found: lines."""
+        """How many designs meet what is asked, what is in the way, how slopes are found: lines."""
         return tuple(self._lines())
 
     def _lines(self) -> Iterator[str]:
         goal, found = self.given.goal, self.searched
-        n_met, n = int(self.rows["meets_targets"].sum()), len(self.specs)
+        n_met, n = int(self.rows["meets_all"].sum()), len(self.specs)
         met = f"{n_met:,} of {counted(n, 'design')}" if n_met else "no design"
         meets = "meets" if n_met < 2 else "meet"
-        yield f"{met} {meets} all targets; each is certified anew from its spec"
-        misses = self.reached[0].misses(goal.targets)
-        units = [self._tables.quantities[target.columns[0]].unit for target in goal.targets]
-        yield from unmet_lines(goal, found.best, misses, units)
-        tried = f"{counted(found.n_starts, 'start')}, {counted(found.n_evaluated, 'design')} evaluated"
+        front = "; they are a front" if len(goal.objectives) > 1 and n_met > 1 else ""
+        yield f"{met} {meets} all that is asked{front}; each is certified anew from its spec"
+        yield from self._tables.standing(found.best, 0).lines()
+        tried = (
+            f"{counted(found.n_starts, 'start')}, {counted(found.n_evaluated, 'design')} evaluated"
+        )
         empty = f", {found.n_empty:,} of them without such states" if found.n_empty else ""
-        stopped = f"; {counted(found.n_stopped, 'descent')} stopped by the limit" if found.n_stopped else ""
-        yield f"{tried}{empty}{stopped}"
-        if said := how_slopes_are_found(TargetEvaluation(goal).by_differences):
+        yield f"{tried}{empty}{'; stopped by the limit' if found.is_stopped else ''}"
+        sloped = (*TargetEvaluation(goal).by_differences, *sorted(MapEvaluation(goal).names))
+        if said := how_slopes_are_found(sloped if goal.ranges else ()):
             yield said
 
     @property
     def _tables(self) -> GoalTables:
         goal = self.given.goal
-        longest = int(max(goal.lists.get("finger.units", (goal.base.units,))))
+        longest = int(max(goal.lists.get(UNITS, (goal.base.units,))))
         return GoalTables(goal, state_quantities(longest, is_gripper=bool(goal.base.gripper)))
 
     def save(self, folder: str | Path) -> None:
@@ -117,10 +120,13 @@ class InverseDesignResult:
         from dpgcli.files.goal_output import write_designs
 
         path = path_of("output", folder)
-        tables = (BEST, self.columns, self.rows), (
-            TRACE,
-            self._tables.trace_columns,
-            self._tables.trace(self.searched.trace),
+        tables = (
+            (BEST, self.columns, self.rows),
+            (
+                TRACE,
+                self._tables.trace_columns,
+                self._tables.trace(self.searched.trace),
+            ),
         )
         write_designs(path, self.given, tables, self.specs, scene_of(self.specs[0]))
 
@@ -151,7 +157,8 @@ def inverse_design(
     >>> goal = {"base": {"finger": finger}, "targets": [target],
     ...         "vary": {"finger.lattice.stroke_mm": {"from": 2.5, "to": 4.5}}}
     >>> found = inverse_design(goal)
-    >>> found.table["stroke_mm"].round(4).tolist(), found.table["target_1_tip_y_mm"].round(9)
+    >>> found.table["stroke_mm"].round(4).tolist(), found.is_met
+    ([3.5164], True)
     """
     check_whole(seed=seed, evaluations=evaluations)
     check_numbers(budget=budget)
@@ -176,10 +183,12 @@ def found_for(
     best = searched.best
     if not len(best):
         patterns = ", ".join(dict.fromkeys(target.pattern for target in given.goal.targets))
-        n = counted(searched.n_starts, "start")
-        raise NothingSelectedError(f"none of {n} is a finger with certified states of {patterns}")
+        n, of = counted(searched.n_starts, "start"), f" of {patterns}" if patterns else ""
+        raise NothingSelectedError(f"none of {n} is a finger with certified states{of}")
     values = given.goal.values(best.choice, best.points)
-    designs = [{key: _plain(key, column[k]) for key, column in values.items()} for k in range(len(best))]
+    designs = [
+        {key: _plain(key, column[k]) for key, column in values.items()} for k in range(len(best))
+    ]
     specs = tuple(design_spec(given.base_document, own) for own in designs)
     reached = tuple(_reached(given, spec, searched, k) for k, spec in enumerate(specs))
     return InverseDesignResult(given, searched, specs, reached)
@@ -187,7 +196,7 @@ def found_for(
 
 def _plain(key: str, value: Any) -> float | int:
     """A value as a spec has it: numbers of units are whole."""
-    return int(value) if key == "finger.units" else float(value)
+    return int(value) if key == UNITS else float(value)
 
 
 def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Reached:
@@ -196,20 +205,27 @@ def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Rea
     codes = best.codes[:, place]
     patterns = tuple(texts(inverted_units(codes, spec.finger.units)).astype(str).tolist())
     names = TargetEvaluation(goal).names
-    rows = predict(scene_of(spec), Request(tuple(dict.fromkeys(patterns)), ("status", *names))).arrays()
-    index = {pattern: row for row, pattern in enumerate(rows["pattern"].tolist())}
-    values = tuple(
-        tuple(float(rows[name][index[pattern]]) for name in target.columns)
-        for target, pattern in zip(goal.targets, patterns, strict=True)
-    )
-    _check_agreement(goal.targets, values, best.residuals.values[:, place])
-    return Reached(patterns, values)
+    values: tuple[tuple[float, ...], ...] = ()
+    if goal.targets:
+        request = Request(tuple(dict.fromkeys(patterns)), ("status", *names))
+        rows = predict(scene_of(spec), request).arrays()
+        index = {pattern: row for row, pattern in enumerate(rows["pattern"].tolist())}
+        values = tuple(
+            tuple(float(rows[name][index[pattern]]) for name in target.columns)
+            for target, pattern in zip(goal.targets, patterns, strict=True)
+        )
+        told = np.concatenate(values)
+        tolerances = np.repeat([t.tolerance for t in goal.targets], [len(v) for v in values])
+        asked = np.concatenate([target.values for target in goal.targets])
+        _check_agreement(told, asked + best.residuals.values[:, place] * tolerances)
+    units = {UNITS: np.array([spec.finger.units])}
+    columns = map_columns(spec.design, [*best.columns], units) if best.columns else {}
+    for name, column in columns.items():
+        _check_agreement(column, best.columns[name][[place]])
+    return Reached(patterns, values, {name: column[0].item() for name, column in columns.items()})
 
 
-def _check_agreement(targets: Sequence[Any], values: Sequence[Sequence[float]], found: Any) -> None:
+def _check_agreement(told: Array, searched: Array) -> None:
     """A broken invariant: both are the same states of the same finger."""
-    told = np.concatenate(values)
-    tolerances = np.concatenate([[t.tolerance] * len(t.values) for t in targets])
-    searched = np.concatenate([t.values for t in targets]) + found * tolerances
-    size = np.maximum(1.0, np.abs(told))
-    assert (np.abs(told - searched) <= AGREEMENT * size).all(), "predict finds the same states"
+    apart = np.abs(told - searched)
+    assert (apart <= AGREEMENT * np.maximum(1.0, np.abs(told))).all(), "predict finds the same"

@@ -13,8 +13,8 @@ from dpgcli.files.sweep_file import Sweep
 def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     """All problems of specs, sweeps and goals, none where they are right; nothing is solved.
 
-    Those of a sweep or a goal come with those of its base, which `settings` change. A sweep without a design
-    that can be solved, of a million at most, has a problem, too.
+    Those of a sweep or a goal come with those of its base, which `settings` change. A sweep without
+    a design that can be solved, of a million at most, has a problem, too.
 
     >>> problem, = validate({"finger": {"units": 0}})[:1]
     >>> problem.key, problem.expected

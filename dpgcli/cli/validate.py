@@ -26,7 +26,9 @@ class ProblemFormat(StrEnum):
 def validate(
     specs: Annotated[
         list[Path],
-        typer.Argument(metavar="SPEC...", help="YAML specs, sweeps and goals; - reads standard input"),
+        typer.Argument(
+            metavar="SPEC...", help="YAML specs, sweeps and goals; - reads standard input"
+        ),
     ],
     settings: Settings = None,
     listed_as: Annotated[

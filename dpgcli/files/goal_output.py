@@ -1,4 +1,4 @@
-"""What a search found, in a folder: tables of designs and of all steps, and a spec for each design."""
+"""What a search found, in a folder: tables of designs and of all steps, a spec for each design."""
 
 import json
 import re

@@ -108,7 +108,7 @@ def _search(ask: Ask[Local], start: Array, scalar: Scalar, sizes: Array) -> Arra
 
     def slope(x: Array) -> Array:
         if several:
-            return np.eye(n + 1)[n]
+            return np.asarray(np.eye(n + 1)[n])
         return np.asarray(scalar.weights[own[0]] * at(x).objective_slopes[own[0]])
 
     def room(x: Array) -> Array:
@@ -132,10 +132,10 @@ def _search(ask: Ask[Local], start: Array, scalar: Scalar, sizes: Array) -> Arra
     has_rules = several or len(at(start).margins)
     rules = [{"type": "ineq", "fun": room, "jac": room_slopes}] if has_rules else []
     options = {"maxiter": MOST_STEPS, "ftol": PRECISION}
-    found = minimize(
+    found = minimize(  # type: ignore[call-overload]  # whose stubs take fewer arrays than it does
         value, begin, jac=slope, bounds=bounds, constraints=rules, method="SLSQP", options=options
     )
-    return np.clip(found.x[:n], 0.0, 1.0)
+    return np.asarray(np.clip(found.x[:n], 0.0, 1.0))
 
 
 def _somewhere(here: Local) -> Local:

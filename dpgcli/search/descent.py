@@ -42,6 +42,12 @@ class Step(NamedTuple):
     misfits: Array
 
 
+def held(points: Array, gradient: Array) -> Flags:
+    """Coordinates on a bound of the unit box that something would fall beyond, (…, lane)."""
+    below = (points <= 0.0) & (gradient > 0.0)
+    return np.asarray(below | ((points >= 1.0) & (gradient < 0.0)))
+
+
 @dataclass
 class Descent:
     """Searches on their way: points (coordinate, lane), with what is known there."""
@@ -70,14 +76,9 @@ class Descent:
         """Of half the sum of squares, (coordinate, lane)."""
         return np.asarray((self.slopes * self.values[:, None]).sum(axis=0))
 
-    def held(self) -> Flags:
-        """Coordinates on a bound that the sum of squares would fall beyond, (coordinate, lane)."""
-        gradient = self.gradient
-        return ((self.points <= 0.0) & (gradient > 0.0)) | ((self.points >= 1.0) & (gradient < 0.0))
-
     def _steps(self, lanes: Indices) -> Array:
         """The next step of some searches, (coordinate, lane), not yet cut at the box."""
-        slopes = np.where(self.held()[:, lanes], 0.0, self.slopes[..., lanes])
+        slopes = np.where(held(self.points, self.gradient)[:, lanes], 0.0, self.slopes[..., lanes])
         curved = np.einsum("pil,pjl->lij", slopes, slopes)
         size = slopes.shape[1]
         scale = np.trace(curved, axis1=1, axis2=2) / size

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Flags, Indices
-from dpgcli.search.descent import Residuals
+from dpgcli.search.descent import Residuals, held
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import MapEvaluation
 from dpgcli.search.targets import TargetEvaluation
@@ -49,7 +51,7 @@ class Designs:
         return cls(choice, points, residuals, codes, columns, objectives, hold)
 
     def __len__(self) -> int:
-        return self.points.shape[1]
+        return int(self.points.shape[1])
 
     @property
     def misfits(self) -> Array:
@@ -86,7 +88,7 @@ class Designs:
     def joined(cls, parts: Sequence["Designs"]) -> "Designs":
         """All of several."""
 
-        def last(arrays: Sequence[Array]) -> Array:
+        def last(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
             return np.concatenate(arrays, axis=-1)
 
         first = parts[0]
@@ -104,7 +106,7 @@ class Designs:
     def held(self) -> Flags:
         """Bounds that designs are on, and beyond which targets would be missed by less."""
         gradient = (self.residuals.slopes * self.residuals.values[:, None]).sum(axis=0)
-        return ((self.points <= 0.0) & (gradient > 0.0)) | ((self.points >= 1.0) & (gradient < 0.0))
+        return held(self.points, np.asarray(gradient))
 
     def n_broken(self, goal: Goal) -> Indices:
         """How many constraints, and with objectives targets, each does not meet, (design,)."""

@@ -19,7 +19,7 @@ Found = TypeVar("Found")
 Ask = Callable[[Array], Answer]
 
 
-class _Stopped(Exception):
+class _StoppedError(Exception):
     """There are no more answers: somebody who gave them stopped."""
 
 
@@ -34,7 +34,7 @@ class _Asker(Generic[Answer]):
         self.asked.put((self.number, point))
         found = self.answer.get()
         if found is None:
-            raise _Stopped
+            raise _StoppedError
         return found
 
 

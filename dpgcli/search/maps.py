@@ -4,15 +4,15 @@ A map is all states of a design, as `sweep` computes it. Slopes by the ranges ar
 differences, all in one batch: extremes of maps have no others where two states change places.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.design.dimensions import unit_of
+from dpgcli.design.dimensions import Design, unit_of
 from dpgcli.search.goal import Goal
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.columns import Column, Group, Kind
@@ -56,30 +56,16 @@ class MapEvaluation:
         found = (margin for rule in self.goal.constraints for margin in margins(rule))
         return tuple(margin for margin in found if not margin.names & COUNTS)
 
-    @cached_property
-    def _evaluation(self) -> DesignEvaluation:
-        """That of a sweep, without what takes its time and does not matter."""
-        used = [metric for metric in METRICS if metric.name in self.names]
-        base = self.goal.base
-        if not any(metric.needs_pressure for metric in used):
-            base = replace(base, pressure=None)
-        if not any(metric.group is Group.GRASP for metric in used):
-            base = replace(base, body=None)
-        values = {key: Column(key, unit_of(key), f"value of {key}") for key in self.goal.keys}
-        return DesignEvaluation(base, {}, _is_possible, values, (), DEFAULT_TOLERANCE)
-
     def columns(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """Columns that matter, and values by key and by the last part of keys, (design,)."""
         known = {**self.goal.known, **values}
-        found = {**{key.rsplit(".", 1)[-1]: value for key, value in known.items()}, **known}
+        found: dict[str, Any] = {
+            **{key.rsplit(".", 1)[-1]: value for key, value in known.items()},
+            **known,
+        }
         if not self.names:
             return found
-        own = {key: values[key] for key in self.goal.keys if key in values}
-        blocks = [tables.designs for tables in self._evaluation(0, own)]
-        rows = {n: np.concatenate([block[n] for block in blocks]) for n in (*self.names, "status")}
-        stable, partly, *_ = (status.encode() for status in DesignStatus)
-        is_there = (rows["status"] == stable) | (rows["status"] == partly)
-        return found | {name: np.where(is_there, rows[name], np.nan) for name in self.names}
+        return found | map_columns(self.goal.base, self.names, values)
 
     def hold(self, columns: Mapping[str, Array]) -> Flags:
         """Which constraints hold, (constraint, design)."""
@@ -125,6 +111,31 @@ def _sloped(rows: Array, k: int, n: int) -> tuple[Array, Array]:
     """Values (row, design), and slopes (row, range, design), from values around designs."""
     around = rows[:, n:].reshape(len(rows), k, 2, n)
     return rows[:, :n], (around[:, :, 1] - around[:, :, 0]) / (2.0 * DIFFERENCE)
+
+
+def map_columns(
+    base: Design, names: Collection[str], values: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Columns of designs around a base with these values by key; NaN without a stable state.
+
+    What takes its time and does not matter is left out.
+    """
+    used = [metric for metric in METRICS if metric.name in names]
+    if not any(metric.needs_pressure for metric in used):
+        base = replace(base, pressure=None)
+    if not any(metric.group is Group.GRASP for metric in used):
+        base = replace(base, body=None)
+    columns = {key: Column(key, unit_of(key), f"value of {key}") for key in values}
+    blocks = [tables.designs for tables in evaluation_of(base, columns)(0, values)]
+    rows = {name: np.concatenate([block[name] for block in blocks]) for name in (*names, "status")}
+    stable, partly, *_ = (status.encode() for status in DesignStatus)
+    is_there = (rows["status"] == stable) | (rows["status"] == partly)
+    return {name: np.where(is_there, rows[name], np.nan) for name in names}
+
+
+def evaluation_of(base: Design, values: Mapping[str, Column]) -> DesignEvaluation:
+    """That of a sweep around a base, over values that keys can have."""
+    return DesignEvaluation(base, {}, _is_possible, values, (), DEFAULT_TOLERANCE)
 
 
 def _is_possible(values: Mapping[str, float]) -> str:

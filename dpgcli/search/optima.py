@@ -18,7 +18,7 @@ STARTS_ON_FRONT = 2  # of a choice, for each point of a front
 TINY = 1e-12
 
 
-class TimeIsUp(Exception):
+class TimeIsUpError(Exception):
     """A search may not go on."""
 
 
@@ -38,7 +38,7 @@ class Asked(NamedTuple):
 class Optima:
     """Searches on from designs that are known, under the constraints of a goal.
 
-    `tell` hears of all that is asked, and may raise `TimeIsUp`.
+    `tell` hears of all that is asked, and may raise `TimeIsUpError`.
     """
 
     goal: Goal
@@ -139,11 +139,11 @@ class Optima:
 
         try:
             ends = descend_within(evaluate, begin.points, own, sizes)
-        except TimeIsUp:
+        except TimeIsUpError:
             ends = latest
         if any(rule.names & COUNTS for rule in goal.constraints):
             ends = last_that_hold(
-                lambda points: Designs.at(goal, begin.choice, points).hold.all(axis=0),
+                lambda points: np.asarray(Designs.at(goal, begin.choice, points).hold.all(axis=0)),
                 begin.points,
                 ends,
             )

@@ -66,8 +66,8 @@ def search(goal: Goal, seed: int = 1, limits: Limits | None = None) -> Searched:
     choices = list(goal.choices())
     n_at_once = max(1, MOST_LANES // STARTS)
     while not rounds or (goal.ranges and limits.may_go_on() and not limits.ends_after_a_round):
-        stream = np.random.default_rng([seed, len(rounds)])
         for first in range(0, len(choices), n_at_once):
+            stream = np.random.default_rng([seed, len(rounds)])
             if rounds and not limits.may_go_on():
                 break
             some = choices[first : first + n_at_once]
@@ -119,7 +119,8 @@ class _Round:
             from dpgcli.search.optima import Optima
 
             optima = Optima(self.goal, self.found, self._told).found()
-            self.found = Designs.joined([self.found, optima])
+            best = best_of(self.goal, self.found).take(np.arange(1))
+            self.found = Designs.joined([best, optima])
         return self
 
     def _descended(self, start: Array) -> Array:
@@ -151,8 +152,8 @@ class _Round:
         return start
 
     def _told(self, asked: "Asked") -> None:
-        """Count what a search asked; raises TimeIsUp where that is enough."""
-        from dpgcli.search.optima import TimeIsUp
+        """Count what a search asked; raises TimeIsUpError where that is enough."""
+        from dpgcli.search.optima import TimeIsUpError
 
         signs = [-1.0 if each.is_maximized else 1.0 for each in self.goal.objectives]
         names = [each.name for each in self.goal.objectives]
@@ -169,7 +170,7 @@ class _Round:
         self.limits.n_evaluated += len(asked.searches) * (2 * len(self.goal.ranges) + 1)
         if not self.limits.may_go_on():
             self.is_stopped = True
-            raise TimeIsUp
+            raise TimeIsUpError
 
     def _row(self, number: int, step: Step) -> Columns:
         known = ~np.isnan(step.misfits)

@@ -5,8 +5,9 @@ Review 40, 1998, 110); `states.sensitivities` brings it on to the states. Quanti
 listed here have no exact slope.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from dpgcli.arrays import COMPLEX_STEP, Array, Indices, total
 from dpgcli.design.dimensions import Design, Sizes
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import Gripper, Scene, Step
+from dpgcli.states.certify import Settled
 from dpgcli.states.sensitivities import Sensitivities, sensitivities
-from dpgcli.states.settle import Settled
 from dpgcli.states.tip import tip
 from dpgcli.states.uncertainty import aperture_slopes, aperture_steps
 
@@ -27,13 +28,13 @@ def key_steps(design: Design, values: Sizes, keys: Sequence[str], designs: Indic
 
 
 def _step(design: Design, key: str, value: Array, designs: Indices) -> Step:
-    moved = design.with_values({key: value + 1j * COMPLEX_STEP})
+    moved = design.with_values({key: cast("Array", value + 1j * COMPLEX_STEP)})
     scene = resolve(moved).batch(designs)
     arrays = {**scene.finger.arrays(), **scene.finger.conditions()}
     changes = {name: _imaginary(part) for name, part in arrays.items() if np.iscomplexobj(part)}
     gripper = scene.gripper or Gripper(0.0, 0.0)
-    placed = (gripper.base_spacing, gripper.mounting_angle, _layer(scene))
-    return Step(key, changes, *map(_imaginary, placed))
+    spacing, angle = _imaginary(gripper.base_spacing), _imaginary(gripper.mounting_angle)
+    return Step(key, changes, spacing, angle, _imaginary(_layer(scene)))
 
 
 def _layer(scene: Scene) -> float | Array:
@@ -41,7 +42,7 @@ def _layer(scene: Scene) -> float | Array:
 
 
 def _imaginary(values: float | Array) -> Array:
-    return np.asarray(np.imag(values) / COMPLEX_STEP)
+    return np.asarray(np.asarray(values).imag / COMPLEX_STEP)
 
 
 @dataclass(frozen=True)

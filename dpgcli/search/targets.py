@@ -1,13 +1,12 @@
-"""Targets of many designs at once: by how much each is missed, and how that changes with the keys."""
+"""Targets of many designs at once: how far each is missed, and how that changes with the keys."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Codes, Columns, Flags, Indices, distinct
+from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.dimensions import UNITS, Design
 from dpgcli.design.resolve import resolve
 from dpgcli.errors import NothingSelectedError
@@ -176,9 +175,7 @@ class _Batch:
         n, k = self.n_designs, len(ranges)
         columns = {key: np.tile(column, 2 * k) for key, column in self.values.items()}
         for place, each in enumerate(ranges):
-            middle = np.clip(
-                self.values[each.key], each.low + step[place], each.high - step[place]
-            )
+            middle = np.clip(self.values[each.key], each.low + step[place], each.high - step[place])
             for way in (0, 1):
                 part = slice((2 * place + way) * n, (2 * place + way + 1) * n)
                 columns[each.key][part] = middle + (step[place] if way else -step[place])

@@ -114,9 +114,7 @@ def groups_of(designs: Indices, size: int) -> Iterator[Indices]:
         yield designs[first : first + size]
 
 
-def placement(
-    scene: Scene, n_designs: int, lanes: Indices
-) -> tuple[Gripper | None, float | Array]:
+def placement(scene: Scene, n_designs: int, lanes: Indices) -> tuple[Gripper | None, float | Array]:
     """The gripper and the layer's thickness of each lane's design."""
 
     def of_lanes(values: float | Array) -> Array:

@@ -349,8 +349,8 @@ def value_columns(space: Space) -> dict[str, Column]:
 def short_names(keys: Sequence[str]) -> dict[str, str]:
     """Names of columns for keys: the last part where that is enough.
 
-    >>> short_names(["finger.units", "finger.overrides.4-5.geometry.dome_height_mm"])["finger.units"]
-    'units'
+    >>> [*short_names(["finger.units", "finger.overrides.4.lattice.stroke_mm"]).values()]
+    ['units', 'finger.overrides.4.lattice.stroke_mm']
     """
     last = [key.rsplit(".", 1)[-1] for key in keys]
     return {

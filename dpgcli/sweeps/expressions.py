@@ -154,6 +154,27 @@ def margins(rule: Expression) -> tuple[Expression, ...]:
     return () if found is None else tuple(expression(ast.unparse(node)) for node in found)
 
 
+def contradict(first: Expression, second: Expression) -> bool:
+    """Whether no number meets both, as far as each bounds one name by a number.
+
+    >>> contradict(expression("a > 2"), expression("a < 1")), contradict(*[expression("a > 2")] * 2)
+    (True, False)
+    >>> contradict(expression("a > 2"), expression("2 > a"))
+    True
+    """
+    if first.names != second.names or len(first.names) != 1:
+        return False
+    (name,) = first.names
+    low, high = -np.inf, np.inf
+    for margin in (*margins(first), *margins(second)):
+        at = [float(margin({name: x})) for x in (0.0, 1.0, 2.0)]
+        slope = at[1] - at[0]
+        if abs(slope) != 1.0 or at[2] - at[1] != slope:  # no bound of the name itself
+            return False
+        low, high = (max(low, -at[0]), high) if slope > 0.0 else (low, min(high, at[0]))
+    return bool(low > high or (low == high and not all(r({name: low}) for r in (first, second))))
+
+
 def _margins(node: ast.expr) -> list[ast.expr] | None:
     if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
         parts = [_margins(value) for value in node.values]

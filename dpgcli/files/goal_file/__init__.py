@@ -1,4 +1,4 @@
-"""The file of a goal: a base spec, what may vary around it, what states should be like."""
+"""The file of a goal: a base spec, what may vary around it, and what is asked of the designs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,26 +13,27 @@ from pydantic import ValidationError
 from dpgcli.design.dimensions import LINEAR_STIFFNESS, MAX_UNITS, UNITS, are_possible
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import beside
-from dpgcli.files.goal_file.models import MOST_TARGETS, VARIED, GoalSpec
+from dpgcli.files.goal_file.maps import MapReader
+from dpgcli.files.goal_file.models import ASKED, MOST_ASKED, VARIED, GoalSpec
 from dpgcli.files.goal_file.targets import TargetReader
 from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file import Spec
 from dpgcli.files.sweep_file import checked_base, read_base, varied
 from dpgcli.files.sweep_file.models import MOST_KEYS
-from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader
+from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader, numbers_of
 from dpgcli.files.yaml_file import Document, read_document
-from dpgcli.search.goal import Goal, Range
+from dpgcli.search.goal import Goal, Objective, Range, Target
+from dpgcli.sweeps.expressions import Expression
 from dpgcli.text import KeyPath
 
 __all__ = ["GoalFile", "goal_in", "goal_of", "read_goal"]
 
 MOST_CHOICES = 1000  # combinations of listed values
-MOST_STATES_UNITS = 16  # units of a finger all of whose states may match a pattern
 
 
 @dataclass(frozen=True)
 class GoalFile:
-    """A goal, its base spec, the data of that with what files hold, the files read, and its words."""
+    """A goal, its base spec, the data of that with what files hold, the files read, its words."""
 
     goal: Goal
     base: Spec
@@ -64,7 +65,8 @@ def goal_in(
     """
     problems = [*document.problems, *_form_problems(document)]
     base_path = beside(folder, str(document.data.get("base")))
-    base_spec, own = None, ()
+    base_spec: Spec | None = None
+    own: tuple[Path, ...] = ()
     if base is not None:
         base_spec = checked_base(base, problems)
     elif isinstance(document.data.get("base"), str):
@@ -72,23 +74,33 @@ def goal_in(
         own = (base_path,)
     reader = SpaceReader(document, folder, OPTIONAL if base is None else base.data)
     ranges, lists = _varied(reader, document.data.get("vary"))
-    targets = []
+    targets: list[Target | None] = []
+    constraints: tuple[Expression, ...] = ()
+    objectives: tuple[Objective, ...] = ()
+    known: dict[str, float] = {}
     if base_spec is not None:
         units = [int(n) for n in lists.get(UNITS, (base_spec.finger.units,))]
         possible = [n for n in units if 1 <= n <= MAX_UNITS]
         of_targets = TargetReader(reader, possible, base_spec.gripper is not None)
-        targets = [of_targets.target(*pair) for pair in _listed(document, "targets")]
+        targets = [of_targets.target(*pair) for pair in enumerate(_listed(document, "targets"))]
+        known = {} if base is None else numbers_of(base.data)
+        of_maps = MapReader(reader, base_spec.design, known)
+        constraints = of_maps.constraints(_listed(document, "constraints"))
+        objectives = of_maps.objectives(
+            _listed(document, "minimize"), _listed(document, "maximize")
+        )
     problems += [*reader.problems, *varied(settings, reader.keys)]
     if problems or base is None or base_spec is None:
         raise SpecError(in_order(problems))
-    goal = Goal(base_spec.design, ranges, lists, tuple(t for t in targets if t is not None))
+    right = tuple(target for target in targets if target is not None)
+    goal = Goal(base_spec.design, ranges, lists, right, constraints, objectives, known)
     files = tuple(dict.fromkeys((*own, *base.files)))
     return GoalFile(goal, base_spec, base, files, dict(document.data))
 
 
-def _listed(document: Document, key: str) -> Iterator[tuple[int, Any]]:
+def _listed(document: Document, key: str) -> list[Any]:
     said = document.data.get(key)
-    yield from enumerate(said if isinstance(said, list) else ())
+    return said if isinstance(said, list) else []
 
 
 def _form_problems(document: Document) -> Iterator[Problem]:
@@ -99,12 +111,14 @@ def _form_problems(document: Document) -> Iterator[Problem]:
         for found in error.errors(include_url=False):
             yield _form_problem(document, found)
         return
-    for key in ("vary", "targets"):
-        if not document.data[key]:
-            yield document.problem((key,), f"one of the {key} or more", "none")
-    if len(document.data["targets"]) > MOST_TARGETS:
-        n = f"{len(document.data['targets']):,}"
-        yield document.problem(("targets",), f"at most {MOST_TARGETS} targets", n)
+    if not document.data["vary"]:
+        yield document.problem(("vary",), "a key or more", "none")
+    asked = {key: len(_listed(document, key)) for key in ASKED}
+    if not sum(asked.values()):
+        yield document.problem(("targets",), f"one or more of {', '.join(ASKED)}", "none")
+    for key, n in asked.items():
+        if n > MOST_ASKED:
+            yield document.problem((key,), f"at most {MOST_ASKED} {key}", f"{n:,}")
 
 
 def _form_problem(document: Document, found: Any) -> Problem:
@@ -159,12 +173,12 @@ def _are_values(reader: SpaceReader, path: KeyPath, key: str, values: list[Any])
     return _are_possible(reader, path, key, values)
 
 
-def _ends(
-    reader: SpaceReader, path: KeyPath, key: str, said: Any
-) -> tuple[float, float] | None:
+def _ends(reader: SpaceReader, path: KeyPath, key: str, said: Any) -> tuple[float, float] | None:
     """Both ends of a range; None, with a problem, where it is none."""
     if not (isinstance(said, dict) and set(said) == {"from", "to"}):
-        found = f"keys {', '.join(map(str, said)) or 'none'}" if isinstance(said, dict) else shown(said)
+        found = (
+            f"keys {', '.join(map(str, said)) or 'none'}" if isinstance(said, dict) else shown(said)
+        )
         reader.wrong(path, VARIED, found)
         return None
     for end, value in said.items():

@@ -13,6 +13,8 @@ from dpgcli.search.goal import OF_TIP, TIP, Target, state_quantities, suffix_of
 from dpgcli.states.patterns import select
 from dpgcli.text import KeyPath, quoted
 
+MOST_STATES = 2**12  # of a finger, among which the nearest is looked for
+
 
 @dataclass
 class TargetReader:
@@ -43,7 +45,7 @@ class TargetReader:
                 self.space.wrong((*path, key), "a known key", shown(key), hint)
         values = self._values(path, said.get("value"), 2 if quantity == TIP else 1)
         tolerance = said.get(tolerance_key)
-        if not (_is_number(tolerance) and tolerance > 0):
+        if not (_is_number(tolerance) and float(tolerance or 0.0) > 0.0):
             self.space.wrong((*path, tolerance_key), "a number > 0", shown(tolerance))
         self._check_pattern((*path, "pattern"), said.get("pattern"))
         if len(self.space.problems) > n_before:
@@ -77,19 +79,23 @@ class TargetReader:
             self.space.wrong(path, "a pattern such as 111*", shown(pattern), hint)
             return
         try:
-            if self.n_units and not any(self._matches(pattern)):
+            n_states = max(self._n_matches(pattern), default=1)
+            if not n_states:
                 expected = f"a pattern of {' or '.join(map(str, self.n_units))} units"
                 self.space.wrong(path, expected, shown(pattern))
+            elif n_states > MOST_STATES:
+                expected = f"a pattern that at most {MOST_STATES:,} states match"
+                self.space.wrong(path, expected, f"{shown(pattern)}, of {n_states:,}")
         except UsageError as error:
             self.space.wrong(path, "a pattern such as 111*", quoted(pattern), str(error))
 
-    def _matches(self, pattern: str) -> Iterator[bool]:
-        """Whether fingers of each number of units have such a pattern. Raises UsageError."""
+    def _n_matches(self, pattern: str) -> Iterator[int]:
+        """How many such patterns fingers of each number of units have. Raises UsageError."""
         for n_units in self.n_units:
             try:
-                yield bool(select((pattern,), n_units))
+                yield len(select((pattern,), n_units))
             except NothingSelectedError:
-                yield False
+                yield 0
 
 
 def _is_number(value: Any) -> bool:
