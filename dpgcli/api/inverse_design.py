@@ -19,7 +19,7 @@ from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
 from dpgcli.search.goal import state_quantities
-from dpgcli.search.maps import MapEvaluation, map_columns
+from dpgcli.search.maps import map_columns
 from dpgcli.search.search import Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
 from dpgcli.search.targets import TargetEvaluation
@@ -101,9 +101,7 @@ class InverseDesignResult:
         )
         empty = f", {found.n_empty:,} of them without such states" if found.n_empty else ""
         yield f"{tried}{empty}{'; stopped by the limit' if found.is_stopped else ''}"
-        sloped = (*TargetEvaluation(goal).by_differences, *sorted(MapEvaluation(goal).names))
-        if said := how_slopes_are_found(sloped if goal.ranges else ()):
-            yield said
+        yield from how_slopes_are_found(goal) if goal.ranges else ()
 
     @property
     def _tables(self) -> GoalTables:

@@ -48,7 +48,7 @@ def write_designs(
             described = with_bases(schema(columns), metadata)
             write_table(folder / name, described, [record_batch(columns, rows)], metadata)
         for number, (path, spec) in enumerate(own.items(), start=1):
-            write_spec(path, spec, f"design {number} of {folder / tables[0][0]}")
+            write_spec(path, spec, f"design {number} of {tables[0][0]}")
         with writing(folder):
             for path in folder.iterdir():
                 is_old = SPEC_NAME.fullmatch(path.name) and path not in own

@@ -5,7 +5,7 @@ min t with w (f − z) <= t for each: with other weights, to other points of the
 dents included (Miettinen, Nonlinear Multiobjective Optimization, 1999, section 3.4).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -18,10 +18,15 @@ from dpgcli.search.lockstep import Ask, in_lockstep
 
 ROOM = 1e-6  # of its size, by which a margin is kept above zero: rounding must not break a rule
 NOWHERE = 1e3  # objective and lack of margin, in their sizes, where there is no such finger
-PRECISION = 1e-10
-MOST_STEPS = 100
+PRECISION = 1e-9
+MOST_STEPS = 50
+MOST_ASKED = 100  # points of a search: on the kinks of extremes it would turn about for long
 MOST_WEIGHTS = 15
-HALVINGS = 20
+HALVINGS = 12  # of the way: where a count changes is found to so much
+
+
+class _EnoughError(Exception):
+    """A search has asked often enough."""
 
 
 class Local(NamedTuple):
@@ -99,7 +104,8 @@ def _search(ask: Ask[Local], start: Array, scalar: Scalar, sizes: Array) -> Arra
         point = np.clip(x[:n], 0.0, 1.0)
         key = point.tobytes()
         if key not in asked:
-            asked.clear()
+            if len(asked) == MOST_ASKED:
+                raise _EnoughError
             asked[key] = _somewhere(ask(point))
         return asked[key]
 
@@ -132,10 +138,29 @@ def _search(ask: Ask[Local], start: Array, scalar: Scalar, sizes: Array) -> Arra
     has_rules = several or len(at(start).margins)
     rules = [{"type": "ineq", "fun": room, "jac": room_slopes}] if has_rules else []
     options = {"maxiter": MOST_STEPS, "ftol": PRECISION}
-    found = minimize(  # type: ignore[call-overload]  # whose stubs take fewer arrays than it does
-        value, begin, jac=slope, bounds=bounds, constraints=rules, method="SLSQP", options=options
-    )
+    try:
+        found = minimize(  # type: ignore[call-overload]  # whose stubs take fewer arrays
+            value,
+            begin,
+            jac=slope,
+            bounds=bounds,
+            constraints=rules,
+            method="SLSQP",
+            options=options,
+        )
+    except _EnoughError:
+        return _least(asked, scalar, sizes)
     return np.asarray(np.clip(found.x[:n], 0.0, 1.0))
+
+
+def _least(asked: Mapping[bytes, Local], scalar: Scalar, sizes: Array) -> Array:
+    """The best point of those that were asked about: that lacks least, and is least of these."""
+
+    def rank(point: bytes) -> tuple[float, float]:
+        rooms = asked[point].margins / sizes
+        return float(np.maximum(-rooms, 0.0).sum()), float(scalar.of(asked[point].objectives))
+
+    return np.frombuffer(min(asked, key=rank))
 
 
 def _somewhere(here: Local) -> Local:

@@ -1,11 +1,12 @@
 """Least squares in a box, many searches at once: Levenberg and Marquardt's method, batched.
 
 A step solves (JᵀJ + λ μ I) p = −Jᵀr for the coordinates that are free, μ being the mean of their
-diagonal, and is cut at the box; coordinates on a bound that the gradient pushes against are left
-there (Nocedal and Wright, Numerical Optimization, 2nd ed., 2006, section 10.3 and 16.7). λ falls
-where a step reduces the sum of squares, and grows where it does not, or where there is no finger
-with that state: then r is NaN. SciPy's least_squares takes one start at a time: sixteen of them
-cost as much as a thousand here, since a batch costs about the same for any small number of lanes.
+diagonal, and is cut at the box; coordinates on a bound that the gradient pushes against stay there
+(Nocedal and Wright, Numerical Optimization, 2nd ed., 2006, sections 10.3 and 16.7). λ falls with
+the share that comes of what a step promises (Madsen, Nielsen and Tingleff, Methods for Non-Linear
+Least Squares Problems, 2nd ed., 2004, section 3.2), and grows where a step does not help, or where
+there is no finger with that state: then r is NaN. SciPy's least_squares takes one start at a time,
+and each of its evaluations costs as much as one of all starts here.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e9
+LOWERED, RAISED = 0.1, 4.0  # factors of λ
 MOST_STEPS = 100
 EXACT = 1e-24  # sum of squares in tolerances: below it, rounding of the states decides
 SMALLEST_STEP = 1e-13  # of the box
@@ -69,7 +71,7 @@ class Descent:
     @property
     def misfits(self) -> Array:
         """The norm of each search's residuals; NaN where there are none."""
-        return np.sqrt((self.values**2).sum(axis=0))
+        return np.asarray(np.sqrt((self.values**2).sum(axis=0)))
 
     @property
     def gradient(self) -> Array:
@@ -87,11 +89,18 @@ class Descent:
         downhill = -np.einsum("pil,pl->li", slopes, self.values[:, lanes])
         return np.asarray(np.linalg.solve(curved, downhill[..., None])[..., 0].T)
 
+    def _promised(self, lanes: Indices, step: Array) -> Array:
+        """By how much the sum of squares should fall, the residuals being straight, (lane,)."""
+        values, changes = self.values[:, lanes], (self.slopes[..., lanes] * step).sum(axis=1)
+        fall = (values**2).sum(axis=0) - ((values + changes) ** 2).sum(axis=0)
+        return np.maximum(fall, np.finfo(float).tiny)
+
     def step(self, evaluate: Evaluate) -> Step:
         """One step of all searches under way, those that it does not help aside."""
         lanes = np.flatnonzero(~self.is_done)
         here = self.points[:, lanes]
         there = np.clip(here + self._steps(lanes), 0.0, 1.0)
+        promised = self._promised(lanes, there - here)
         values, slopes = evaluate(there, lanes)
         before = (self.values[:, lanes] ** 2).sum(axis=0)
         after = (values**2).sum(axis=0)
@@ -100,7 +109,9 @@ class Descent:
         self.points[:, taken] = there[:, is_better]
         self.values[:, taken] = values[:, is_better]
         self.slopes[..., taken] = slopes[..., is_better]
-        factor = np.where(is_better, 0.1, 10.0)
+        factor = np.where(
+            is_better, _factor(np.clip(before - after, 0.0, promised) / promised), RAISED
+        )
         damping = np.maximum(self.damping[lanes] * factor, LEAST_DAMPING)
         self.damping[lanes] = damping
         is_small = np.abs(there - here).max(axis=0) <= SMALLEST_STEP
@@ -108,6 +119,11 @@ class Descent:
         is_exact = is_better & (after <= EXACT)
         self.is_done[lanes] = is_small | gains_little | is_exact | (damping > MOST_DAMPING)
         return Step(taken, self.points[:, taken], self.misfits[taken])
+
+
+def _factor(share: Array) -> Array:
+    """By what λ changes with the share of the promised fall that came; at least `LOWERED`."""
+    return np.maximum(1.0 - (2.0 * share - 1.0) ** 3, LOWERED)
 
 
 def descend(

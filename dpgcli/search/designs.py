@@ -63,7 +63,7 @@ class Designs:
         ends = np.cumsum([len(target.values) for target in goal.targets])[:-1]
         parts = np.split(self.residuals.values, ends) if goal.targets else []
         found = [np.sqrt((part**2).sum(axis=0)) for part in parts]
-        return np.array(found).reshape(-1, len(self))
+        return np.array(found).reshape(len(goal.targets), len(self))
 
     @property
     def exist(self) -> Flags:
@@ -132,7 +132,7 @@ def best_of(goal: Goal, every: Designs) -> Designs:
         front = met[_on_front(every.objectives[:, met].T)]
         every, most = every.take(front), MOST_ON_FRONT
         broken, keys = broken[front], [key[front] for key in keys]
-    listed = np.array([*every.choice.values()], float).reshape(-1, len(every))
+    listed = np.array([*every.choice.values()], float).reshape(len(every.choice), len(every))
     ties = (*np.round(every.points, 6)[::-1], *listed[::-1])
     order = np.lexsort((*ties, *keys[::-1], broken))
     kept: list[int] = []

@@ -56,16 +56,30 @@ class MapEvaluation:
         found = (margin for rule in self.goal.constraints for margin in margins(rule))
         return tuple(margin for margin in found if not margin.names & COUNTS)
 
-    def columns(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        """Columns that matter, and values by key and by the last part of keys, (design,)."""
+    @cached_property
+    def sloped(self) -> frozenset[str]:
+        """Columns that searches follow: those of margins that are smooth, and of objectives."""
+        said = {name for margin in self.smooth for name in margin.names}
+        return self.names & (said | {objective.name for objective in self.goal.objectives})
+
+    def keys(self, values: Mapping[str, Array]) -> dict[str, Any]:
+        """Values by key and by the last part of keys, those of the base among them."""
         known = {**self.goal.known, **values}
-        found: dict[str, Any] = {
-            **{key.rsplit(".", 1)[-1]: value for key, value in known.items()},
-            **known,
-        }
-        if not self.names:
-            return found
-        return found | map_columns(self.goal.base, self.names, values)
+        return {**{key.rsplit(".", 1)[-1]: value for key, value in known.items()}, **known}
+
+    def columns(
+        self, values: Mapping[str, Array], names: Collection[str] | None = None
+    ) -> dict[str, Array]:
+        """Columns that matter, or those of these names, and values by key, (design,)."""
+        wanted = self.names if names is None else names
+        found = map_columns(self.goal.base, wanted, values) if wanted else {}
+        return self.keys(values) | found
+
+    def margins(self, columns: Mapping[str, Array], n_designs: int) -> Array:
+        """How far smooth constraints are from their limits, (margin, design)."""
+        with np.errstate(invalid="ignore"):
+            rows = [np.broadcast_to(np.asarray(m(columns), float), n_designs) for m in self.smooth]
+        return np.array(rows).reshape(len(rows), n_designs)
 
     def hold(self, columns: Mapping[str, Array]) -> Flags:
         """Which constraints hold, (constraint, design)."""
@@ -86,7 +100,7 @@ class MapEvaluation:
             np.broadcast_to(columns[each.name] * (-1.0 if each.is_maximized else 1.0), n_designs)
             for each in self.goal.objectives
         ]
-        return np.array(rows, float).reshape(-1, n_designs)
+        return np.array(rows, float).reshape(len(rows), n_designs)
 
     def __call__(self, values: Mapping[str, Array]) -> Maps:
         """Objectives, margins and their slopes, of designs with these values by key."""
@@ -99,12 +113,9 @@ class MapEvaluation:
             first = (2 * place + 1) * n
             stacked[each.key][first : first + n] = middle - step
             stacked[each.key][first + n : first + 2 * n] = middle + step
-        columns = self.columns(stacked)
-        whole = (2 * k + 1) * n
-        with np.errstate(invalid="ignore"):
-            rules = [np.broadcast_to(np.asarray(m(columns), float), whole) for m in self.smooth]
-        found = np.array(rules).reshape(-1, whole)
-        return Maps(*_sloped(self.objectives(columns), k, n), *_sloped(found, k, n))
+        columns = self.columns(stacked, self.sloped)
+        rooms = self.margins(columns, (2 * k + 1) * n)
+        return Maps(*_sloped(self.objectives(columns), k, n), *_sloped(rooms, k, n))
 
 
 def _sloped(rows: Array, k: int, n: int) -> tuple[Array, Array]:
@@ -126,7 +137,8 @@ def map_columns(
     if not any(metric.group is Group.GRASP for metric in used):
         base = replace(base, body=None)
     columns = {key: Column(key, unit_of(key), f"value of {key}") for key in values}
-    blocks = [tables.designs for tables in evaluation_of(base, columns)(0, values)]
+    evaluation = replace(evaluation_of(base, columns), only=frozenset(names))
+    blocks = [tables.designs for tables in evaluation(0, values)]
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in (*names, "status")}
     stable, partly, *_ = (status.encode() for status in DesignStatus)
     is_there = (rows["status"] == stable) | (rows["status"] == partly)

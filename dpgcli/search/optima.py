@@ -82,14 +82,17 @@ class Optima:
     def found(self) -> Designs:
         """The designs that searches end in; they begin at the best of each choice."""
         known, goal = self.known, self.goal
-        here = self.evaluate(known.points, known.choice)
-        objectives = np.stack([each.objectives for each in here], axis=1)
-        margins = np.stack([each.margins for each in here], axis=1)
-        sizes = np.nanmedian(np.abs(margins), axis=1) if margins.size else np.ones(len(margins))
-        sizes = np.where(sizes > TINY, sizes, 1.0)
+        maps = MapEvaluation(goal)
+        columns = maps.keys(goal.values(known.choice, known.points)) | {**known.columns}
+        objectives, margins = known.objectives, maps.margins(columns, len(known))
+        if not goal.objectives:
+            objectives = 0.5 * known.misfits[None] ** 2
+        elif goal.targets:
+            margins = np.concatenate((margins, 1.0 - known.misses(goal) ** 2))
+        sizes = np.array([_size(row) for row in margins])
         lack = np.maximum(-margins / sizes[:, None], 0.0).sum(axis=0) + (~known.hold).sum(axis=0)
         n = len(objectives)
-        spread = np.nanmax(objectives, axis=1) - np.nanmin(objectives, axis=1)
+        spread = np.ptp(objectives, axis=1)
         spread = np.where(spread > TINY, spread, 1.0)
         alone = [Scalar(row / spread, np.zeros(n)) for row in np.eye(n)]
         ends = self._run(alone, STARTS_EACH, objectives, lack, sizes)
@@ -114,7 +117,7 @@ class Optima:
     ) -> Designs:
         """Where searches end that begin, for each scalar and choice, at the best known designs."""
         known, goal = self.known, self.goal
-        listed = np.array([*known.choice.values()], float).reshape(-1, len(known))
+        listed = np.array([*known.choice.values()], float).reshape(len(known.choice), len(known))
         choices = np.unique(listed, axis=1, return_inverse=True)[1].reshape(-1)
         lanes: list[int] = []
         own: list[Scalar] = []
@@ -148,3 +151,10 @@ class Optima:
                 ends,
             )
         return Designs.at(goal, begin.choice, ends)
+
+
+def _size(margins: Array) -> float:
+    """The usual size of a margin."""
+    known = np.abs(margins[np.isfinite(margins)])
+    size = float(np.median(known)) if len(known) else 0.0
+    return size if size > TINY else 1.0

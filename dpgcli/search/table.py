@@ -118,7 +118,8 @@ class GoalTables:
         rows: Columns = {"design": np.arange(1, n + 1)}
         rows |= {name: values[key] for key, name in short_names(goal.keys).items()}
         for column in self.map_columns:
-            rows[column.name] = np.array([each.columns[column.name] for each in reached])
+            kind = np.int64 if column.kind is Kind.COUNT else np.float64
+            rows[column.name] = np.array([each.columns[column.name] for each in reached], kind)
         rows["misfit"] = np.sqrt(((misses / tolerances) ** 2).sum(axis=1))
         is_met = (misses <= tolerances).all(axis=1)
         rows["meets_all"] = np.asarray(is_met & designs.hold.all(axis=0))

@@ -8,7 +8,8 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal
-from dpgcli.search.maps import MapEvaluation
+from dpgcli.search.maps import COUNTS, MapEvaluation
+from dpgcli.search.targets import TargetEvaluation
 from dpgcli.sweeps.evaluation import short_names
 from dpgcli.sweeps.expressions import margins
 from dpgcli.text import enumerated
@@ -154,8 +155,12 @@ class Standing:
         return wishes[int(first)].name, wishes[int(second)].name
 
 
-def how_slopes_are_found(names: Sequence[str]) -> str:
-    """That some slopes are not exact; empty where all are."""
-    if not names:
-        return ""
-    return f"slopes of {enumerated(names)} by central differences: there are no exact ones"
+def how_slopes_are_found(goal: Goal) -> Iterator[str]:
+    """Which slopes are not exact, and what has none."""
+    maps = MapEvaluation(goal)
+    names = [*TargetEvaluation(goal).by_differences, *sorted(maps.sloped - COUNTS)]
+    if names:
+        yield f"slopes of {enumerated(names)} by central differences: there are no exact ones"
+    if counts := sorted(maps.names & COUNTS):
+        kept = "searches do not follow counts, but stay where these hold"
+        yield f"{enumerated(counts)}: {kept}"

@@ -1,6 +1,6 @@
 """Many designs at once: all states of each in bounded blocks, and their metrics."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +35,11 @@ def design_states(
     scene: Scene,
     exactness: Exactness,
     quantities: tuple[Quantity, ...],
+    only: Collection[str] | None = None,
 ) -> Iterator[Block]:
     """All states of a batch of designs, design by design, in blocks; with a body, if there is one.
+
+    The metrics are all, or `only` those of these names.
 
     A block holds up to `ROWS_AT_ONCE` states, of several designs or of one: how long one is cut
     depends on its number of units alone.
@@ -74,7 +77,7 @@ def design_states(
             rows = joined_rows(parts)
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
-            yield Block(designs, rows, metrics.columns() if is_last else None)
+            yield Block(designs, rows, metrics.columns(only) if is_last else None)
 
 
 def _with_body(

@@ -47,7 +47,8 @@ class DesignEvaluation:
     `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
     a design that has a value which its key cannot have, from its values. `values` are the columns
     of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest level
-    that is bounded by it.
+    that is bounded by it. The metrics are all, or `only` those of these names and the counts of
+    states.
     """
 
     base: Design
@@ -57,6 +58,7 @@ class DesignEvaluation:
     constraints: tuple[Expression, ...]
     tolerance: float
     target_error: float | None = None
+    only: frozenset[str] | None = None
 
     @property
     def groups(self) -> frozenset[Group]:
@@ -94,9 +96,14 @@ class DesignEvaluation:
             for c in METRICS
             if c.group in self.groups and (c.group is not Group.GRASP or c.over in of_body)
         )
-        metrics = (c for c in every if has_pressure or not c.needs_pressure)
+        there = (c for c in every if has_pressure or not c.needs_pressure)
+        metrics = (c for c in there if self._told is None or c.name in self._told)
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
+
+    @property
+    def _told(self) -> frozenset[str] | None:
+        return None if self.only is None else self.only | COUNTS_OF_STATES
 
     def __call__(self, start: int, values: DesignValues) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
@@ -232,7 +239,7 @@ class DesignEvaluation:
         found = exactnesses(UnitSolutions.of(scene.finger), self.tolerance, self.target_error)
         for some, exactness in found:
             alike = scene if len(some) == len(places) else scene.take_lanes(some)
-            for block in design_states(alike, exactness, self.quantities):
+            for block in design_states(alike, exactness, self.quantities, self._told):
                 if block.metrics is not None and exactness.accuracy_level is not None:
                     name = np.full(len(block.places), exactness.accuracy_level.name, "S24")
                     block.metrics["accuracy_level"] = name
@@ -308,6 +315,7 @@ NO_FACE = (
 )
 IN_BASE = "object: begins in the base of a finger: move it along x, or take a smaller one"
 
+COUNTS_OF_STATES = frozenset({"n_states", "n_stable"})  # by which a design has its status
 DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
 CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)
 STATUS = Column("status", "", "what became of the design", kind=Kind.TEXT)

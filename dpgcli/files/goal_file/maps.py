@@ -79,10 +79,10 @@ class MapReader:
         return tuple(found.values())
 
     def _is_known(self, path: KeyPath, name: Any) -> bool:
-        if name in self.names:
+        if isinstance(name, str) and name in self.names:
             return True
         every = {metric.name: metric for metric in METRICS if metric.kind in NUMBERS}
-        if name in every:
+        if isinstance(name, str) and name in every:
             needs = "pressure" if every[name].needs_pressure else every[name].group.value
             section = {"grasp": "object"}.get(needs, needs)
             hint = f"the base has no {section}"
