@@ -93,7 +93,7 @@ class Descent:
         """By how much the sum of squares should fall, the residuals being straight, (lane,)."""
         values, changes = self.values[:, lanes], (self.slopes[..., lanes] * step).sum(axis=1)
         fall = (values**2).sum(axis=0) - ((values + changes) ** 2).sum(axis=0)
-        return np.maximum(fall, np.finfo(float).tiny)
+        return np.asarray(np.maximum(fall, np.finfo(float).tiny))
 
     def step(self, evaluate: Evaluate) -> Step:
         """One step of all searches under way, those that it does not help aside."""

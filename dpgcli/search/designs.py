@@ -14,8 +14,9 @@ from dpgcli.search.maps import MapEvaluation
 from dpgcli.search.targets import TargetEvaluation
 
 MOST_FOUND = 10
-MOST_ON_FRONT = 50
+MOST_ON_FRONT = 100
 ALIKE = 1e-6  # of the box: closer designs are one
+GRAIN = 1e-2  # of a front's span: points closer in each objective are one
 SAME = 1e-6  # which of two is less by so little says nothing
 
 
@@ -127,11 +128,13 @@ def best_of(goal: Goal, every: Designs) -> Designs:
     if goal.objectives:
         keys.append(every.objectives[0])
     most = MOST_FOUND
-    if len(goal.objectives) > 1 and (broken == 0).any():
+    is_front = len(goal.objectives) > 1 and bool((broken == 0).any())
+    if is_front:
         met = np.flatnonzero(broken == 0)
         front = met[_on_front(every.objectives[:, met].T)]
         every, most = every.take(front), MOST_ON_FRONT
         broken, keys = broken[front], [key[front] for key in keys]
+    grain = GRAIN * np.ptp(every.objectives, axis=1)[:, None] if is_front else 0.0
     listed = np.array([*every.choice.values()], float).reshape(len(every.choice), len(every))
     ties = (*np.round(every.points, 6)[::-1], *listed[::-1])
     order = np.lexsort((*ties, *keys[::-1], broken))
@@ -140,7 +143,11 @@ def best_of(goal: Goal, every: Designs) -> Designs:
         if len(kept) == most:
             break
         apart = np.abs(every.points[:, kept] - every.points[:, [place]]).max(axis=0, initial=0.0)
-        if not ((listed[:, kept] == listed[:, [place]]).all(axis=0) & (apart <= ALIKE)).any():
+        alike = (listed[:, kept] == listed[:, [place]]).all(axis=0) & (apart <= ALIKE)
+        if is_front:
+            beside = np.abs(every.objectives[:, kept] - every.objectives[:, [place]])
+            alike |= (beside <= grain).all(axis=0)
+        if not alike.any():
             kept.append(place)
     return every.take(np.array(kept, np.int64))
 

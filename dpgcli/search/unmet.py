@@ -134,11 +134,10 @@ class Standing:
         k = int(gain.argmax())
         each = self.goal.ranges[k]
         end = (each.high if outward[k] > 0.0 else each.low) + SHARE * each.width * outward[k]
-        left = wish.amount(max(wish.lack - float(gain[k]), 0.0))
-        yield (
-            f"in the way: {self._bound(k)}; with {end:.4g} {wish.name} would lack about {left} "
-            f"instead of {wish.amount(wish.lack)}"
-        )
+        left = wish.lack - float(gain[k])
+        lacking = f"would lack about {wish.amount(left)} instead of {wish.amount(wish.lack)}"
+        what = "could be met" if left <= 0.0 else lacking
+        yield f"in the way: {self._bound(k)}; with {end:.4g} {wish.name} {what}"
 
     def _contradiction(self, wishes: Sequence[Wish]) -> tuple[str, str] | None:
         """What pulls most against something that is not met, within the bounds."""
