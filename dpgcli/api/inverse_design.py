@@ -22,7 +22,7 @@ from dpgcli.search.goal import state_quantities
 from dpgcli.search.maps import map_columns
 from dpgcli.search.search import Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
-from dpgcli.search.targets import TargetEvaluation
+from dpgcli.search.targets import TargetEvaluation, reason_against
 from dpgcli.search.unmet import how_slopes_are_found
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import inverted_units, texts
@@ -170,7 +170,7 @@ def found_for(
     given: GoalFile, seed: int = 1, evaluations: int | None = None, budget: float | None = None
 ) -> InverseDesignResult:
     """The same, of a goal that was read before."""
-    if seed < 0:
+    if seed is None or seed < 0:
         raise UsageError(Field("seed"), f" {seed}: expected a whole number from 0 on")
     if evaluations is not None and evaluations < 1:
         raise UsageError(Field("evaluations"), f" {evaluations}: expected 1 design or more")
@@ -182,7 +182,9 @@ def found_for(
     if not len(best):
         patterns = ", ".join(dict.fromkeys(target.pattern for target in given.goal.targets))
         n, of = counted(searched.n_starts, "start"), f" of {patterns}" if patterns else ""
-        raise NothingSelectedError(f"none of {n} is a finger with certified states{of}")
+        why = reason_against(given.goal)
+        because = f": {why}" if why else ""
+        raise NothingSelectedError(f"none of {n} is a finger with certified states{of}{because}")
     values = given.goal.values(best.choice, best.points)
     designs = [
         {key: _plain(key, column[k]) for key, column in values.items()} for k in range(len(best))

@@ -109,9 +109,12 @@ class _Round:
     def run(self, stream: np.random.Generator) -> "_Round":
         """Search from drawn starts, to where each search ends or time is up."""
         points = self._starts(stream)
-        if self.goal.targets:
+        if self.goal.targets and self.goal.ranges:
             points = self._descended(points)
         found = Designs.at(self.goal, self.lists, points)
+        if not self.trace:
+            self.limits.n_evaluated += len(found)
+            self.trace.append(self._row(0, Step(np.arange(len(found)), points, found.misfits)))
         self.begin = self._row(0, Step(np.arange(0), points[:, :0], np.zeros(0)))
         self.n_empty = int((~found.exist).sum())
         self.found = found.take(np.flatnonzero(found.exist))

@@ -188,6 +188,14 @@ class _Batch:
         return slopes
 
 
+def reason_against(goal: Goal) -> str:
+    """What is wrong with the design in the middle of all ranges; empty where it can exist."""
+    middle = goal.values(next(goal.choices()), np.full((len(goal.ranges), 1), 0.5))
+    values = {key: np.atleast_1d(column) for key, column in middle.items()}
+    ((_, design),) = by_units(goal.base, values, np.zeros(1, np.int64))
+    return "; ".join(issue.statement for issue in resolve(design).problems.of(0))
+
+
 def _matching(target: Target, n_units: int) -> Codes:
     """Codes of the states of so many units that match a target's pattern."""
     try:

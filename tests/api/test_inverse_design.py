@@ -143,6 +143,16 @@ def test_no_finger_with_such_states(goal: Callable[..., Goal]) -> None:
         dpg.inverse_design(given)
 
 
+def test_why_no_design_can_exist_is_said(goal: Callable[..., Goal]) -> None:
+    """Where the geometry has a stroke, too, another is refused."""
+    given = goal()
+    sizes = ("dome_height_mm", 6.5), ("unit_separation_mm", 3.0)
+    given["base"]["finger"]["geometry"] = {**dict(sizes)}
+    given["vary"] = {STROKE: {"from": 3.6, "to": 4.0}}
+    with pytest.raises(NothingSelectedError, match=r"stroke_mm: expected 3\.5"):
+        dpg.inverse_design(given)
+
+
 @pytest.mark.parametrize(
     ("choice", "field"), [({"seed": -1}, "seed"), ({"evaluations": 0}, "evaluations"),
                           ({"budget": 0.0}, "budget"), ({"budget": float("nan")}, "budget")]

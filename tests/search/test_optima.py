@@ -172,7 +172,12 @@ def test_listed_values_are_all_tried_and_the_best_comes_first(goal: Make) -> Non
     made = goal("vary: {finger.units: [2, 3, 4]}\nmaximize: [reach_max_mm]", base="three_unit")
     found = search(made)
     assert found.best.choice["finger.units"].tolist() == [4, 3, 2]
-    assert found.n_starts == 3
+    assert found.n_starts == found.n_evaluated == 3
+    target = "targets: [{pattern: '11*', quantity: tip, value: [37, -10], tolerance_mm: 0.5}]\n"
+    found = search(goal(f"vary: {{finger.units: [2, 3, 4]}}\n{target}", base="three_unit"))
+    assert found.best.choice["finger.units"][0] == 3
+    assert (np.diff(found.best.misfits) > 0.0).all()
+    assert sorted(found.trace["misfit"]) == found.best.misfits.tolist()
 
 
 def test_a_limit_stops_searches_and_what_was_found_stays(goal: Make) -> None:

@@ -52,6 +52,10 @@ def read_goal(path: Path, settings: Sequence[str] = ()) -> GoalFile:
 
 def goal_of(document: Document, path: Path, settings: Sequence[str] = ()) -> GoalFile:
     """The same, of a document that was read from this path."""
+    for key, kind, command in (("finger", "a spec", "predict"), ("space", "a sweep", "sweep")):
+        if key in document.data and "vary" not in document.data:
+            said = "a goal, with the keys base, vary and targets", kind, f"dpg {command} takes it"
+            raise SpecError(in_order([*document.problems, document.problem((key,), *said)]))
     found = goal_in(document, path.parent, settings)
     return replace(found, files=(path, *found.files))
 

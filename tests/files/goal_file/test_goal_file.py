@@ -182,6 +182,13 @@ def test_mistakes_of_goal_and_base_come_together(read: Read, tmp_path: Path) -> 
     assert {"target", "finger.units"} <= {*keys}
 
 
+def test_specs_and_sweeps_are_told_apart() -> None:
+    with pytest.raises(SpecError, match=r"found a spec \(dpg predict takes it\)"):
+        read_goal(CONFIGS / "three_unit.yaml")
+    with pytest.raises(SpecError, match=r"found a sweep \(dpg sweep takes it\)"):
+        read_goal(CONFIGS / "sweeps" / "height_separation.yaml")
+
+
 def test_settings_change_the_base_but_not_what_varies(read: Read) -> None:
     assert read(VARY, TARGET, settings=("finger.units=4",)).goal.base.units == 4
     with pytest.raises(SpecError, match="a key that the space leaves alone"):
