@@ -190,8 +190,8 @@ class _Batch:
 
 def reason_against(goal: Goal) -> str:
     """What is wrong with the design in the middle of all ranges; empty where it can exist."""
-    middle = goal.values(next(goal.choices()), np.full((len(goal.ranges), 1), 0.5))
-    values = {key: np.atleast_1d(column) for key, column in middle.items()}
+    choice = {key: np.array([value]) for key, value in next(goal.choices()).items()}
+    values = goal.values(choice, np.full((len(goal.ranges), 1), 0.5))
     ((_, design),) = by_units(goal.base, values, np.zeros(1, np.int64))
     return "; ".join(issue.statement for issue in resolve(design).problems.of(0))
 
