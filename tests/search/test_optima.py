@@ -12,6 +12,7 @@ from dpgcli.search.goal import Goal
 from dpgcli.search.lockstep import Ask, in_lockstep
 from dpgcli.search.maps import MapEvaluation
 from dpgcli.search.search import Limits, search
+from dpgcli.sweeps.pressures import PressedDesigns
 
 Make = Callable[..., Goal]
 HEIGHT, SEPARATION = "finger.geometry.dome_height_mm", "finger.geometry.unit_separation_mm"
@@ -202,8 +203,37 @@ def test_the_seed_decides(goal: Make) -> None:
     assert not np.array_equal(first.trace["misfit"][:32], other.trace["misfit"][:32])
 
 
+def test_what_meets_all_comes_before_what_is_less(goal: Make) -> None:
+    """A target is a limit beside an objective, as a constraint is; else it counts by its misfit."""
+    target = "targets: [{pattern: '11100', quantity: tip, value: [52, -38], tolerance_mm: 0.5}]\n"
+    met = search(goal(TWO + target)).best.points[:, :1]
+    both = np.concatenate((met - [[0.3], [0.0]], met), axis=1)  # a lower dome, and the right one
+    made = goal(TWO + target + "minimize: [dome_height_mm]")
+    assert best_of(made, Designs.at(made, {}, both)).points[:, 0] == pytest.approx(met[:, 0])
+    made = goal(TWO + "minimize: [dome_height_mm]")
+    assert best_of(made, Designs.at(made, {}, both)).points[:, 0] == pytest.approx(both[:, 0])
+    made = goal(TWO + target + "constraints: [dome_height_mm < 6]")
+    assert best_of(made, Designs.at(made, {}, both)).points[:, 0] == pytest.approx(both[:, 0])
+
+
 def test_alike_designs_are_one(goal: Make) -> None:
     target = "targets: [{pattern: '11100', quantity: tip, value: [52, -38], tolerance_mm: 0.5}]\n"
     made = goal(TWO + target)
     one = Designs.at(made, {}, np.array([[0.3, 0.3 + 1e-9, 0.5], [0.4, 0.4, 0.4]]))
     assert len(best_of(made, one)) == 2
+
+
+def test_of_maps_only_what_matters_is_computed(goal: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Snap pressures without the graph of states, and constraints on shapes without pressure."""
+
+    def refuse(_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(PressedDesigns, "n_reachable", property(refuse))
+    lines = TWO + "constraints: [snap_pressure_max_MPa > 0.1]"
+    made = goal(lines, "pressure={}", base="three_unit")
+    point = made.values({}, np.array([[0.5], [0.5]]))
+    assert MapEvaluation(made).columns(point)["snap_pressure_max_MPa"][0] > 0.1
+    monkeypatch.setattr(PressedDesigns, "__init__", refuse)
+    made = goal(TWO + "constraints: [reach_max_mm > 1]", "pressure={}", base="three_unit")
+    assert MapEvaluation(made).columns(point)["reach_max_mm"][0] > 1.0

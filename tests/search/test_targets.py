@@ -1,14 +1,18 @@
 """Targets: the nearest of the states that match, slopes against differences, tips found again."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
-from dpgcli.arrays import Array, Indices
+from dpgcli.arrays import Array, Columns, Indices
+from dpgcli.search import targets as module
 from dpgcli.search.descent import Residuals, descend
 from dpgcli.search.goal import Goal
 from dpgcli.search.targets import TargetEvaluation
+from dpgcli.states.certify import Status
+from dpgcli.states.rows import solved_rows
 
 Make = Callable[..., Goal]
 HEIGHT, SEPARATION = "finger.geometry.dome_height_mm", "finger.geometry.unit_separation_mm"
@@ -147,3 +151,17 @@ def test_designs_are_the_same_alone_and_in_a_batch(goal: Make) -> None:
         assert np.array_equal(alone.values[:, 0], together.values[:, k])
         assert np.array_equal(alone.slopes[..., 0], together.slopes[..., k])
         assert code[:, 0].tolist() == codes[:, k].tolist()
+
+
+def test_only_certified_states_count(goal: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A marginal one has numbers, too."""
+    made = goal(TWO + TIP.format("11100", 52, -38))
+    point = made.values({}, np.array([[0.5], [0.5]]))
+    assert not np.isnan(TargetEvaluation(made)(point)[0].values).any()
+
+    def marginal(*arguments: Any) -> Columns:
+        rows = solved_rows(*arguments)
+        return {**rows, "status": np.full_like(rows["status"], Status.MARGINAL)}
+
+    monkeypatch.setattr(module, "solved_rows", marginal)
+    assert np.isnan(TargetEvaluation(made)(point)[0].values).all()
