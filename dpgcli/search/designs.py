@@ -12,6 +12,7 @@ from dpgcli.search.descent import Residuals, held
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import MapEvaluation
 from dpgcli.search.targets import TargetEvaluation
+from dpgcli.sweeps.fronts import on_front
 
 MOST_FOUND = 10
 MOST_ON_FRONT = 100
@@ -131,7 +132,7 @@ def best_of(goal: Goal, every: Designs) -> Designs:
     is_front = len(goal.objectives) > 1 and bool((broken == 0).any())
     if is_front:
         met = np.flatnonzero(broken == 0)
-        front = met[_on_front(every.objectives[:, met].T)]
+        front = met[on_front(every.objectives[:, met].T)]
         every, most = every.take(front), MOST_ON_FRONT
         broken, keys = broken[front], [key[front] for key in keys]
     grain = GRAIN * np.ptp(every.objectives, axis=1)[:, None] if is_front else 0.0
@@ -150,9 +151,3 @@ def best_of(goal: Goal, every: Designs) -> Designs:
         if not alike.any():
             kept.append(place)
     return every.take(np.array(kept, np.int64))
-
-
-def _on_front(values: Array) -> Flags:
-    """Which rows nothing else is nowhere worse and somewhere better than."""
-    below = (values[:, None] <= values).all(axis=2) & (values[:, None] < values).any(axis=2)
-    return np.asarray(~below.any(axis=0))

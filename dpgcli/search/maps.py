@@ -16,7 +16,7 @@ from dpgcli.design.dimensions import Design, unit_of
 from dpgcli.search.goal import Goal
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.columns import Column, Group, Kind
-from dpgcli.sweeps.evaluation import DesignEvaluation, DesignStatus
+from dpgcli.sweeps.evaluation import VALUE_OF, DesignEvaluation, DesignStatus
 from dpgcli.sweeps.expressions import Expression, margins
 from dpgcli.sweeps.metrics import METRICS
 
@@ -136,7 +136,7 @@ def map_columns(
         base = replace(base, pressure=None)
     if not any(metric.group is Group.GRASP for metric in used):
         base = replace(base, body=None)
-    columns = {key: Column(key, unit_of(key), f"value of {key}") for key in values}
+    columns = {key: Column(key, unit_of(key), f"{VALUE_OF}{key}") for key in values}
     evaluation = replace(evaluation_of(base, columns), only=frozenset(names))
     blocks = [tables.designs for tables in evaluation(0, values)]
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in (*names, "status")}

@@ -13,7 +13,7 @@ from dpgcli.search.maps import MapEvaluation
 from dpgcli.search.unmet import Standing
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.quantities import Quantity
-from dpgcli.sweeps.evaluation import short_names
+from dpgcli.sweeps.evaluation import VALUE_OF, short_names
 from dpgcli.sweeps.metrics import METRICS
 
 DESIGN = Column("design", "", "number, the best first", kind=Kind.COUNT)
@@ -62,7 +62,7 @@ class GoalTables:
             Column(
                 name,
                 unit_of(key),
-                f"value of {key}",
+                f"{VALUE_OF}{key}",
                 kind=Kind.COUNT if key == UNITS else Kind.NUMBER,
             )
             for key, name in short_names(self.goal.keys).items()
@@ -79,7 +79,7 @@ class GoalTables:
         """The columns of the trace."""
         own = {column.name: column for column in (*self.map_columns, *self.value_columns)}
         objectives = (
-            own.get(each.name, Column(each.name, unit_of(each.name), f"value of {each.name}"))
+            own.get(each.name, Column(each.name, unit_of(each.name), f"{VALUE_OF}{each.name}"))
             for each in self.goal.objectives
         )
         told = (*PLACE, *self.value_columns, MISFIT, *objectives)

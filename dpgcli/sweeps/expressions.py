@@ -150,8 +150,13 @@ def margins(rule: Expression) -> tuple[Expression, ...]:
     >>> margins(expression("a > 1 or b > 1"))
     ()
     """
-    found = _margins(ast.parse(_without_digits(rule.text), mode="eval").body)
-    return () if found is None else tuple(expression(ast.unparse(node)) for node in found)
+    found: list[ast.expr] = []
+    for part in _joined(_body(_without_digits(rule.text))):
+        own = _margins(part)
+        if not own:
+            return ()
+        found += own
+    return tuple(expression(_with_digits(ast.unparse(node))) for node in found)
 
 
 def contradict(first: Expression, second: Expression) -> bool:
@@ -175,12 +180,10 @@ def contradict(first: Expression, second: Expression) -> bool:
     return bool(low > high or (low == high and not all(r({name: low}) for r in (first, second))))
 
 
-def _margins(node: ast.expr) -> list[ast.expr] | None:
-    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-        parts = [_margins(value) for value in node.values]
-        return None if None in parts else [each for part in parts for each in part or ()]
+def _margins(node: ast.expr) -> list[ast.expr]:
+    """Those of a comparison; none where it says nothing of above or below."""
     if not isinstance(node, ast.Compare):
-        return None
+        return []
     sides = zip(node.ops, [node.left, *node.comparators[:-1]], node.comparators, strict=True)
     found: list[ast.expr] = []
     for op, left, right in sides:
@@ -189,7 +192,7 @@ def _margins(node: ast.expr) -> list[ast.expr] | None:
         elif isinstance(op, ast.Gt | ast.GtE):
             found.append(ast.BinOp(left, ast.Sub(), right))
         else:
-            return None
+            return []
     return found
 
 
