@@ -5,6 +5,7 @@ min t with w (f − z) <= t for each: with other weights, to other points of the
 dents included (Miettinen, Nonlinear Multiobjective Optimization, 1999, section 3.4).
 """
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -22,6 +23,7 @@ PRECISION = 1e-9
 MOST_STEPS = 50
 MOST_ASKED = 100  # points of a search: on the kinks of extremes it would turn about for long
 MOST_WEIGHTS = 15
+MOST_AT_ONCE = 256  # threads
 HALVINGS = 12  # of the way: where a count changes is found to so much
 
 
@@ -87,10 +89,21 @@ def descend_within(
     `sizes` are those of margins, by which they are measured.
     """
 
-    def search(number: int, ask: Ask[Local]) -> Array:
-        return _search(ask, starts[:, number], scalars[number], sizes)
+    ends = starts.copy()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Values in x were outside bounds")  # which it mends
+        for first in range(0, starts.shape[1], MOST_AT_ONCE):
+            some = np.arange(first, min(first + MOST_AT_ONCE, starts.shape[1]))
 
-    return np.stack(in_lockstep(search, starts.shape[1], evaluate), axis=1)
+            def search(number: int, ask: Ask[Local], some: Indices = some) -> Array:
+                place = some[number]
+                return _search(ask, starts[:, place], scalars[place], sizes)
+
+            def answers(points: Array, numbers: Indices, some: Indices = some) -> Sequence[Local]:
+                return evaluate(points, some[numbers])
+
+            ends[:, some] = np.stack(in_lockstep(search, len(some), answers), axis=1)
+    return ends
 
 
 def _search(ask: Ask[Local], start: Array, scalar: Scalar, sizes: Array) -> Array:

@@ -104,7 +104,7 @@ class Optima:
         ideal, worst = met.objectives.min(axis=1), met.objectives.max(axis=1)
         span = np.where(worst - ideal > TINY, worst - ideal, 1.0)
         scalars = [Scalar(weights / span, ideal) for weights in simplex(n)]
-        front = self._run(scalars, STARTS_ON_FRONT, objectives, lack, sizes)
+        front = self._run(scalars, STARTS_ON_FRONT, objectives, lack, sizes, len(ends))
         return Designs.joined([ends, front])
 
     def _run(
@@ -114,8 +114,12 @@ class Optima:
         objectives: Array,
         lack: Array,
         sizes: Array,
+        n_before: int = 0,
     ) -> Designs:
-        """Where searches end that begin, for each scalar and choice, at the best known designs."""
+        """Where searches end that begin, for each scalar and choice, at the best known designs.
+
+        They are numbered after `n_before` others.
+        """
         known, goal = self.known, self.goal
         listed = np.array([*known.choice.values()], float).reshape(len(known.choice), len(known))
         choices = np.unique(listed, axis=1, return_inverse=True)[1].reshape(-1)
@@ -128,7 +132,6 @@ class Optima:
                 lanes += best.tolist()
                 own += [scalar] * len(best)
         begin = known.take(np.array(lanes, np.int64))
-
         latest = begin.points.copy()
 
         def evaluate(points: Array, numbers: Indices) -> list[Local]:
@@ -137,7 +140,7 @@ class Optima:
             latest[:, numbers] = points
             values = goal.values(choice, points)
             told = np.stack([each.objectives for each in found], axis=1)
-            self.tell(Asked(numbers, values, told, self._misfits(found)))
+            self.tell(Asked(n_before + numbers, values, told, self._misfits(found)))
             return found
 
         try:

@@ -76,7 +76,7 @@ def search(goal: Goal, seed: int = 1, limits: Limits | None = None) -> Searched:
     return Searched(
         goal,
         best_of(goal, Designs.joined([each.found for each in rounds])),
-        _joined([part for each in rounds for part in (each.begin, *each.trace)]),
+        _joined([part for each in rounds for part in each.trace]),
         sum(each.n_starts for each in rounds),
         sum(each.n_empty for each in rounds),
         any(each.is_stopped for each in rounds),
@@ -115,7 +115,6 @@ class _Round:
         if not self.trace:
             self.limits.n_evaluated += len(found)
             self.trace.append(self._row(0, Step(np.arange(len(found)), points, found.misfits)))
-        self.begin = self._row(0, Step(np.arange(0), points[:, :0], np.zeros(0)))
         self.n_empty = int((~found.exist).sum())
         self.found = found.take(np.flatnonzero(found.exist))
         if self.goal.has_maps and self.goal.ranges and len(self.found):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.search import constrained
 from dpgcli.search.constrained import Local, Scalar, descend_within, last_that_hold, simplex
 from dpgcli.search.designs import Designs, best_of
 from dpgcli.search.goal import Goal
@@ -146,6 +147,14 @@ def test_with_targets_objectives_use_their_tolerance(goal: Make) -> None:
     assert less.points[0, 0] < met.points[0, 0]
 
 
+def test_more_searches_than_threads_are_done_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    scalars = [Scalar(weights, np.full(2, 0.04)) for weights in simplex(2)]
+    starts = np.random.default_rng(1).random((2, len(scalars)))
+    together = descend_within(toy, starts, scalars, np.ones(1))
+    monkeypatch.setattr(constrained, "MOST_AT_ONCE", 4)
+    assert np.array_equal(descend_within(toy, starts, scalars, np.ones(1)), together)
+
+
 @pytest.mark.slow
 def test_a_front_has_nothing_that_another_is_better_than(goal: Make) -> None:
     lines = "constraints: [min_barrier_mJ > 1]\nminimize: [reach_min_mm]\n"
@@ -157,6 +166,9 @@ def test_a_front_has_nothing_that_another_is_better_than(goal: Make) -> None:
         others = np.delete(found.objectives, k, axis=1).T
         assert not ((others <= row).all(axis=1) & (others < row).any(axis=1)).any()
     assert (np.diff(found.objectives[0]) > 0.0).all()
+    trace = search(made).trace
+    steps = np.stack([trace["search"], trace["step"]])
+    assert np.unique(steps, axis=1).shape == steps.shape
 
 
 def test_counts_are_kept_too(goal: Make) -> None:
