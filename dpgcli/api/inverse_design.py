@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 
 from dpgcli.api.given import GoalInput, goal_input
-from dpgcli.api.inputs import Settings, check_numbers, check_whole, path_of
+from dpgcli.api.inputs import Settings, check_flags, check_numbers, check_whole, path_of
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Array, Columns, keep_freed_memory
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import doubts_about
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
-from dpgcli.search.goal import state_quantities
+from dpgcli.search.goal import Goal, state_quantities
 from dpgcli.search.maps import map_columns
 from dpgcli.search.search import Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
@@ -74,14 +75,8 @@ class InverseDesignResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Of the calibrations in use, and of what no design should be chosen by."""
-        scene, tables = scene_of(self.specs[0]), self._tables
-        known = {trust.output: trust for trust in scene.trusts}
-        asked = [tables.quantities[name] for name in TargetEvaluation(self.given.goal).names]
-        trusts = {
-            column.name: [known[output] for output in column.outputs if output in known]
-            for column in (*asked, *tables.map_columns)
-        }
-        return (*scene.warnings, *(f"goal: {why}" for why in doubts_about(trusts)))
+        scene = scene_of(self.specs[0])
+        return (*scene.warnings, *(f"goal: {why}" for why in _doubts(self._tables, scene)))
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -105,9 +100,7 @@ class InverseDesignResult:
 
     @property
     def _tables(self) -> GoalTables:
-        goal = self.given.goal
-        longest = int(max(goal.lists.get(UNITS, (goal.base.units,))))
-        return GoalTables(goal, state_quantities(longest, is_gripper=bool(goal.base.gripper)))
+        return tables_of(self.given.goal)
 
     def save(self, folder: str | Path) -> None:
         """Write the designs, the trace and a spec for each design into a folder.
@@ -137,6 +130,7 @@ def inverse_design(
     seed: int = 1,
     evaluations: int | None = None,
     budget: float | None = None,
+    strict: bool = False,
 ) -> InverseDesignResult:
     """Search for designs whose states meet the targets of a goal: its file, or its data.
 
@@ -144,7 +138,8 @@ def inverse_design(
     random starts, 32 for each combination of listed values, by `seed`. With `evaluations`, a number
     of designs, or a `budget` in seconds it goes on with further starts until that is used up.
     Tables and specs go into the folder `output`, if there is one.
-    Raises SpecError for a wrong goal, UsageError for wrong choices, OutputError, and
+    Raises SpecError for a wrong goal, UsageError for wrong choices, and where it is `strict` for a
+    goal about what no design of the base should be chosen by, OutputError, and
     NothingSelectedError where no start has certified states of the patterns.
 
     >>> lattice = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
@@ -160,14 +155,37 @@ def inverse_design(
     """
     check_whole(seed=seed, evaluations=evaluations)
     check_numbers(budget=budget)
-    found = found_for(goal_input(goal, settings), seed, evaluations, budget)
+    check_flags(strict=strict)
+    found = found_for(goal_input(goal, settings), seed, evaluations, budget, strict=strict)
     if output is not None:
         found.save(output)
     return found
 
 
+def tables_of(goal: Goal) -> GoalTables:
+    """The columns of a goal's tables."""
+    longest = int(max(goal.lists.get(UNITS, (goal.base.units,))))
+    return GoalTables(goal, state_quantities(longest, is_gripper=bool(goal.base.gripper)))
+
+
+def _doubts(tables: GoalTables, scene: Scene) -> list[str]:
+    """Why no design should be chosen by what a goal asks for, in a line for each reason."""
+    known = {trust.output: trust for trust in scene.trusts}
+    asked = [tables.quantities[name] for name in TargetEvaluation(tables.goal).names]
+    trusts = {
+        column.name: [known[output] for output in column.outputs if output in known]
+        for column in (*asked, *tables.map_columns)
+    }
+    return doubts_about(trusts)
+
+
 def found_for(
-    given: GoalFile, seed: int = 1, evaluations: int | None = None, budget: float | None = None
+    given: GoalFile,
+    seed: int = 1,
+    evaluations: int | None = None,
+    budget: float | None = None,
+    *,
+    strict: bool = False,
 ) -> InverseDesignResult:
     """The same, of a goal that was read before."""
     if seed is None or seed < 0:
@@ -176,6 +194,9 @@ def found_for(
         raise UsageError(Field("evaluations"), f" {evaluations}: expected 1 design or more")
     if budget is not None and not 0.0 < budget < float("inf"):
         raise UsageError(Field("budget"), f" {budget:g}: expected a time > 0 s")
+    if strict and (doubts := _doubts(tables_of(given.goal), scene_of(given.base))):
+        lines = (part for doubt in doubts for part in ("\n", doubt))
+        raise UsageError(Field("strict"), " allows no goal about what is doubted:", *lines)
     keep_freed_memory()
     searched = search(given.goal, seed, Limits(evaluations, budget))
     best = searched.best

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from dpgcli.cli.exits import ExitCode, say_warnings
-from dpgcli.cli.options import Quiet, Settings, seconds
+from dpgcli.cli.options import Quiet, Settings, Strict, seconds
 from dpgcli.cli.printing import Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
@@ -41,16 +41,17 @@ def design(
     printed_as: Annotated[
         Format, typer.Option("--format", help="How to print designs")
     ] = Format.TABLE,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
-    """Search for designs whose states meet targets."""
+    """Search for designs whose states, and maps of states, are as a goal asks."""
     from dpgcli.api.given import goal_input
     from dpgcli.api.inverse_design import found_for
 
     limit = None if budget is None else seconds("--budget", budget)
     given = goal_input(goal, settings or ())
     with under_way("searching", quiet=quiet):
-        found = found_for(given, seed, evaluations, limit)
+        found = found_for(given, seed, evaluations, limit, strict=strict)
     if output is not None:
         found.save(output)
     print_rows(found.columns, found.rows, printed_as)

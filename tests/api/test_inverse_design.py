@@ -12,7 +12,9 @@ import dpgcli as dpg
 from dpgcli.api import inverse_design as module
 from dpgcli.errors import NothingSelectedError, SpecError, UsageError
 from dpgcli.files.design_spec import spec_text
+from dpgcli.files.yaml_file import read_document
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 Goal = dict[str, Any]
 STROKE = "finger.lattice.stroke_mm"
 HINGE = "finger.lattice.hinge_stiffness_N_mm_per_rad"
@@ -122,11 +124,18 @@ def test_what_is_not_met_is_said(goal: Callable[..., Goal]) -> None:
 
 
 def test_warnings_name_what_no_design_should_be_chosen_by(goal: Callable[..., Goal]) -> None:
+    """And it is strict about them before any work; tips may be chosen by."""
+    data = read_document(CONFIGS / "three_unit.yaml").data
     energy = {"pattern": "11*", "quantity": "energy_mJ", "value": 9.0, "tolerance_mJ": 0.1}
-    found = dpg.inverse_design(goal(targets=[energy]))
-    assert any(line.startswith("goal: energy_mJ rests on energies") for line in found.warnings) or (
-        not any(trust.doubt for trust in dpg.predict(goal()["base"]).trusts)
-    )
+    height = {"finger.geometry.dome_height_mm": {"from": 5.5, "to": 6.5}}
+    given = goal(base=data, vary=height, targets=[energy])
+    found = dpg.inverse_design(given)
+    assert any(line.startswith("goal: energy_mJ rests on energies") for line in found.warnings)
+    with pytest.raises(UsageError, match=r"^strict allows no goal about what is doubted:\n?energy"):
+        dpg.inverse_design(given, strict=True)
+    tip = {"pattern": "11*", "quantity": "tip_y_mm", "value": -15.0, "tolerance_mm": 5.0}
+    strict = dpg.inverse_design(goal(base=data, vary=height, targets=[tip]), strict=True)
+    assert strict.warnings == ()
 
 
 def test_differences_are_said(goal: Callable[..., Goal]) -> None:
