@@ -1,6 +1,7 @@
 """Targets: the nearest of the states that match, slopes against differences, tips found again."""
 
 from collections.abc import Callable
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -165,3 +166,20 @@ def test_only_certified_states_count(goal: Make, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(module, "solved_rows", marginal)
     assert np.isnan(TargetEvaluation(made)(point)[0].values).all()
+
+
+@pytest.mark.slow
+def test_many_starts_cost_little_more_than_one(goal: Make) -> None:
+    """In CPU time, both in turn, of three rounds the least."""
+    made = goal(TWO + TIP.format("11100", 52, -38))
+    evaluation = TargetEvaluation(made)
+
+    def cost(n_starts: int) -> float:
+        point = np.random.default_rng(1).random((2, n_starts))
+        began = process_time()
+        for _ in range(5):
+            evaluation(made.values({}, point))
+        return process_time() - began
+
+    one, many = np.min([(cost(1), cost(32)) for _ in range(3)], axis=0)
+    assert many < 4.0 * one
