@@ -32,7 +32,6 @@ from dpgcli.states.predict import predict
 from dpgcli.text import counted
 
 AGREEMENT = 1e-9  # of a number: a design's, and that of predict from its spec
-BEST, TRACE = "best.parquet", "trace.parquet"
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class InverseDesignResult:
         They are `best.parquet`, `trace.parquet` and `design_1.yaml` and so on. Raises OutputError,
         and UsageError for files that the designs come from.
         """
-        from dpgcli.files.goal_output import write_designs
+        from dpgcli.files.goal_output import BEST, TRACE, write_designs
 
         path = path_of("output", folder)
         tables = (
@@ -155,8 +154,13 @@ def inverse_design(
     """
     check_whole(seed=seed, evaluations=evaluations)
     check_numbers(budget=budget)
+    from dpgcli.files.goal_output import check_folder
+
     check_flags(strict=strict)
-    found = found_for(goal_input(goal, settings), seed, evaluations, budget, strict=strict)
+    given = goal_input(goal, settings)
+    if output is not None:
+        check_folder(path_of("output", output), given)
+    found = found_for(given, seed, evaluations, budget, strict=strict)
     if output is not None:
         found.save(output)
     return found

@@ -50,6 +50,10 @@ def design(
 
     limit = None if budget is None else seconds("--budget", budget)
     given = goal_input(goal, settings or ())
+    if output is not None:
+        from dpgcli.files.goal_output import check_folder
+
+        check_folder(output, given)
     with under_way("searching", quiet=quiet):
         found = found_for(given, seed, evaluations, limit, strict=strict)
     if output is not None:

@@ -18,8 +18,15 @@ from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_table
 from dpgcli.files.trust import trust_metadata, with_bases
 from dpgcli.states.columns import Column
 
+BEST, TRACE = "best.parquet", "trace.parquet"
 SPEC_NAME = re.compile(r"design_[0-9]+\.yaml")
 NamedTable = tuple[str, tuple[Column, ...], Columns]
+
+
+def check_folder(folder: Path, given: GoalFile) -> None:
+    """Raise OutputError or UsageError for a folder that tables cannot go into, before the work."""
+    with sole_use(folder):
+        check_outputs(given.files, *((folder / name, Mark.TABLE) for name in (BEST, TRACE)))
 
 
 def write_designs(

@@ -69,6 +69,19 @@ def test_rows_for_programs_and_files(run: Run, goal: Callable[[str], str], folde
     assert run(*arguments).stdout == done.stdout
 
 
+def test_a_folder_that_cannot_be_is_refused_before_the_work(
+    run: Run, goal: Callable[[str], str], folder: Path
+) -> None:
+    name = goal("[36, -16]")
+    (folder / "best.parquet").write_text("mine")
+    for output, said in ((name, "it is no folder"), (".", "best.parquet: it is there and not of")):
+        done = run("design", name, "-o", output)
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert not done.stdout
+    assert (folder / "best.parquet").read_text() == "mine"
+
+
 def test_other_seeds_and_limits(run: Run, goal: Callable[[str], str]) -> None:
     name = goal("[36, -16]")
     assert run("design", name, "--seed", "2", "--evaluations", "300").returncode == 0
