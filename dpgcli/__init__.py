@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dpgcli.api.fits.hinge import fit_hinge
     from dpgcli.api.fits.unit import fit_unit
     from dpgcli.api.grasp import grasp
+    from dpgcli.api.inverse_design import inverse_design
     from dpgcli.api.jaws import jaws
     from dpgcli.api.landscape import landscape
     from dpgcli.api.lookup import lookup
@@ -72,6 +73,7 @@ __all__ = [
     "fit_hinge",
     "fit_unit",
     "grasp",
+    "inverse_design",
     "jaws",
     "landscape",
     "lookup",
@@ -100,6 +102,7 @@ _HOMES = {
     "fit_hinge": "api.fits.hinge",
     "fit_unit": "api.fits.unit",
     "grasp": "api.grasp",
+    "inverse_design": "api.inverse_design",
     "jaws": "api.jaws",
     "landscape": "api.landscape",
     "lookup": "api.lookup",

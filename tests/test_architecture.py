@@ -26,6 +26,7 @@ FLOORS = {
     "reference": 4,
     "benchmark": 5,
     "hard_cases": 5,
+    "search": 5,
     "sweeps": 5,
     "files": 6,
     "reports": 6,

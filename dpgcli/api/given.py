@@ -1,4 +1,4 @@
-"""A spec or a sweep, as it is given: told apart by its keys, and read once."""
+"""A spec, a sweep or a goal, as it is given: told apart by its keys, and read once."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,9 +17,11 @@ from dpgcli.api.inputs import (
     spec_document,
 )
 from dpgcli.design.scene import Scene
-from dpgcli.errors import UsageError
+from dpgcli.errors import SpecError, UsageError
 from dpgcli.files.frames import frame_of
-from dpgcli.files.kind import is_sweep
+from dpgcli.files.goal_file import GoalFile, goal_in, goal_of, read_goal
+from dpgcli.files.kind import FileKind, kind_of
+from dpgcli.files.places import Location, located
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in, sweep_of
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
@@ -27,30 +29,47 @@ from dpgcli.mechanics.finger import Finger
 SweepInput: TypeAlias = str | Path | Mapping[str, Any]
 """A sweep's file, or its data."""
 
+GoalInput: TypeAlias = str | Path | Mapping[str, Any]
+"""A goal's file, or its data."""
 
-def scene_or_sweep(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep:
-    """Read a spec or a sweep; `settings` change the spec, that of a sweep being its base.
 
-    Raises SpecError with all problems, also for what is neither.
+def any_input(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep | GoalFile:
+    """Read a spec, a sweep or a goal; `settings` change the spec, that of others being their base.
 
-    >>> scene_or_sweep({"fingers": {}})
+    Raises SpecError with all problems, also for what is none of them.
+
+    >>> any_input({"fingers": {}})
     Traceback (most recent call last):
         ...
-    dpgcli.errors.SpecError: spec: fingers: expected a spec, with the key finger, or a sweep, with \
-the keys base and space, found fingers (did you mean finger?)
+    dpgcli.errors.SpecError: spec: fingers: expected a spec, with the key finger, a sweep, with \
+the keys base and space, or a goal, with the keys base, vary and targets, found fingers (did you \
+mean finger?)
     """
     texts = setting_texts(settings)
     if isinstance(given, SceneInput | Scene | Finger):
         return scene_input(given, texts)
     if isinstance(given, Mapping):
         own = without_free_keys(by_text("spec", given))
-        is_swept = is_sweep(Document("spec", own, {}))
-        return sweep_input(given, texts) if is_swept else scene_input(given, texts)
+        kind = kind_of(Document("spec", own, {}))
+        if kind is FileKind.GOAL:
+            return goal_input(given, texts)
+        return (sweep_input if kind is FileKind.SWEEP else scene_input)(given, texts)
     path = path_of("spec", given)
     document = read_document(given)
-    if is_sweep(document):
-        return sweep_of(document, path, texts)
-    return scene_input_in(document, path, texts)
+    kind = kind_of(document)
+    if kind is FileKind.SPEC:
+        return scene_input_in(document, path, texts)
+    return (sweep_of if kind is FileKind.SWEEP else goal_of)(document, path, texts)
+
+
+def scene_or_sweep(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep:
+    """The same, of a spec or a sweep alone. Raises SpecError for a goal."""
+    found = any_input(given, settings)
+    if isinstance(found, GoalFile):
+        place = Location(str(given) if isinstance(given, str | Path) else "spec")
+        what = "a spec or a sweep", "a goal", "dpg design takes it"
+        raise SpecError((located(place, "targets", *what),))
+    return found
 
 
 def sweep_input(sweep: SweepInput, settings: Settings = ()) -> Sweep:
@@ -58,14 +77,30 @@ def sweep_input(sweep: SweepInput, settings: Settings = ()) -> Sweep:
     texts = setting_texts(settings)
     if not isinstance(sweep, Mapping):
         return read_sweep(path_of("sweep", sweep), texts)
-    base = sweep.get("base")
+    document, base = _around_base("sweep", {**sweep, "space": _axes(sweep.get("space"))}, texts)
+    return sweep_in(document, Path(), texts, base=base)
+
+
+def goal_input(goal: GoalInput, settings: Settings = ()) -> GoalFile:
+    """Read a goal, or take its data, in which the base may be data, too; raises SpecError."""
+    texts = setting_texts(settings)
+    if not isinstance(goal, Mapping):
+        return read_goal(path_of("goal", goal), texts)
+    document, base = _around_base("goal", goal, texts)
+    return goal_in(document, Path(), texts, base=base)
+
+
+def _around_base(
+    name: str, given: Mapping[str, Any], settings: Settings
+) -> tuple[Document, Document | None]:
+    """Data with a base, and the base where it is data, too."""
+    base = given.get("base")
     if isinstance(base, Finger | Scene):
         raise UsageError("base: a finger's values have no keys that could vary: give a spec")
-    data = without_free_keys(plain({**sweep, "space": _axes(sweep.get("space"))}))
+    data = without_free_keys(plain(given))
     if not isinstance(base, Mapping):
-        return sweep_in(Document("sweep", data, {}), Path(), texts)
-    document = Document("sweep", {**data, "base": "base"}, {})
-    return sweep_in(document, Path(), texts, base=spec_document(base, texts))
+        return Document(name, data, {}), None
+    return Document(name, {**data, "base": "base"}, {}), spec_document(base, settings)
 
 
 def _axes(space: Any) -> Any:

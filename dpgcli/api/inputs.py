@@ -108,6 +108,9 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
     if "space" in document.data and "finger" not in document.data:
         said = "a spec, with the key finger", "a sweep", "dpg sweep and dpg explain take it"
         raise SpecError((document.problem(("space",), *said),))
+    if "targets" in document.data and "finger" not in document.data:
+        said = "a spec, with the key finger", "a goal", "dpg design takes it"
+        raise SpecError((document.problem(("targets",), *said),))
     return scene_input_in(document, path, settings)
 
 

@@ -1,20 +1,20 @@
-"""`validate`: specs and sweeps looked at, and nothing solved."""
+"""`validate`: specs, sweeps and goals looked at, and nothing solved."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from dpgcli.api.given import scene_or_sweep
-from dpgcli.api.inputs import SceneInput, Settings, SpecInput, setting_texts
+from dpgcli.api.given import any_input
+from dpgcli.api.inputs import Settings, SpecInput, setting_texts
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.places import Location, located
 from dpgcli.files.sweep_file import Sweep
 
 
 def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
-    """All problems of specs and sweeps, none where they are right; nothing is solved.
+    """All problems of specs, sweeps and goals, none where they are right; nothing is solved.
 
-    Those of a sweep come with those of its base, which `settings` change. A sweep without a design
-    that can be solved, of a million at most, has a problem, too.
+    Those of a sweep or a goal come with those of its base, which `settings` change. A sweep without
+    a design that can be solved, of a million at most, has a problem, too.
 
     >>> problem, = validate({"finger": {"units": 0}})[:1]
     >>> problem.key, problem.expected
@@ -26,7 +26,7 @@ def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     problems: list[Problem] = []
     for spec in specs:
         try:
-            given = scene_or_sweep(spec, texts)
+            given = any_input(spec, texts)
         except SpecError as error:
             problems += error.problems
         else:
@@ -34,9 +34,9 @@ def validate(*specs: SpecInput, settings: Settings = ()) -> tuple[Problem, ...]:
     return tuple(problems)
 
 
-def _none_to_solve(given: SceneInput | Sweep, spec: SpecInput) -> Iterator[Problem]:
+def _none_to_solve(given: object, spec: SpecInput) -> Iterator[Problem]:
     """The problem of a sweep whose designs are all excluded, or cannot exist."""
-    if isinstance(given, SceneInput):
+    if not isinstance(given, Sweep):
         return
     from dpgcli.studies.plan import nothing_to_solve
     from dpgcli.studies.sweep import Study

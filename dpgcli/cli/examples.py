@@ -32,6 +32,11 @@ EXAMPLES = {
         "dpg pick out --states --minimize tip_y_mm --top 3 --format csv",
     ),
     "report": ("dpg report out", "dpg report out --output page.html"),
+    "design": (
+        "dpg design goal.yaml",
+        "dpg design goal.yaml --output found --seed 2",
+        "dpg design goal.yaml --evaluations 5000 --format csv > designs.csv",
+    ),
     "bench": (
         "dpg bench finger.yaml",
         "dpg bench finger.yaml --target-error 0.01mm --repeats 1 --plot error.svg",

@@ -12,18 +12,9 @@ from dpgcli.cli.streams import put
 from dpgcli.errors import UsageError
 
 TOPICS = (  # in the order in which one reads them
-    *("tutorial", "spec", "columns", "sweeps", "choosing", "pressure", "loads", "grasping"),
-    *(
-        "barriers",
-        "calibration",
-        "laws",
-        "trust",
-        "accuracy",
-        "stress",
-        "files",
-        "python",
-        "glossary",
-    ),
+    *("tutorial", "spec", "columns", "sweeps", "choosing", "designing", "pressure", "loads"),
+    *("grasping", "barriers", "calibration", "laws", "trust", "accuracy", "stress", "files"),
+    *("python", "glossary"),
 )
 LINK_TO_PAGE = re.compile(r"\[([^]]+)\]\((\w+)\.md(#[\w-]+)?\)")
 

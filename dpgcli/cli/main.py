@@ -19,19 +19,9 @@ os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
-    *("predict", "explain", "sweep", "merge", "check", "pick", "report", "bench"),
-    *(
-        "compare",
-        "stress",
-        "actuate",
-        "transitions",
-        "pulses",
-        "landscape",
-        "grasp",
-        "validate",
-        "init",
-    ),
-    *("schema", "fit", "fe", "help"),
+    *("predict", "explain", "sweep", "merge", "check", "pick", "report", "design", "bench"),
+    *("compare", "stress", "actuate", "transitions", "pulses", "landscape", "grasp", "validate"),
+    *("init", "schema", "fit", "fe", "help"),
 )
 
 

@@ -1,4 +1,4 @@
-"""`dpg validate`: check specs and sweeps without solving."""
+"""`dpg validate`: check specs, sweeps and goals without solving."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -26,14 +26,16 @@ class ProblemFormat(StrEnum):
 def validate(
     specs: Annotated[
         list[Path],
-        typer.Argument(metavar="SPEC...", help="YAML specs and sweeps; - reads standard input"),
+        typer.Argument(
+            metavar="SPEC...", help="YAML specs, sweeps and goals; - reads standard input"
+        ),
     ],
     settings: Settings = None,
     listed_as: Annotated[
         ProblemFormat, typer.Option("--format", help="How to list problems")
     ] = ProblemFormat.TEXT,
 ) -> None:
-    """Check specs and sweeps without solving."""
+    """Check specs, sweeps and goals without solving."""
     from dpgcli.api.validate import validate
 
     problems: list[Problem] = []

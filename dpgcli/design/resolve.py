@@ -226,7 +226,8 @@ class Resolution:
     @property
     def _mounting_angle(self) -> Array:
         """The tilt of the fingers of a gripper, rad; 0 of a finger by itself."""
-        return np.asarray(np.radians(self.design.gripper.get("mounting_angle_deg", np.zeros(1))))
+        degrees = self.design.gripper.get("mounting_angle_deg", np.zeros(1))
+        return np.asarray(degrees * (np.pi / 180.0))  # as np.radians, which takes no complex ones
 
     def _pressure(self, designs: Indices) -> Pressure | None:
         given, units = self.design.pressure, self.design.units

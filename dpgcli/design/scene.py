@@ -53,16 +53,16 @@ class Step:
     """One standard uncertainty of one value, and by how much it changes what depends on it.
 
     `cause` is the value's key, or `FITTED` of a calibration's; `size` says how large it is.
-    `finger` has the changes of the finger's arrays by name, each (1 or unit, 1); the others are
-    those of the gripper's base spacing (mm) and mounting angle (rad), and of the limiting layer's
-    thickness (mm).
+    `finger` has the changes of the finger's arrays by name, each (1 or unit, 1 or design); the
+    others are those of the gripper's base spacing (mm) and mounting angle (rad), and of the
+    limiting layer's thickness (mm), numbers or (design,).
     """
 
     cause: str
     finger: Mapping[str, Array]
-    base_spacing: float = 0.0
-    mounting_angle: float = 0.0
-    layer_thickness: float = 0.0
+    base_spacing: float | Array = 0.0
+    mounting_angle: float | Array = 0.0
+    layer_thickness: float | Array = 0.0
     size: str = ""
 
 

@@ -30,13 +30,14 @@ class Sensitivities:
 
     `pose` (3, …) of tip x, y (mm) and angle (rad), `strut_angles` (unit, …) of all stations (rad),
     `openings` (unit, …) at the domes' axis (mm), with what walls yield, and `pushes` (unit, …) of
-    the domes (N), each per unit of the direction.
+    the domes (N), `energy` (mJ) of the state, each per unit of the direction.
     """
 
     pose: Array
     strut_angles: Array
     openings: Array
     pushes: Array
+    energy: Array
 
 
 class Softened(Attached):
@@ -87,7 +88,7 @@ def sensitivities(settled: Settled, directions: Sequence[Direction]) -> Sensitiv
     [[0.]]
     """
     found = [_along(settled, direction) for direction in directions]
-    return Sensitivities(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
+    return Sensitivities(*(np.stack(parts, axis=-2) for parts in zip(*found, strict=True)))
 
 
 def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
@@ -97,7 +98,9 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
     finger, softened = _moved(settled, direction)
     moved = chain_potential(finger)
     with np.errstate(divide="ignore", invalid="ignore"):  # lanes that are no states
-        forces = moved.evaluate(here).gradient.imag / COMPLEX_STEP
+        evaluated = moved.evaluate(here)
+        energy = np.sum(evaluated.energies, axis=0)  # the state's own change costs nothing
+        forces = evaluated.gradient.imag / COMPLEX_STEP
         change = forward(equilibrium.factorization, -forces)
         change /= equilibrium.factorization.pivots
         change = backward(equilibrium.factorization, change)
@@ -109,7 +112,8 @@ def _along(settled: Settled, direction: Direction) -> tuple[Array, ...]:
         push = -finger.springs(extension).force
         opening = extension + softened * push  # the dome's, and what a rigid wall begins to yield
     x, y = (nodes[-1].imag / COMPLEX_STEP for nodes in (stations.base_x, stations.base_y))
-    return np.stack((x, y, turns[-1])), turns, opening.imag / COMPLEX_STEP, push.imag / COMPLEX_STEP
+    further = (part.imag / COMPLEX_STEP for part in (opening, push, energy))
+    return np.stack((x, y, turns[-1])), turns, *further
 
 
 def _moved(settled: Settled, direction: Direction) -> tuple[Finger, Array]:

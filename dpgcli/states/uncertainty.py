@@ -3,6 +3,7 @@
 s are the derivatives of tip and aperture by what may be off, C its covariance (GUM, JCGM 100, 5.2).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,9 +59,9 @@ def spread(
     variance += np.stack((0.5 * model[0] ** 2, 0.5 * model[0] ** 2, model[1] ** 2))
     aperture = np.full(pose.shape[1], np.nan)
     if gripper is not None:
-        by_pose = _aperture_slopes(gripper, layer_thickness, pose)
+        by_pose = aperture_slopes(gripper, layer_thickness, pose)
         steps = total(by_pose[:, None] * slopes) if len(known.steps) else slopes[0]
-        steps = steps + _gripper_steps(gripper, layer_thickness, pose, known)
+        steps = steps + aperture_steps(gripper, layer_thickness, pose, known.steps)
         modeled = by_pose**2 * np.stack((0.5 * model[0] ** 2, 0.5 * model[0] ** 2, model[1] ** 2))
         aperture = np.sqrt(_variance(steps[None], known.covariance)[0] + total(modeled))
     return Spread(np.sqrt(variance), aperture, _shares(slopes, known, model[0]))
@@ -106,15 +107,15 @@ def _shares(slopes: Array, known: Uncertainty, model: Array) -> dict[str, Array]
     return {**found, MODEL: model} if known.model_error else found
 
 
-def _aperture_slopes(gripper: Gripper, layer_thickness: float | Array, pose: Array) -> Array:
+def aperture_slopes(gripper: Gripper, layer_thickness: float | Array, pose: Array) -> Array:
     """Derivatives of the aperture, 2 (s/2 + x sin m + y cos m) − t cos(φ + m), by x, y and φ."""
     mount = np.broadcast_to(gripper.mounting_angle, pose.shape[1])
     turned = layer_thickness * np.sin(pose[2] + mount)
     return np.stack((2.0 * np.sin(mount), 2.0 * np.cos(mount), turned))
 
 
-def _gripper_steps(
-    gripper: Gripper, layer_thickness: float | Array, pose: Array, known: Uncertainty
+def aperture_steps(
+    gripper: Gripper, layer_thickness: float | Array, pose: Array, steps: Sequence[Step]
 ) -> Array:
     """What the steps change in the aperture at the same pose, mm, (step, state)."""
     x, y, angle = pose
@@ -122,8 +123,8 @@ def _gripper_steps(
     by_mount = 2.0 * (x * np.cos(mount) - y * np.sin(mount))
     by_mount = by_mount + layer_thickness * np.sin(angle + mount)
     by_layer = -np.cos(angle + mount)
-    found = np.zeros((len(known.steps), pose.shape[1]))
-    for place, step in enumerate(known.steps):
+    found = np.zeros((len(steps), pose.shape[1]))
+    for place, step in enumerate(steps):
         found[place] = (
             step.base_spacing + step.mounting_angle * by_mount + step.layer_thickness * by_layer
         )

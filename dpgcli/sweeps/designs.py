@@ -1,6 +1,6 @@
 """Many designs at once: all states of each in bounded blocks, and their metrics."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +35,11 @@ def design_states(
     scene: Scene,
     exactness: Exactness,
     quantities: tuple[Quantity, ...],
+    only: Collection[str] | None = None,
 ) -> Iterator[Block]:
     """All states of a batch of designs, design by design, in blocks; with a body, if there is one.
+
+    The metrics are all, or `only` those of these names.
 
     A block holds up to `ROWS_AT_ONCE` states, of several designs or of one: how long one is cut
     depends on its number of units alone.
@@ -47,7 +50,7 @@ def design_states(
     def solved(designs: Indices, codes: Codes) -> Columns:
         lanes = np.repeat(designs, len(codes))
         inverted = np.tile(inverted_units(codes, n_units), len(designs))
-        around = Surroundings(*_placement(scene, n_designs, lanes))
+        around = Surroundings(*placement(scene, n_designs, lanes))
         request = RowRequest(
             chain_potential,
             exactness.tolerance,
@@ -56,25 +59,25 @@ def design_states(
             dropped[lanes],
             has_bars=not exactness.drops_bars,
         )
-        found = solved_rows(_designs(units, lanes), inverted, request)
+        found = solved_rows(units_of(units, lanes), inverted, request)
         return found | _with_body(scene, units, around, lanes, np.tile(codes, len(designs)))
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
-    for designs in _groups(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
+    for designs in groups_of(np.arange(n_designs), ROWS_AT_ONCE >> n_units):
         pressure = scene.pressure and scene.pressure.take_lanes(designs)
-        metrics = Metrics(_designs(units, designs), len(designs), pressure)
+        metrics = Metrics(units_of(units, designs), len(designs), pressure)
         for first in range(0, 2**n_units, ROWS_AT_ONCE):
             n_codes = min(ROWS_AT_ONCE, 2**n_units - first)
             parts = [
                 solved(some, codes + np.uint64(first))
-                for some in _groups(designs, size >> n_units)
+                for some in groups_of(designs, size >> n_units)
                 for codes in chunks(n_codes, size)
             ]
             rows = joined_rows(parts)
             metrics.add(rows)
             is_last = first + n_codes == 2**n_units
-            yield Block(designs, rows, metrics.columns() if is_last else None)
+            yield Block(designs, rows, metrics.columns(only) if is_last else None)
 
 
 def _with_body(
@@ -86,15 +89,13 @@ def _with_body(
     from dpgcli.sweeps.grasps import Encounter, grasp_rows
 
     layer, gripper = np.asarray(around.layer_thickness), around.gripper
-    body, friction = (
-        scene.body.take_lanes(lanes),
-        scene.friction and scene.friction.take_lanes(lanes),
-    )
-    met = _designs(units, lanes), layer, gripper, body, scene.held
-    return grasp_rows(Encounter(*met, friction, scene.gravity), codes)
+    body, friction = scene.body, scene.friction
+    met = units_of(units, lanes), layer, gripper, body.take_lanes(lanes), scene.held
+    of_friction = friction and friction.take_lanes(lanes)
+    return grasp_rows(Encounter(*met, of_friction, scene.gravity), codes)
 
 
-def _designs(units: UnitSolutions, index: Indices) -> UnitSolutions:
+def units_of(units: UnitSolutions, index: Indices) -> UnitSolutions:
     """Units of the designs at `index`; what there is one design of stays one."""
     return units.take_lanes(index) if units.wells.exists.shape[1] > 1 else units
 
@@ -111,16 +112,14 @@ def designs_at_once(n_units: int) -> int:
     return max(1, lanes_at_once(n_units) >> n_units)
 
 
-def _groups(designs: Indices, size: int) -> Iterator[Indices]:
+def groups_of(designs: Indices, size: int) -> Iterator[Indices]:
     """So many designs at a time, or one."""
     size = max(size, 1)
     for first in range(0, len(designs), size):
         yield designs[first : first + size]
 
 
-def _placement(
-    scene: Scene, n_designs: int, lanes: Indices
-) -> tuple[Gripper | None, float | Array]:
+def placement(scene: Scene, n_designs: int, lanes: Indices) -> tuple[Gripper | None, float | Array]:
     """The gripper and the layer's thickness of each lane's design."""
 
     def of_lanes(values: float | Array) -> Array:

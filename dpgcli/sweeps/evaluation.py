@@ -1,6 +1,6 @@
 """Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -47,7 +47,8 @@ class DesignEvaluation:
     `known` are the base's numbers by key, for constraints; `reason_against` says what is wrong with
     a design that has a value which its key cannot have, from its values. `values` are the columns
     of the keys that change, by key. With a `target_error` (mm) each design takes the cheapest level
-    that is bounded by it.
+    that is bounded by it. The metrics are all, or `only` those of these names and the counts of
+    states.
     """
 
     base: Design
@@ -57,6 +58,7 @@ class DesignEvaluation:
     constraints: tuple[Expression, ...]
     tolerance: float
     target_error: float | None = None
+    only: frozenset[str] | None = None
 
     @property
     def groups(self) -> frozenset[Group]:
@@ -95,9 +97,14 @@ class DesignEvaluation:
             for c in METRICS
             if c.group in self.groups and (c.group is not Group.GRASP or c.over in of_body)
         )
-        metrics = (c for c in every if has_pressure or not c.needs_pressure)
+        there = (c for c in every if has_pressure or not c.needs_pressure)
+        metrics = (c for c in there if self._told is None or c.name in self._told)
         chosen = () if self.target_error is None else LEVEL_COLUMNS
         return (DESIGN, *self.values.values(), CALIBRATION, STATUS, REASON, *metrics, *chosen)
+
+    @property
+    def _told(self) -> frozenset[str] | None:
+        return None if self.only is None else self.only | COUNTS_OF_STATES
 
     def __call__(self, start: int, values: DesignValues) -> Iterator[Tables]:
         """Rows of designs numbered from `start` on, with these values by key.
@@ -136,7 +143,7 @@ class DesignEvaluation:
             place: self.reason_against({k: _said(k, v[place].item()) for k, v in values.items()})
             for place in np.flatnonzero(allowed & ~possible).tolist()
         }
-        for places, design in self._designs(values, np.flatnonzero(possible)):
+        for places, design in by_units(self.base, values, np.flatnonzero(possible)):
             found = resolve(design)
             for index in np.flatnonzero(found.are_wrong).tolist():
                 issues = found.problems.of(index)
@@ -165,16 +172,6 @@ class DesignEvaluation:
             begin = begins_in_base(scene, scene.body)
             reasons |= dict.fromkeys(alike[begin].tolist(), IN_BASE)
         return reasons
-
-    def _designs(self, values: DesignValues, places: Indices) -> Iterator[tuple[Indices, Design]]:
-        """The designs at some places, by their number of units."""
-        columns = {key: column[places] for key, column in values.items()}
-        units = columns.pop(UNITS, np.full(len(places), self.base.units))
-        for n_units in distinct(units).tolist():
-            here = np.flatnonzero(units == n_units)
-            own = {key: column[here] for key, column in columns.items()}
-            base = replace(self.base, units=int(n_units), n_designs=len(here))
-            yield places[here], base.with_values(own)
 
     def _are_possible(self, values: DesignValues) -> Flags:
         """Which designs have only values that their keys can have."""
@@ -216,7 +213,7 @@ class DesignEvaluation:
         """Which designs meet all constraints, and which of these can exist; nothing is solved."""
         allowed = self.allowed(values)
         right = allowed & self._are_possible(values)
-        for places, design in self._designs(values, np.flatnonzero(right)):
+        for places, design in by_units(self.base, values, np.flatnonzero(right)):
             found = resolve(design)
             possible = ~found.are_wrong
             possible[[*self._reasons_against_bodies(found, np.flatnonzero(possible))]] = False
@@ -235,7 +232,7 @@ class DesignEvaluation:
     def kinds_of_trust(self, values: DesignValues) -> Iterator[tuple[tuple[Trust, ...], int]]:
         """What outputs of designs that will be solved rest on, and how many of them."""
         right = self.allowed(values) & self._are_possible(values)
-        for _, design in self._designs(values, np.flatnonzero(right)):
+        for _, design in by_units(self.base, values, np.flatnonzero(right)):
             found = resolve(design)
             yield from found.kinds_of_trust(np.flatnonzero(~found.are_wrong))
 
@@ -243,7 +240,7 @@ class DesignEvaluation:
         found = exactnesses(UnitSolutions.of(scene.finger), self.tolerance, self.target_error)
         for some, exactness in found:
             alike = scene if len(some) == len(places) else scene.take_lanes(some)
-            for block in design_states(alike, exactness, self.quantities):
+            for block in design_states(alike, exactness, self.quantities, self._told):
                 if block.metrics is not None and exactness.accuracy_level is not None:
                     name = np.full(len(block.places), exactness.accuracy_level.name, "S24")
                     block.metrics["accuracy_level"] = name
@@ -300,12 +297,26 @@ class DesignEvaluation:
         return {column.name: rows[column.name] for column in self.design_columns}
 
 
+def by_units(
+    base: Design, values: DesignValues, places: Indices
+) -> Iterator[tuple[Indices, Design]]:
+    """The designs around a base at some places of these values, by their number of units."""
+    columns = {key: column[places] for key, column in values.items()}
+    units = columns.pop(UNITS, np.full(len(places), base.units))
+    for n_units in distinct(units).tolist():
+        here = np.flatnonzero(units == n_units)
+        own = {key: column[here] for key, column in columns.items()}
+        alike = replace(base, units=int(n_units), n_designs=len(here))
+        yield places[here], alike.with_values(own)
+
+
 NO_FACE = (
     "finger.geometry.limiting_layer_thickness_mm: expected a thickness where there is a body: the "
     "face of a finger is half of it inside the lattice"
 )
 IN_BASE = "object: begins in the base of a finger: move it along x, or take a smaller one"
 
+COUNTS_OF_STATES = frozenset({"n_states", "n_stable"})  # by which a design has its status
 DESIGN = Column("design", "", "number in the order of the space", kind=Kind.COUNT)
 CALIBRATION = Column("calibration", "", "gravest origin of a spring constant", kind=Kind.TEXT)
 STATUS = Column("status", "", "what became of the design", kind=Kind.TEXT)
@@ -331,16 +342,29 @@ def value_columns(space: Space) -> dict[str, Column]:
 
     What some units override keeps its whole key: the last part is that of the others too.
     """
-    last = [key.rsplit(".", 1)[-1] for key in space.keys]
     first = space.designs(0, 1)
+    whole = {key for key in space.keys if first[key].dtype.kind in "iu"}
     return {
         key: Column(
-            short if last.count(short) == 1 and ".overrides." not in key else key,
+            name,
             unit_of(key),
             f"{VALUE_OF}{key}",
-            kind=Kind.COUNT if first[key].dtype.kind in "iu" else Kind.NUMBER,
+            kind=Kind.COUNT if key in whole else Kind.NUMBER,
         )
-        for key, short in zip(space.keys, last, strict=True)
+        for key, name in short_names(space.keys).items()
+    }
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Names of columns for keys: the last part where that is enough.
+
+    >>> [*short_names(["finger.units", "finger.overrides.4.lattice.stroke_mm"]).values()]
+    ['units', 'finger.overrides.4.lattice.stroke_mm']
+    """
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    return {
+        key: short if last.count(short) == 1 and ".overrides." not in key else key
+        for key, short in zip(keys, last, strict=True)
     }
 
 

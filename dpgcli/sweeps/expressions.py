@@ -140,6 +140,62 @@ def _body(spelled: str) -> ast.expr:
     return ast.parse(spelled, mode="eval").body
 
 
+def margins(rule: Expression) -> tuple[Expression, ...]:
+    """What has to be above zero for a comparison to hold, or at zero; none where that does not say.
+
+    As of `or`, `not`, `==` and `!=`.
+
+    >>> [margin.text for margin in margins(expression("2 < a.b <= 4 and c > 1"))]
+    ['a.b - 2', '4 - a.b', 'c - 1']
+    >>> margins(expression("a > 1 or b > 1"))
+    ()
+    """
+    found: list[ast.expr] = []
+    for part in _joined(_body(_without_digits(rule.text))):
+        own = _margins(part)
+        if not own:
+            return ()
+        found += own
+    return tuple(expression(_with_digits(ast.unparse(node))) for node in found)
+
+
+def contradict(first: Expression, second: Expression) -> bool:
+    """Whether no number meets both, as far as each bounds one name by a number.
+
+    >>> contradict(expression("a > 2"), expression("a < 1")), contradict(*[expression("a > 2")] * 2)
+    (True, False)
+    >>> contradict(expression("a > 2"), expression("2 > a"))
+    True
+    """
+    if first.names != second.names or len(first.names) != 1:
+        return False
+    (name,) = first.names
+    low, high = -np.inf, np.inf
+    for margin in (*margins(first), *margins(second)):
+        at = [float(margin({name: x})) for x in (0.0, 1.0, 2.0)]
+        slope = at[1] - at[0]
+        if abs(slope) != 1.0 or at[2] - at[1] != slope:  # no bound of the name itself
+            return False
+        low, high = (max(low, -at[0]), high) if slope > 0.0 else (low, min(high, at[0]))
+    return bool(low > high or (low == high and not all(r({name: low}) for r in (first, second))))
+
+
+def _margins(node: ast.expr) -> list[ast.expr]:
+    """Those of a comparison; none where it says nothing of above or below."""
+    if not isinstance(node, ast.Compare):
+        return []
+    sides = zip(node.ops, [node.left, *node.comparators[:-1]], node.comparators, strict=True)
+    found: list[ast.expr] = []
+    for op, left, right in sides:
+        if isinstance(op, ast.Lt | ast.LtE):
+            found.append(ast.BinOp(right, ast.Sub(), left))
+        elif isinstance(op, ast.Gt | ast.GtE):
+            found.append(ast.BinOp(left, ast.Sub(), right))
+        else:
+            return []
+    return found
+
+
 def _is_comparison(node: ast.expr) -> bool:
     """Whether a node is true or false, and not a number."""
     is_negation = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)

@@ -3,7 +3,7 @@
 A metric is written here and nowhere else: tables, metadata and the manual follow.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -76,9 +76,10 @@ class Metrics:
             self.n_grasps = n_before + (stable & (block["n_contacts"] > 0)).sum(axis=1)
         self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
-    def columns(self) -> Columns:
-        """One row per design; NaN where it has no stable state."""
-        known = (m for m in METRICS if not m.over or m.name in self.extremes)
+    def columns(self, only: Collection[str] | None = None) -> Columns:
+        """One row per design; NaN where it has no stable state. Of all metrics, or `only` some."""
+        told = (m for m in METRICS if only is None or m.name in only)
+        known = (m for m in told if not m.over or m.name in self.extremes)
         has_pressure, has_bodies = self.pressure is not None, self.n_grasps is not None
         return {
             m.name: m.of(self)

@@ -45,6 +45,11 @@ SPEC = {
     }
 }
 SWEEP = {"base": SPEC, "space": [{"key": "finger.units", "values": [1]}]}
+GOAL = {
+    "base": SPEC,
+    "vary": {"finger.lattice.stroke_mm": [3.0, 3.5]},
+    "targets": [{"pattern": "1", "quantity": "tip", "value": [13.0, -1.0], "tolerance_mm": 1.0}],
+}
 TOUCHING = Scene(FINGER, (), None, 1.5)
 GRIPPING = Scene(FINGER, (), Gripper(base_spacing=40.0, mounting_angle=0.0), 1.5)
 FACE: dict[str, dict[str, Any]] = {
@@ -59,6 +64,7 @@ FACE: dict[str, dict[str, Any]] = {
     "fit_hinge": {"curve": HINGE},
     "fit_unit": {"curve": TURNS},
     "grasp": {"spec": TOUCHING, "object": "disc:10", "at": (20.0, -10.0)},
+    "inverse_design": {"goal": GOAL},
     "jaws": {"spec": GRIPPING, "gaps": (10.0, 12.0), "at": (20.0, 0.0), "patterns": "00"},
     "landscape": {"spec": FINGER, "start": "0x", "end": "11"},
     "lookup": {"spec": FINGER},

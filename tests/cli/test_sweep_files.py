@@ -187,7 +187,10 @@ def test_what_is_neither_is_said_to_be(
 ) -> None:
     (folder / "document.yaml").write_text(text)
     result = call(command, "document.yaml")
-    kinds = "expected a spec, with the key finger, or a sweep, with the keys base and space"
+    kinds = (
+        "expected a spec, with the key finger, a sweep, with the keys base and space, or a goal, "
+        "with the keys base, vary and targets"
+    )
     assert result.exit_code == 2
     problem, count = result.output.splitlines()
     assert problem.startswith(said.format(kinds))

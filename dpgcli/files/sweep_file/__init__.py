@@ -33,7 +33,16 @@ from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
 from dpgcli.text import KeyPath
 
-__all__ = ["Sweep", "read_sweep", "starter", "sweep_in", "sweep_of"]
+__all__ = [
+    "Sweep",
+    "checked_base",
+    "read_base",
+    "read_sweep",
+    "starter",
+    "sweep_in",
+    "sweep_of",
+    "varied",
+]
 
 MOST_DIGITS = 30
 TYPES = ("int", "float", "constrained-int", "constrained-float")  # not keys, in a finding's path
@@ -88,16 +97,16 @@ def sweep_in(
     base_files: tuple[Path, ...] = ()
     base_spec = None
     if base is not None:
-        base_spec = _checked(base, problems)
+        base_spec = checked_base(base, problems)
     elif isinstance(document.data.get("base"), str):
-        base, base_spec = _base(base_path, settings, problems)
+        base, base_spec = read_base(base_path, settings, problems)
         base_files = (base_path,)
     sections = OPTIONAL if base is None else sections_in(base.data)
     reader = SpaceReader(document, folder, sections)
     axes = [reader.axis(place, axis) for place, axis in _axes(document)]
     known = None if base is None or spec is None else base.data
     rules = [reader.constraint(place, text, known) for place, text in _constraints(document)]
-    problems = [*document.problems, *reader.problems, *problems, *_varied(settings, reader.keys)]
+    problems = [*document.problems, *reader.problems, *problems, *varied(settings, reader.keys)]
     space = Space(tuple(axis for axis in axes if axis is not None))
     if space.size > MOST_DESIGNS:
         expected, found = f"at most {MOST_DESIGNS:,} designs", _many(space.size)
@@ -133,7 +142,7 @@ def _constraints(document: Document) -> Iterator[tuple[int, str]]:
             yield place, text
 
 
-def _base(
+def read_base(
     path: Path, settings: Sequence[str], problems: list[Problem]
 ) -> tuple[Document | None, Spec | None]:
     """The data of the base and what they mean, None where `problems` now say why not."""
@@ -147,7 +156,8 @@ def _base(
     return document, None
 
 
-def _checked(base: Document, problems: list[Problem]) -> Spec | None:
+def checked_base(base: Document, problems: list[Problem]) -> Spec | None:
+    """What the data of a base mean, None where `problems` now say why not."""
     try:
         return checked(base)
     except SpecError as error:
@@ -167,7 +177,7 @@ def _many(number: int) -> str:
     return f"{number:,}" if power < MOST_DIGITS else f"about 10^{power:.0f}"
 
 
-def _varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:
+def varied(settings: Sequence[str], keys: Container[str]) -> Iterator[Problem]:
     """Settings of what the space varies, which would change nothing."""
     for text in settings:
         key = text.partition("=")[0].strip()

@@ -1,0 +1,68 @@
+"""`dpg design`: search for designs whose states are as a goal asks for."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dpgcli.cli.exits import ExitCode, say_warnings
+from dpgcli.cli.options import Quiet, Settings, Strict, seconds
+from dpgcli.cli.printing import Format, print_rows
+from dpgcli.cli.progress import under_way
+from dpgcli.cli.streams import say
+
+GoalPath = Annotated[
+    Path, typer.Argument(metavar="GOAL", help="YAML file of a goal; - reads standard input")
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="FOLDER", help="Folder for tables, and a spec of each design"
+    ),
+]
+Evaluations = Annotated[
+    int | None,
+    typer.Option("--evaluations", metavar="N", min=1, help="Go on until so many are evaluated"),
+]
+Budget = Annotated[
+    str | None, typer.Option("--budget", metavar="TIME", help="Go on for so long: 60s, 5m")
+]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the starts")]
+
+
+def design(
+    goal: GoalPath,
+    output: Output = None,
+    seed: Seed = 1,
+    evaluations: Evaluations = None,
+    budget: Budget = None,
+    settings: Settings = None,
+    printed_as: Annotated[
+        Format, typer.Option("--format", help="How to print designs")
+    ] = Format.TABLE,
+    strict: Strict = False,
+    quiet: Quiet = False,
+) -> None:
+    """Search for designs whose states, and maps of states, are as a goal asks."""
+    from dpgcli.api.given import goal_input
+    from dpgcli.api.inverse_design import found_for
+
+    limit = None if budget is None else seconds("--budget", budget)
+    given = goal_input(goal, settings or ())
+    if output is not None:
+        from dpgcli.files.goal_output import check_folder
+
+        check_folder(output, given)
+    with under_way("searching", quiet=quiet):
+        found = found_for(given, seed, evaluations, limit, strict=strict)
+    if output is not None:
+        found.save(output)
+    print_rows(found.columns, found.rows, printed_as)
+    sys.stdout.flush()
+    say_warnings(found.warnings)
+    if not quiet:
+        for line in found.summary:
+            say(line)
+    if not found.is_met:
+        raise typer.Exit(ExitCode.REQUIREMENT)

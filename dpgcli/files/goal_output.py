@@ -1,0 +1,63 @@
+"""What a search found, in a folder: tables of designs and of all steps, a spec for each design."""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from dpgcli.arrays import Columns
+from dpgcli.design.scene import Scene
+from dpgcli.files.access import writing
+from dpgcli.files.design_spec import write_spec
+from dpgcli.files.goal_file import GoalFile
+from dpgcli.files.output import Mark, check_outputs, is_own, sole_use
+from dpgcli.files.record_batches import record_batch, schema
+from dpgcli.files.scene_file import Spec, canonical_json
+from dpgcli.files.scene_metadata import scene_metadata
+from dpgcli.files.table_writer import SCHEMA_VERSION, versions, write_table
+from dpgcli.files.trust import trust_metadata, with_bases
+from dpgcli.states.columns import Column
+
+BEST, TRACE = "best.parquet", "trace.parquet"
+SPEC_NAME = re.compile(r"design_[0-9]+\.yaml")
+NamedTable = tuple[str, tuple[Column, ...], Columns]
+
+
+def check_folder(folder: Path, given: GoalFile) -> None:
+    """Raise OutputError or UsageError for a folder that tables cannot go into, before the work."""
+    with sole_use(folder):
+        check_outputs(given.files, *((folder / name, Mark.TABLE) for name in (BEST, TRACE)))
+
+
+def write_designs(
+    folder: Path,
+    given: GoalFile,
+    tables: Sequence[NamedTable],
+    specs: Sequence[Spec],
+    first: Scene,
+) -> None:
+    """Write tables by name, and the specs as design_1.yaml and so on; `first` is the best's scene.
+
+    Specs of more designs that an earlier search left there are removed.
+    """
+    own = {folder / f"design_{number}.yaml": spec for number, spec in enumerate(specs, start=1)}
+    marked = [*((folder / name, Mark.TABLE) for name, *_ in tables), *((p, Mark.SPEC) for p in own)]
+    with sole_use(folder):
+        check_outputs(given.files, *marked)
+        metadata = {
+            "dpg.schema_version": str(SCHEMA_VERSION),
+            "dpg.goal": json.dumps(given.said, sort_keys=True),
+            **scene_metadata(first, canonical_json(specs[0])),
+            **trust_metadata(first.trusts, first.warnings),
+            "dpg.versions": versions(),
+        }
+        for name, columns, rows in tables:
+            described = with_bases(schema(columns), metadata)
+            write_table(folder / name, described, [record_batch(columns, rows)], metadata)
+        for number, (path, spec) in enumerate(own.items(), start=1):
+            write_spec(path, spec, f"design {number} of {tables[0][0]}")
+        with writing(folder):
+            for path in folder.iterdir():
+                is_old = SPEC_NAME.fullmatch(path.name) and path not in own
+                if is_old and path.is_file() and is_own(path, Mark.SPEC):
+                    path.unlink()
