@@ -55,6 +55,8 @@ class Pulled:
         payload = np.full(len(is_there), np.nan)
         failing = np.where(is_there, SLIP, "").astype("U5")
         lanes = np.flatnonzero(is_there)
+        if not len(lanes):
+            return {"payload_N": payload, "fails_first": failing}
         few, rest = own.take_lanes(lanes), shapes.take_lanes(lanes)
         slip, share, is_reset = self.take_lanes(lanes)._borne(few, rest)
         payload[lanes] = slip * np.minimum(share, 1.0)
