@@ -222,6 +222,7 @@ class Friction:
 
 def _moved(center: Array, key: str, column: Array) -> Array:
     """Centers with values of designs, (design,), at the key of a part of their place."""
+    assert key in PLACES, f"no key of this body: {key}"
     x, y = (column if key == own else at for own, at in zip(PLACES, center, strict=True))
     return np.stack(np.broadcast_arrays(x, y))
 

@@ -121,6 +121,26 @@ def test_keys_of_a_body_need_a_body_in_the_base() -> None:
         swept(bare, ("object.disc.diameter_mm", [20.0, 30.0]))
 
 
+JAWS = {"jaws": {"gap_mm": 20.0, "height_mm": 12.0}, "at_mm": [32.0, 0.0]}
+WEDGE = {"polygon": [[-8.0, 0.0], [8.0, -10.0], [8.0, 10.0]], "at_mm": [32.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("body", "key"),
+    [
+        (BODY, "object.jaws.gap_mm"),
+        (BODY, "object.compliance.stiffness_N_per_mm"),
+        (JAWS, "object.disc.diameter_mm"),
+        (JAWS, "object.compliance.stiffness_N_per_mm"),
+        (WEDGE, "object.disc.diameter_mm"),
+        (WEDGE, "object.jaws.height_mm"),
+    ],
+)
+def test_keys_of_another_body_are_refused(body: dict[str, Any], key: str) -> None:
+    with pytest.raises(SpecError, match=f"the base has no {key.rpartition('.')[0]}"):
+        swept({**SPEC, "object": body}, (key, [20.0, 25.0]))
+
+
 def test_requirements_by_forces_are_warned_of() -> None:
     result = swept(SPEC, ("object.disc.diameter_mm", [20.0, 22.0]), require="squeeze_max_N > 0.01")
     assert result.verdicts[0].is_met

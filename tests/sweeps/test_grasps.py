@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dpgcli.design.bodies import GAP, HEIGHT, PLACES, Body, Disc, Jaws, Polygon
+from dpgcli.design.bodies import (
+    COMPLIANCE,
+    DIAMETER,
+    GAP,
+    HEIGHT,
+    PLACES,
+    Body,
+    Disc,
+    Jaws,
+    Polygon,
+)
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping.table import grasp_rows as rows_of
 from dpgcli.grasping.table import grasps
@@ -53,6 +63,19 @@ def test_bodies_by_design(body: Body, key: str, column: list[float]) -> None:
                 assert said.astype(expected.dtype).tolist() == expected.tolist(), column_.name
         n_touching += int((rows["n_contacts"] > 0).sum())
     assert n_touching > 0
+
+
+@pytest.mark.parametrize(
+    ("body", "key"),
+    [
+        (Disc(CENTER, 10.0), GAP),
+        (Jaws(CENTER, 20.0, 12.0), DIAMETER),
+        (Polygon(CENTER, WEDGE), COMPLIANCE),
+    ],
+)
+def test_a_body_takes_its_own_keys_only(body: Body, key: str) -> None:
+    with pytest.raises(AssertionError, match=key):
+        body.with_value(key, np.array([20.0, 25.0]))
 
 
 def _single(body: Body) -> Body:

@@ -20,7 +20,7 @@ from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file import Spec
 from dpgcli.files.sweep_file import checked_base, read_base, varied
 from dpgcli.files.sweep_file.models import MOST_KEYS
-from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader, numbers_of
+from dpgcli.files.sweep_file.space import SpaceReader, numbers_of
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.search.goal import Goal, Objective, Range, Target
 from dpgcli.sweeps.expressions import Expression
@@ -76,7 +76,7 @@ def goal_in(
     elif isinstance(document.data.get("base"), str):
         base, base_spec = read_base(base_path, settings, problems)
         own = (base_path,)
-    reader = SpaceReader(document, folder, OPTIONAL if base is None else base.data)
+    reader = SpaceReader(document, folder, None if base is None else base.data)
     ranges, lists = _varied(reader, document.data.get("vary"))
     targets: list[Target | None] = []
     constraints: tuple[Expression, ...] = ()

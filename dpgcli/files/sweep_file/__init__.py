@@ -27,7 +27,7 @@ from dpgcli.files.sweep_file.models import (
     SampleRange,
     SweepSpec,
 )
-from dpgcli.files.sweep_file.space import OPTIONAL, SpaceReader, sections_in
+from dpgcli.files.sweep_file.space import SpaceReader
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
@@ -101,8 +101,7 @@ def sweep_in(
     elif isinstance(document.data.get("base"), str):
         base, base_spec = read_base(base_path, settings, problems)
         base_files = (base_path,)
-    sections = OPTIONAL if base is None else sections_in(base.data)
-    reader = SpaceReader(document, folder, sections)
+    reader = SpaceReader(document, folder, None if base is None else base.data)
     axes = [reader.axis(place, axis) for place, axis in _axes(document)]
     known = None if base is None or spec is None else base.data
     rules = [reader.constraint(place, text, known) for place, text in _constraints(document)]

@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.design.bodies import PLACES
 from dpgcli.design.dimensions import UNITS
 from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import beside, content_of
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
 
 
 LARGEST_UNITS = 2**53  # beyond, a float that is whole need not be the number that was meant
-OF_FRICTION = ("object.friction", "object.mass_g")
-OPTIONAL = ("gripper", "loads", "object", "pressure", *OF_FRICTION)  # what a base may leave out
+OBJECT = "object"
+OPTIONAL = ("gripper", "loads", OBJECT, "pressure")  # sections that a base may leave out
 ASIDE = ("uncertainty", "model_error")  # sections that a sweep leaves aside
 INDEX = "pandas writes no index where index=False"
 TABLE = "a CSV or Parquet file of designs, or a folder of such"
@@ -47,12 +48,12 @@ TABLE = "a CSV or Parquet file of designs, or a folder of such"
 class SpaceReader:
     """Makes axes from what a file says; what is wrong gathers in `problems`.
 
-    `sections` are those of the base that it may leave out, and has, and keys that are like them.
+    `base` is the data of the base spec, None where they are not known.
     """
 
     document: Document
     folder: Path
-    sections: Container[str]
+    base: dict[str, Any] | None
 
     def __post_init__(self) -> None:
         self.problems: list[Problem] = []
@@ -220,12 +221,26 @@ class SpaceReader:
             if unknown := unknown_key(tuple(key.split("."))):
                 expected, found, hint = unknown
                 self.wrong(path, expected, found, INDEX if key.startswith("Unnamed: ") else hint)
-            elif missing := [s for s in _sections(key) if s in OPTIONAL and s not in self.sections]:
-                hint = f"the base has no {missing[0]}"
+            elif absent := self.absent_section(key):
+                hint = f"the base has no {absent}"
                 self.wrong(path, "keys of a base that has them", key, hint)
             if key in self.keys:
                 self.wrong(path, "each key on one axis", f"{key} again")
             self.keys.add(key)
+
+    def absent_section(self, key: str) -> str:
+        """What a key needs of the base that is not there; empty where all is.
+
+        A body has the keys of its kind, and of what it has beside its place.
+        """
+        section, *others = key.split(".")
+        if self.base is None or section not in OPTIONAL:
+            return ""
+        if section not in self.base:
+            return section
+        own = self.base[section]
+        needs = section == OBJECT and isinstance(own, dict) and others[0] not in (*PLACES, *own)
+        return f"{section}.{others[0]}" if needs else ""
 
     def constraint(self, place: int, text: str, data: dict[str, Any] | None) -> Expression | None:
         """The rule, with names that are keys of the space or of the base spec, if it is known."""
@@ -248,18 +263,6 @@ class SpaceReader:
             expected = "numeric keys, by their last part or, if two share that, in full"
             self.wrong(path, expected, ", ".join(unknown), hint)
         return rule
-
-
-def _sections(key: str) -> tuple[str, str]:
-    """What a key needs in a base, if that may be left out there: its section, perhaps itself."""
-    return key.split(".")[0], key
-
-
-def sections_in(data: dict[str, Any]) -> set[str]:
-    """The sections in the data of a base, and its keys of friction."""
-    body = data.get("object")
-    own = {f"object.{key}" for key in body} if isinstance(body, dict) else set()
-    return {*data, *own}
 
 
 def _size(said: AxisSpec) -> tuple[int, int]:
