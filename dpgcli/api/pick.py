@@ -25,7 +25,7 @@ from dpgcli.files.table_writer import write_table
 from dpgcli.files.trust import with_bases
 from dpgcli.states.columns import Column
 from dpgcli.sweeps.choice import Question, check_undoubted, question, selected, warnings_of
-from dpgcli.sweeps.gate import REACHABLE, UNKNOWN
+from dpgcli.sweeps.gate import counts_of
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _picked(
     strict: bool,
 ) -> PickResult:
     status = "status" if source.has_states else "n_stable"
-    extra = [UNKNOWN] if REACHABLE in asked.names and UNKNOWN in source.numbers else []
+    extra = counts_of(asked.names, source.numbers)
     columns = source.columns([*dict.fromkeys((*asked.names, "status", status, *extra))])
     is_usable, first_line = _usable(source, columns)
     found = selected(columns, is_usable, asked)

@@ -18,7 +18,7 @@ from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Origin
 from dpgcli.files.trust import trusts_in, warnings_in
 from dpgcli.reports.base import bar_stiffness, base_lines
-from dpgcli.sweeps.gate import ranking_doubts, swept_names
+from dpgcli.sweeps.gate import failed_searches, ranking_doubts, swept_names
 
 METRICS = {  # whether the largest value is the best one, or else the one nearest zero
     "workspace_area_mm2": True,
@@ -258,6 +258,7 @@ def _extremes(space: DesignSpace) -> list[str | PageTable]:
         text,
         *_left_out(space),
         *(f"Warning: {doubt}." for doubt in doubts(space)),
+        *_unknown(space, ranked_metrics(space)),
         PageTable(["metric", "", "value", "design", *space.swept], rows),
     ]
 
@@ -323,9 +324,9 @@ def varies(space: DesignSpace, name: str) -> bool:
 
 def _failures(space: DesignSpace) -> list[str | PageTable]:
     """Designs that are not stable, grouped by reason; reasons that differ in numbers are one."""
-    others = space.of_status(*STATUSES[1:])
+    others, unknown = space.of_status(*STATUSES[1:]), [*_unknown(space, space.designs)]
     if not len(others):
-        return ["Every design is stable."]
+        return ["Every design is stable.", *unknown]
     statuses, reasons = (space.designs[name] for name in ("status", "reason"))
     groups: dict[tuple[str, str], list[int]] = {}
     for row in others.tolist():
@@ -337,7 +338,12 @@ def _failures(space: DesignSpace) -> list[str | PageTable]:
         why = reason or WITHOUT_REASON.get(status, "")
         rows.append([status, f"{count:,}", why, space.number(row), *space.point(row)])
     head = ["status", "designs", "reason, as of the example", "example", *space.swept]
-    return shortened(PageTable(head, rows[:MOST_ROWS]), len(rows))
+    return [*shortened(PageTable(head, rows[:MOST_ROWS]), len(rows)), *unknown]
+
+
+def _unknown(space: DesignSpace, names: Iterable[str]) -> Iterator[str]:
+    """Where searches failed, of the columns with these names."""
+    return (f"Warning: {line}." for line in failed_searches(space.designs, {*names}))
 
 
 def _bistability(space: DesignSpace) -> list[str | PageTable]:

@@ -13,8 +13,10 @@ from dpgcli.sweeps.expressions import Expression, conjuncts
 from dpgcli.sweeps.fronts import on_front
 from dpgcli.sweeps.gate import (
     Trusts,
+    counts_of,
     doubts,
     failed_searches,
+    failed_searches_of,
     have_values,
     holds,
     requirement,
@@ -140,7 +142,8 @@ def selected(columns: Columns, is_usable: Flags, asked: Question) -> Selection:
     is not chosen. Rows go by the first objective, then by the next, and last by their place.
     """
     usable = np.flatnonzero(is_usable)
-    own = {name: columns[name][usable] for name in asked.names} | {"": usable}
+    names = (*asked.names, *counts_of(asked.names, columns))
+    own = {name: columns[name][usable] for name in names} | {"": usable}
     n_rows = len(usable)
     met = [holds(rule, own) for rule in asked.conditions]
     known = [have_values(own, rule.names) for rule in asked.conditions]
@@ -177,9 +180,10 @@ def warnings_of(asked: Question, columns: Columns, trusts: Trusts) -> tuple[Mess
     """Why nothing should be chosen by some of the columns, in a line for each reason."""
     named: list[Message | str] = []
     for rule in asked.conditions:
-        named += [*doubts(rule, trusts, WHERE), *failed_searches(columns, rule, WHERE)]
+        named += [*doubts(rule, trusts, WHERE), *failed_searches_of(rule, columns, WHERE)]
     for field, names in (("minimize", asked.minimize), ("maximize", asked.maximize)):
         found = doubts_about({name: trusts.get(name, ()) for name in names})
+        found += failed_searches(columns, names)
         named += [Message(Field(field), f": {why}") for why in found]
     return tuple(dict.fromkeys(named))
 

@@ -1,8 +1,9 @@
 """Requirements on a table of designs: thresholds that every design has to meet."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import compress, product
 
 import numpy as np
 
@@ -10,9 +11,21 @@ from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
+from dpgcli.sweeps.metrics import (
+    METRICS,
+    UNKNOWN_DIRECTIONS,
+    UNKNOWN_GRASPS,
+    UNKNOWN_STATES,
+    Metric,
+)
 from dpgcli.text import counted, printable
 
-REACHABLE, UNKNOWN = "n_reachable", "n_unknown_directions"
+BOUNDS = {metric.name: metric for metric in METRICS if metric.unknown}
+MEANINGS = {
+    UNKNOWN_DIRECTIONS: "more states may be reached there",
+    UNKNOWN_STATES: "there may be more states there, and values beyond those found",
+    UNKNOWN_GRASPS: "more states may touch the body there, with larger forces",
+}
 
 
 @dataclass(frozen=True)
@@ -62,10 +75,16 @@ class RequirementVerdict:
     def _text(self) -> str:
         return printable(self.requirement.text)
 
+    @property
+    def _told(self) -> set[str]:
+        """Columns that say why a design fails: those that are named, and counts of the unknown."""
+        failed = {metric.unknown for metric, _ in _bounds(self.designs, self.requirement.names)}
+        return {*self.requirement.names, *failed}
+
     def failures(self, limit: int | None = None) -> list[Failure]:
         """The designs that fail, in the order of the table; at most `limit`."""
         swept = swept_names(self.designs)
-        needed = [name for name in self.designs if name in self.requirement.names]
+        needed = [name for name in self.designs if name in self._told]
         shown = {name: column[self.rows[:limit]].tolist() for name, column in self.designs.items()}
         rows = (dict(zip(shown, row, strict=True)) for row in zip(*shown.values(), strict=True))
         return [
@@ -155,18 +174,28 @@ def swept_names(designs: Columns) -> list[str]:
 def failing(designs: Columns, rule: Expression) -> Indices:
     """Numbers of the rows that do not meet a requirement; excluded designs are left aside.
 
-    A design without a stable state meets none, nor does one where a value is NaN or has none.
+    A design without a stable state meets none, nor does one where a value is NaN or has none. Where
+    searches failed, what is not known has to meet it as well as what was found.
     """
     met = (designs["n_stable"] > 0) & holds(rule, designs)
     return np.flatnonzero(~met & _in_question(designs))
 
 
 def holds(rule: Expression, columns: Columns) -> Flags:
-    """In which rows a comparison holds: in none where a value is NaN, or where it has none."""
+    """In which rows a comparison holds: in none where a value is NaN, or where it has none.
+
+    Where searches failed it holds for all that may be there, as far as its ends tell.
+    """
     values = {name: columns[name] for name in rule.names}
-    truth = np.asarray(rule(values), float)
     met = have_values(columns, rule.names)
-    met &= np.isfinite(truth) & (truth != 0.0)
+    bounds = _bounds(columns, rule.names)
+    for beyond in product((False, True), repeat=len(bounds)):
+        ends = {
+            metric.name: np.where(is_open, metric.furthest, values[metric.name])
+            for metric, is_open in compress(bounds, beyond)
+        }
+        truth = np.asarray(rule({**values, **ends}), float)
+        met &= np.isfinite(truth) & (truth != 0.0)
     return met
 
 
@@ -176,6 +205,19 @@ def have_values(columns: Columns, names: Iterable[str]) -> Flags:
     for name in names:
         have &= ~np.isnan(columns[name])
     return have
+
+
+def counts_of(names: Iterable[str], columns: Container[str]) -> list[str]:
+    """Those of the columns that count failed searches for columns with some names."""
+    counts = dict.fromkeys(BOUNDS[name].unknown for name in names if name in BOUNDS)
+    return [count for count in counts if count in columns]
+
+
+def _bounds(columns: Columns, names: Collection[str]) -> list[tuple[Metric, Flags]]:
+    """Metrics among columns that are bounds where searches failed, and in which rows."""
+    told = [BOUNDS[name] for name in sorted(names) if name in BOUNDS]
+    found = [(metric, columns[metric.unknown] > 0) for metric in told if metric.unknown in columns]
+    return [(metric, is_open) for metric, is_open in found if is_open.any()]
 
 
 def check_designs(
@@ -210,21 +252,27 @@ def check_requirements(
             rule,
             n_checked,
             failing(designs, rule),
-            (*doubts(rule, trusts or {}), *failed_searches(designs, rule)),
+            (*doubts(rule, trusts or {}), *failed_searches_of(rule, designs)),
         )
         for rule in requirements
     )
 
 
-def failed_searches(
-    designs: Columns, rule: Expression, field: str = "require"
+def failed_searches_of(
+    rule: Expression, columns: Columns, field: str = "require"
 ) -> tuple[Message, ...]:
-    """That a count of states is that of those found, where searches failed."""
-    if REACHABLE not in rule.names or UNKNOWN not in designs:
-        return ()
-    n = int(((designs[UNKNOWN] > 0) & _in_question(designs)).sum())
-    why = f"searches failed in {counted(n, 'design')} ({UNKNOWN}): more states may be reached there"
-    return (Message(Field(field), f" {rule.text!r}: {why}"),) if n else ()
+    """The same of the columns that a comparison names."""
+    found = failed_searches(columns, rule.names)
+    return tuple(Message(Field(field), f" {rule.text!r}: {why}") for why in found)
+
+
+def failed_searches(columns: Columns, names: Collection[str]) -> list[str]:
+    """What is not known of columns with these names, where searches failed: in lines."""
+    found = {metric.unknown: int(is_open.sum()) for metric, is_open in _bounds(columns, names)}
+    return [
+        f"searches failed in {counted(n, 'design')} ({name}): {MEANINGS[name]}"
+        for name, n in found.items()
+    ]
 
 
 def _in_question(designs: Columns) -> Flags:

@@ -29,13 +29,21 @@ class Metric(Column):
     """A column of designs: what `of` makes of all their states, (design,).
 
     Or, with a value `over` the states, the `extreme` of it among a design's stable ones. What
-    `needs_pressure` is there for designs that have it.
+    `needs_pressure` is there for designs that have it. Where the count `unknown` is not 0 searches
+    failed, and the metric is that of what was found: a bound, from above of a minimum, else from
+    below.
     """
 
     of: Callable[["Metrics"], NDArray[Any]] = field(kw_only=True, compare=False)
     over: str = field(default="", kw_only=True)
-    extreme: np.ufunc = field(default=np.minimum, kw_only=True)
+    extreme: np.ufunc = field(default=np.maximum, kw_only=True)
+    unknown: str = field(default="", kw_only=True)
     needs_pressure: bool = field(default=False, kw_only=True)
+
+    @property
+    def furthest(self) -> float:
+        """How far the metric may be from what was found, where searches failed."""
+        return -np.inf if self.extreme is np.minimum else np.inf
 
 
 @dataclass
@@ -51,12 +59,16 @@ class Metrics:
     n_designs: int
     pressure: Pressure | None = None
     n_stable: Indices = field(init=False)
+    n_unknown_states: Indices = field(init=False)
     n_grasps: Indices | None = field(init=False, default=None)  # None without bodies
+    n_unknown_grasps: Indices = field(init=False)
     extremes: dict[str, Array] = field(init=False, default_factory=dict)
     n_told: dict[str, Indices] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.n_stable = np.zeros(self.n_designs, np.int64)
+        self.n_unknown_states = np.zeros(self.n_designs, np.int64)
+        self.n_unknown_grasps = np.zeros(self.n_designs, np.int64)
         self.length = np.broadcast_to(self.units.finger.straight_length, self.n_designs)
         self.hulls: list[tuple[Indices, Any]] = []
         self.tips = DistinctTips()
@@ -66,7 +78,9 @@ class Metrics:
         block = {name: values.reshape(self.n_designs, -1) for name, values in rows.items()}
         block["reach"] = np.hypot(block["tip_x_mm"], block["tip_y_mm"])
         stable = block["status"] == Status.STABLE
+        is_lost = block["status"] == Status.NOT_CONVERGED
         self.n_stable += stable.sum(axis=1)
+        self.n_unknown_states += is_lost.sum(axis=1)
         for metric in METRICS:
             if metric.over in block:
                 is_told = stable & self._is_known(metric, block[metric.over])
@@ -74,6 +88,8 @@ class Metrics:
         if "n_contacts" in block:
             n_before = 0 if self.n_grasps is None else self.n_grasps
             self.n_grasps = n_before + (stable & (block["n_contacts"] > 0)).sum(axis=1)
+            is_answer = np.isin(block["grasp_status"], (Status.STABLE, Status.NOT_HELD))
+            self.n_unknown_grasps += (is_lost | stable & ~is_answer).sum(axis=1)
         self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
     def columns(self, only: Collection[str] | None = None) -> Columns:
@@ -138,6 +154,8 @@ class Metrics:
 
 
 SHAPES = (Output.SHAPES,)
+UNKNOWN_STATES, UNKNOWN_GRASPS = "n_unknown_states", "n_unknown_grasps"
+UNKNOWN_DIRECTIONS = "n_unknown_directions"
 
 
 def _count(
@@ -146,8 +164,9 @@ def _count(
     of: Callable[[Metrics], Array | Indices],
     outputs: tuple[Output, ...] = (),
     group: Group = Group.STATES,
+    unknown: str = "",
 ) -> Metric:
-    return Metric(name, "", description, group, Kind.COUNT, outputs=outputs, of=of)
+    return Metric(name, "", description, group, Kind.COUNT, outputs=outputs, of=of, unknown=unknown)
 
 
 def _least(
@@ -161,7 +180,18 @@ def _least(
     def extreme(metrics: Metrics) -> Array:
         return metrics.extreme(name)
 
-    return Metric(name, unit, description, group, outputs=outputs, of=extreme, over=over)
+    unknown = UNKNOWN_GRASPS if group is Group.GRASP else UNKNOWN_STATES
+    return Metric(
+        name,
+        unit,
+        description,
+        group,
+        outputs=outputs,
+        of=extreme,
+        over=over,
+        extreme=np.minimum,
+        unknown=unknown,
+    )
 
 
 def _most(
@@ -182,13 +212,21 @@ def _under_pressure(
     description: str,
     of: Callable[["PressedDesigns"], NDArray[Any]],
     kind: Kind = Kind.NUMBER,
+    unknown: str = "",
 ) -> Metric:
     def of_pressed(metrics: Metrics) -> NDArray[Any]:
         return of(metrics.pressed)
 
     outputs = (Output.PRESSURES,)
     return Metric(
-        name, unit, description, kind=kind, outputs=outputs, of=of_pressed, needs_pressure=True
+        name,
+        unit,
+        description,
+        kind=kind,
+        outputs=outputs,
+        of=of_pressed,
+        needs_pressure=True,
+        unknown=unknown,
     )
 
 
@@ -199,6 +237,7 @@ UNDER_PRESSURE = (
         "states that pulses of pressure lead to from rest",
         lambda d: d.n_reachable,
         Kind.COUNT,
+        UNKNOWN_DIRECTIONS,
     ),
     _under_pressure(
         "reachable_patterns",
@@ -208,7 +247,7 @@ UNDER_PRESSURE = (
         Kind.TEXT,
     ),
     _under_pressure(
-        "n_unknown_directions",
+        UNKNOWN_DIRECTIONS,
         "",
         "directions of pressure in which searches failed: more states may be reached",
         lambda d: d.n_unknown_directions,
@@ -249,12 +288,24 @@ UNDER_PRESSURE = (
 METRICS = (
     _count("n_units", "number of units", lambda m: m.alike(m.units.finger.n_units)),
     _count("n_states", "number of patterns", lambda m: m.alike(2**m.units.finger.n_units)),
-    _count("n_stable", "number of certified states", lambda m: m.n_stable, SHAPES),
+    _count(
+        "n_stable",
+        "number of certified states",
+        lambda m: m.n_stable,
+        SHAPES,
+        unknown=UNKNOWN_STATES,
+    ),
+    _count(
+        UNKNOWN_STATES,
+        "patterns whose search failed: there may be more states",
+        lambda m: m.n_unknown_states,
+    ),
     _count(
         "n_distinct_tips",
         f"tips told apart on a grid of 1/{TIPS_PER_LENGTH:,} of the finger's length",
         lambda m: m.tips.counts(m.n_designs),
         SHAPES,
+        unknown=UNKNOWN_STATES,
     ),
     Metric(
         "workspace_area_mm2",
@@ -262,6 +313,7 @@ METRICS = (
         "area of the tips' convex hull",
         outputs=SHAPES,
         of=Metrics.area,
+        unknown=UNKNOWN_STATES,
     ),
     _least("reach_min_mm", "mm", "smallest distance of a tip from the base", "reach", *SHAPES),
     _most("reach_max_mm", "mm", "largest distance of a tip from the base", "reach", *SHAPES),
@@ -310,6 +362,13 @@ METRICS = (
         lambda m: m.alike(0) if m.n_grasps is None else m.n_grasps,
         (Output.SHAPES, Output.FORCES),
         Group.GRASP,
+        UNKNOWN_GRASPS,
+    ),
+    _count(
+        UNKNOWN_GRASPS,
+        "states whose grasp is not found: more may touch the body, with larger forces",
+        lambda m: m.n_unknown_grasps,
+        group=Group.GRASP,
     ),
     _most(
         "squeeze_max_N",

@@ -10,8 +10,13 @@ import pytest
 
 import dpgcli as dpg
 from dpgcli.api.sweep import SweepResult
+from dpgcli.arrays import Codes, Columns
 from dpgcli.errors import SpecError
+from dpgcli.states.certify import Status
+from dpgcli.sweeps import grasps
 from dpgcli.sweeps.grasps import NAMES
+
+FORCES = ("squeeze_N", "max_contact_N")
 
 LATTICE = {
     "segment_length_mm": 13.5,
@@ -178,3 +183,24 @@ def test_rigid_and_elastic_bars_meet_a_body_in_one_sweep() -> None:
     places = ("object.at_y_mm", [-9.0, 0.0])  # the second is in the base
     found = swept(ALONE | {"object": disc}, places, bars)
     assert [status == "invalid" for status in found.designs["status"]] == [False, False, True, True]
+
+
+def test_grasps_that_are_not_found_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are no answer: no bound on forces is met by them."""
+    rows_of = grasps.grasp_rows
+
+    def losing(own: grasps.Encounter, codes: Codes) -> Columns:
+        rows = rows_of(own, codes)
+        is_lost = codes == 7
+        rows["grasp_status"] = np.where(is_lost, Status.NOT_CONVERGED, rows["grasp_status"])
+        lost = {name: np.where(is_lost, np.nan, rows[name]) for name in FORCES}
+        return {**rows, **lost, "n_contacts": np.where(is_lost, 0, rows["n_contacts"])}
+
+    monkeypatch.setattr(grasps, "grasp_rows", losing)
+    axis = ("object.disc.diameter_mm", [1.0, 20.0])
+    result = swept(SPEC, axis, require=["contact_max_N < 100", "contact_max_N > 0.01"])
+    assert result.designs["n_unknown_grasps"].tolist() == [1, 1]
+    assert result.designs["n_unknown_states"].tolist() == [0, 0]
+    assert [verdict.rows.tolist() for verdict in result.verdicts] == [[0, 1], [0]]
+    assert "searches failed in 2 designs (n_unknown_grasps)" in result.report
+    assert any("searches failed in 2 designs" in str(line) for line in result.warnings)

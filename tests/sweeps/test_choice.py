@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import UsageError
-from dpgcli.sweeps.choice import Question, Selection, question, selected
+from dpgcli.sweeps.choice import Question, Selection, question, selected, warnings_of
 
 NAN = float("nan")
 COLUMNS = {
@@ -104,3 +104,17 @@ def test_a_question_says_what_it_asks_for() -> None:
         "where": ["count > 1"], "minimize": ["reach"], "maximize": ["height"], "top": 3,
     }  # fmt: skip
     assert not Question(minimize=("reach",)).is_front
+
+
+def test_what_is_not_known_is_not_chosen_by_it() -> None:
+    """And a choice by largest values that may be larger is warned of."""
+    columns = {
+        "contact_max_N": np.array([1.0, 2.0, 3.0]),
+        "n_unknown_grasps": np.array([0, 4, 0]),
+    }
+    asked = question(["contact_max_N < 2.5"], [], ["contact_max_N"], None, list(columns))
+    assert selected(columns, np.ones(3, bool), asked).places.tolist() == [0]
+    found = "searches failed in 1 design (n_unknown_grasps): more states may touch the body"
+    where, maximize = map(str, warnings_of(asked, columns, {}))
+    assert where.startswith("where 'contact_max_N < 2.5': " + found)
+    assert maximize.startswith("maximize: " + found)

@@ -112,3 +112,57 @@ def test_a_requirement_that_all_meet() -> None:
 def test_an_empty_space_meets_nothing(designs: Columns) -> None:
     with pytest.raises(NothingSelectedError, match="no design to check"):
         check_requirements(designs, [requirement("area_mm2 > 0", COLUMNS)])
+
+
+SEARCHED: Columns = {
+    **rows(slice(3)),
+    "n_stable": np.array([8, 8, 8]),
+    "n_unknown_states": np.array([0, 0, 1]),
+    "n_unknown_grasps": np.array([0, 2, 0]),
+    "n_unknown_directions": np.array([1, 0, 0]),
+    "reach_min_mm": np.array([5.0, 5.0, 5.0]),
+    "reach_max_mm": np.array([9.0, 9.0, 9.0]),
+    "n_grasps": np.array([4, 4, 4]),
+    "squeeze_max_N": np.array([1.0, 1.0, 1.0]),
+    "contact_max_N": np.array([2.0, 2.0, 2.0]),
+    "n_reachable": np.array([4, 4, 4]),
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("contact_max_N < 3", [1]),
+        ("contact_max_N > 1", []),  # whatever else is there
+        ("0 < squeeze_max_N < 3", [1]),
+        ("n_grasps <= 4", [1]),
+        ("n_grasps >= 4", []),
+        ("not n_grasps > 4", [1]),
+        ("squeeze_max_N < contact_max_N", [1]),  # either may be larger
+        ("squeeze_max_N < 0.5 or contact_max_N > 1", []),
+        ("reach_max_mm < 10", [2]),
+        ("reach_max_mm > 8", []),
+        ("reach_min_mm > 4", [2]),
+        ("reach_min_mm < 6", []),
+        ("n_stable == 8", [2]),
+        ("n_reachable < 5 and reach_max_mm < 10", [0, 2]),
+        ("gap_mm < 3", [1]),  # a NaN, and no bound
+        ("area_mm2 < 4", []),
+    ],
+)
+def test_what_is_not_known_meets_no_bound(text: str, rows: list[int]) -> None:
+    """Of states that are not found the extremes are bounds on one side."""
+    rule = requirement(text, number_columns(SEARCHED))
+    assert failing(SEARCHED, rule).tolist() == rows
+
+
+def test_failed_searches_are_warned_of_and_shown() -> None:
+    rule = requirement("contact_max_N + reach_max_mm < 20", number_columns(SEARCHED))
+    (verdict,) = check_requirements(SEARCHED, [rule])
+    grasps, states = map(str, verdict.warnings)
+    assert "searches failed in 1 design (n_unknown_states): there may be more states" in states
+    assert "searches failed in 1 design (n_unknown_grasps): more states may touch" in grasps
+    found = [failure.found for failure in verdict.failures()]
+    assert [own["n_unknown_grasps"] for own in found] == [2, 0]
+    (verdict,) = check_requirements(SEARCHED, [requirement("area_mm2 < 9", COLUMNS)])
+    assert verdict.warnings == ()

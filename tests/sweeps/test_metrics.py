@@ -75,7 +75,7 @@ def test_metrics_scale_with_the_finger(graded_finger: Fingers, length: float) ->
         expected = values * powers.get(suffix, 1)
         np.testing.assert_allclose(other.metrics[name], expected, rtol=1e-9, err_msg=name)
         compared += 1
-    assert compared == 10
+    assert compared == 11
     assert one.metrics["workspace_area_mm2"] > 1.0
     assert one.metrics["n_distinct_tips"] == 32
 
