@@ -280,19 +280,38 @@ def pairs_of(patterns: Sequence[str], scene: Scene, both: bool) -> tuple[Codes, 
     n, is_pair = scene.finger.n_units, scene.gripper is not None
     if not is_pair and (both or any("/" in text for text in patterns)):
         raise UsageError(Field("patterns"), ": pairs of states need a gripper in the spec")
+    single, n_rows = [text for text in patterns if "/" not in text], 0
     found: list[tuple[Codes, Codes]] = []
-    single = [text for text in patterns if "/" not in text]
     if single or not patterns:  # none at all selects nothing
         own = _codes(single, n)
+        n_rows = _counted(0, len(own) ** 2 if both else len(own))
         found.append(_crossed(own, own) if both else (own, own))
     for text in patterns:
         upper, is_one, lower = text.partition("/")
         if is_one:
-            found.append(_crossed(_codes([upper], n), _codes([lower], n)))
-    uppers, lowers = (np.concatenate(part) for part in zip(*found, strict=True))
-    if len(uppers) > MOST_ROWS:
-        raise UsageError(f"{len(uppers):,} grasps: expected at most {MOST_ROWS:,}")
-    return (uppers, lowers) if is_pair else (uppers,)
+            halves = _codes([upper], n), _codes([lower], n)
+            n_rows = _counted(n_rows, len(halves[0]) * len(halves[1]))
+            found.append(_crossed(*halves))
+    pairs = np.stack([np.concatenate(part) for part in zip(*found, strict=True)])
+    if len(found) > 1:
+        pairs = _each_once(pairs)
+    return tuple(pairs) if is_pair else (pairs[0],)
+
+
+def _each_once(pairs: Codes) -> Codes:
+    """Pairs (2, row), each once: where it came first."""
+    order = np.lexsort(pairs)
+    is_new = np.ones(len(order), bool)
+    is_new[1:] = (np.diff(pairs[:, order], axis=1) != 0).any(axis=0)
+    return pairs[:, np.sort(order[is_new])]
+
+
+def _counted(n_before: int, n_more: int) -> int:
+    """So many rows, before they are made. Raises UsageError for too many."""
+    n_rows = n_before + n_more
+    if n_rows > MOST_ROWS:
+        raise UsageError(f"{n_rows:,} grasps: expected at most {MOST_ROWS:,}")
+    return n_rows
 
 
 def _codes(globs: Sequence[str], n_units: int) -> Codes:

@@ -85,3 +85,26 @@ def test_work_counts_states_once_and_rows_of_bodies_that_move() -> None:
     assert (fixed.n_states, fixed.n_rows) == (16, 64)
     assert moving.seconds > 3.0 * fixed.seconds
     assert work_of(scene(5), pairs, Way.INSERT).seconds > fixed.seconds
+
+
+def test_too_many_pairs_are_refused_before_they_are_made() -> None:
+    """Two to the 28 of them take gigabytes."""
+    long = scene(14)
+    for patterns, both in ((["*"], True), (["*/*"], False), (["0*/1*", "*/*"], False)):
+        tracemalloc.start()
+        with pytest.raises(UsageError, match="grasps: expected at most"):
+            pairs_of(patterns, long, both)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+        tracemalloc.stop()
+
+
+def test_each_pair_is_there_once() -> None:
+    """In the order in which they come first, as states are."""
+    own = scene(3)
+    upper, lower = pairs_of(["11*/000", "001", "110/00*", "11*/000"], own, both=False)
+    assert list(zip(upper.tolist(), lower.tolist(), strict=True)) == [
+        (1, 1),
+        (6, 0),
+        (7, 0),
+        (6, 1),
+    ]
