@@ -52,12 +52,15 @@ class ActuateResult:
     """What happened to a finger under pressure, and where it ended.
 
     `given` is the spec with its lines, `history` the pressures by step, `way` what was followed.
-    `branches` are the unstable ones by the number of the event, if they were asked for.
+    It began at the pattern `start`, and went through the history `cycles` times. `branches` are the
+    unstable ones by the number of the event, if they were asked for.
     """
 
     given: PressedInput
     history: GivenHistory
     way: Travel
+    start: str
+    cycles: int
     branches: Mapping[int, PathPoints] = field(default_factory=dict)
 
     @cached_property
@@ -191,11 +194,14 @@ class ActuateResult:
         """
         from dpgcli.files.actuation import write_path
         from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_metadata import told_history
 
         given, table = self.given.given, path_of("path", path)
         check_outputs((*given.files, *self.history.files), (table, Mark.TABLE))
         events = self.columns, self.rows
-        write_path(table_path(table), given.scene, given.json, self._path, events)
+        chosen = told_history(self.given.pressure, self.history.history)
+        chosen |= {"start": self.start, "cycles": self.cycles}
+        write_path(table_path(table), given.scene, given.json, self._path, events, chosen)
 
     def draw(self, path: str | Path) -> None:
         """Draw pressure against the tip, with shapes at the holds, to a .svg or .png file."""
@@ -253,8 +259,10 @@ def followed(
             Field("cycles"),
             f" {cycles:,}: expected at most {MOST_PRESSURES:,}, as the path is held in memory",
         )
+    check_texts(start=start)
+    start = start or "0" * given.pressed.finger.n_units
     way = travel(given.pressed, _start(given, start), by_unit, cycles, LARGEST_STEP)
-    result = ActuateResult(given, history, way)
+    result = ActuateResult(given, history, way, start, cycles)
     if result.problem:
         is_large = np.abs(by_unit).max() > LARGE
         hint = "; pressures are in MPa, of which 150 kPa are 0.15" if is_large else ""
@@ -264,9 +272,7 @@ def followed(
 
 def _start(given: PressedInput, pattern: str) -> Shapes:
     """The shape at rest that a way begins with. Raises UsageError where there is none."""
-    check_texts(start=pattern)
     n_units = given.pressed.finger.n_units
-    pattern = pattern or "0" * n_units
     if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
         raise UsageError(Field("start"), f" {pattern}: expected {n_units} digits, 0 or 1")
     inverted = np.array([[digit == "1"] for digit in pattern])

@@ -52,6 +52,7 @@ class GraspResult:
 
     given: SceneInput
     grasps: Grasps
+    way: Way
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -142,13 +143,17 @@ class GraspResult:
         Raises OutputError, and UsageError for a file that was read or a name of another format.
         """
         from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_file.objects import told_of
+        from dpgcli.files.scene_metadata import told_history
         from dpgcli.files.scene_rows import write_scene_rows
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
-        write_scene_rows(
-            table_path(table), self.grasps.scene, self.given.json, self.columns, self.rows
-        )
+        scene = self.grasps.scene
+        chosen = {"object": told_of(self.grasps.body, scene.held), "approach": self.way.value}
+        if (closing := self.grasps.closing) is not None:
+            chosen |= told_history(closing.pressure, closing.history)
+        write_scene_rows(table_path(table), scene, self.given.json, self.columns, self.rows, chosen)
 
     def draw(self, path: str | Path) -> None:
         """Draw the fingers on the body, with forces and inverted units, to a .svg or .png file."""
@@ -247,7 +252,8 @@ def grasp_of(
     pairs = pairs_of(patterns, scene, both)
     check_work(work_of(scene, pairs, way, closing))
     keep_freed_memory()
-    return GraspResult(given, grasps(scene, chain_potential, scene.body, pairs, way, closing))
+    found = grasps(scene, chain_potential, scene.body, pairs, way, closing)
+    return GraspResult(given, found, way)
 
 
 def work_of(

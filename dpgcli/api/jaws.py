@@ -24,7 +24,7 @@ from dpgcli.api.inputs import (
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws
-from dpgcli.design.scene import Scene
+from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.jaw_table import COLUMNS, PATH_COLUMNS, by_number, jaw_rows, path_rows
@@ -49,6 +49,7 @@ class JawsResult:
 
     given: SceneInput
     jaws: Jaws
+    gaps: tuple[float, float]
     path: JawPath
 
     @property
@@ -123,12 +124,22 @@ class JawsResult:
         Raises OutputError, and UsageError for a file that was read or a name of another format.
         """
         from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_file.objects import told_of
         from dpgcli.files.scene_rows import write_scene_rows
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
         rows = path_rows(self.path, self.n_units)
-        write_scene_rows(table_path(table), self.given.scene, self.given.json, PATH_COLUMNS, rows)
+        scene = self.given.scene
+        body, gaps = told_of(self.jaws, Held.FIXED), [*self.gaps]
+        write_scene_rows(
+            table_path(table),
+            scene,
+            self.given.json,
+            PATH_COLUMNS,
+            rows,
+            {"object": body, "gaps_mm": gaps},
+        )
 
     def draw(self, path: str | Path) -> None:
         """Draw force by aperture, and by the number of inverted units, to a .svg or .png file."""
@@ -176,9 +187,8 @@ def jaws_of(
     codes = states_of(scene, patterns)
     keep_freed_memory()
     upper = frames(scene.gripper)[0]
-    return JawsResult(
-        given, body, jaw_path(scene, chain_potential, body, upper, codes, (first, last))
-    )
+    path = jaw_path(scene, chain_potential, body, upper, codes, (first, last))
+    return JawsResult(given, body, (first, last), path)
 
 
 def states_of(scene: Scene, patterns: Sequence[str]) -> Codes:

@@ -44,13 +44,17 @@ MOST_UNITS = 12  # seconds of work
 class LandscapeResult:
     """States and saddles on the path of least barriers, and the energy between them.
 
-    `graph` has all states and barriers, `landscape` those on the path; `n_ways` paths are as good.
+    `graph` has all states and barriers, `landscape` those on the path from `start` over `via` to
+    `end`; `n_ways` paths are as good.
     """
 
     given: SceneInput
     graph: BarrierGraph
     landscape: Landscape
     n_ways: int
+    start: str
+    end: str
+    via: tuple[str, ...]
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -114,8 +118,9 @@ class LandscapeResult:
 
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
+        chosen = {"from": self.start, "to": self.end, "via": [*self.via]}
         write_scene_rows(
-            table_path(table), self.given.scene, self.given.json, self.columns, self.rows
+            table_path(table), self.given.scene, self.given.json, self.columns, self.rows, chosen
         )
 
     def draw(self, path: str | Path) -> None:
@@ -164,7 +169,8 @@ def landscape_of(
     legs = [_leg(graph, pattern, field, other) for (_, pattern), (field, other) in pairwise(named)]
     units = [unit for leg in legs for unit in leg.units]
     n_ways = prod(leg.n_ways for leg in legs)
-    return LandscapeResult(given, graph, graph.along(int(start, 2), units), n_ways)
+    along = graph.along(int(start, 2), units)
+    return LandscapeResult(given, graph, along, n_ways, start, end, tuple(via))
 
 
 def _check(named: Sequence[tuple[str, str]], n_units: int) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -129,6 +129,23 @@ class ObjectSpec(Section):
         if self.mass_g is not None and self.friction is None:
             return [NO_FRICTION]
         return list(_wrong_sides(self.polygon or []))
+
+
+def told_of(body: Body, held: str) -> dict[str, Any]:
+    """A body as a spec's object says it, in plain values.
+
+    >>> told_of(Disc(np.array([40.0, 0.0]), 20.0), "free")
+    {'disc': {'diameter_mm': 40.0}, 'at_mm': [40.0, 0.0], 'held': 'free'}
+    """
+    if isinstance(body, Disc):
+        kind: dict[str, Any] = {"disc": {"diameter_mm": 2.0 * body.radius}}
+    elif isinstance(body, Jaws):
+        kind = {"jaws": {"gap_mm": body.gap, "height_mm": body.height}}
+        if body.stiffness is not None:
+            kind["compliance"] = {"stiffness_N_per_mm": body.stiffness}
+    else:
+        kind = {POLYGON: body.around.T.tolist()}
+    return {**kind, PLACE: body.center.tolist(), "held": held}
 
 
 def _wrong_sides(corners: list[Corner]) -> Iterator[Issue]:
