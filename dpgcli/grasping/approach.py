@@ -31,7 +31,8 @@ class Reset:
 
     `push` (cell, lane) are the pushes, N, at the fold; `snapped` are those that are inverted now.
     Where it is pressures that changed, `pressure` (unit, lane), MPa, is that of each unit, and
-    `tied` (unit, lane) are those whose thresholds are the same, if there are several.
+    `tied` (unit, lane) are those whose thresholds are the same, if there are several. Loads
+    `of_release` are shares of letting go.
     """
 
     lanes: Indices
@@ -41,10 +42,12 @@ class Reset:
     snapped: Flags
     tied: Flags
     pressure: Array | None = None
+    of_release: bool = False
 
     def take(self, index: Indices) -> "Reset":
         """The same of some of the lanes, by their places here."""
-        parts = {key: part[..., index] for key, part in vars(self).items() if part is not None}
+        arrays = {key: part for key, part in vars(self).items() if isinstance(part, np.ndarray)}
+        parts = {key: part[..., index] for key, part in arrays.items()}
         return replace(self, **parts)
 
     def take_units(self, units: slice) -> "Reset":

@@ -115,11 +115,10 @@ def _let_go(
 
 
 def _events(resets: Sequence[Reset], index: Indices) -> Iterator[Reset]:
-    """What happened as fingers closed, by the rows whose lanes are at `index`."""
+    """What happened before bodies are let go of, by the rows whose lanes are at `index`."""
     for reset in resets:
-        if reset.pressure is not None:
-            rows = np.flatnonzero(np.isin(index, reset.lanes))
-            yield replace(reset.take(np.searchsorted(reset.lanes, index[rows])), lanes=rows)
+        rows = np.flatnonzero(np.isin(index, reset.lanes))
+        yield replace(reset.take(np.searchsorted(reset.lanes, index[rows])), lanes=rows)
 
 
 def _of_jaws(motion: Motion) -> Motion:
@@ -176,4 +175,5 @@ def released(own: Obstructed, shapes: ContactShapes) -> Approach:
     potential = own.pressed(shapes.inverted, shapes.push, begin + 1.0)
     kept = potential.evaluate(shapes.coordinates).gradient[own.n_own :]
     keeping = replace(own, depth=np.zeros(1), motion=replace(own.motion, hold=kept))
-    return approach(keeping, shapes, begin, begin + 1.0)
+    gone = approach(keeping, shapes, begin, begin + 1.0)
+    return replace(gone, resets=tuple(replace(own, of_release=True) for own in gone.resets))

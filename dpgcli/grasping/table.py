@@ -274,19 +274,20 @@ def _joined(
 def _happened(finger: Grasped, closing: Closing | None) -> Columns:
     """What happened to each lane on the way, by column.
 
-    Such as "1 at 0.672; 2 at 0.91" and, as pressures changed, "snap 1,2 at 0.1495 MPa".
+    Such as "1 at 0.672; 2 at 0.91 of letting go" and, as pressures changed, "snap 1 at 0.1 MPa".
     """
     n = len(finger.code)
     words: dict[str, list[list[str]]] = {
         name: [[] for _ in range(n)] for name in ("resets", *OF_CLOSING)
     }
     for reset in finger.resets:
+        of_what = " of letting go" if reset.of_release else ""
         for place, lane in enumerate(reset.lanes):
             if not reset.flipped[:, place].any():  # it is the other finger's
                 continue
             if closing is None or reset.pressure is None:
                 units = _numbers(np.flatnonzero(reset.flipped[:, place]))
-                words["resets"][lane].append(f"{units} at {reset.load[place]:.4g}")
+                words["resets"][lane].append(f"{units} at {reset.load[place]:.4g}{of_what}")
                 continue
             words["events"][lane].append(event_text(reset, place, closing.pressure))
             if tied := _numbers(np.flatnonzero(reset.tied[:, place])):

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array
 from dpgcli.design.bodies import Body, Disc, Jaws
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp
-from dpgcli.grasping.approach import Way
+from dpgcli.grasping.approach import Reset, Way
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.grasp import placed
 from dpgcli.grasping.release import motion_of, released, together
@@ -277,3 +277,25 @@ def test_jaws_that_give_way_balance(stiffness: float, reference_finger: Fingers)
     assert squeeze > 0.01 and squeeze == pytest.approx(stiffness * (56.0 - gap), rel=1e-9)
     rigid = grasp_rows(grasped(scene, replace(jaws, gap=gap, stiffness=None), Held.FIXED, "01/01"))
     assert rigid["squeeze_N"] == pytest.approx([squeeze], rel=1e-8)
+
+
+def test_resets_before_letting_go_are_told(reference_finger: Fingers) -> None:
+    """Jaws that hardly give way reset what rigid ones do, whatever else is in the table."""
+    scene, rigid = gripper_of(reference_finger(5)), Jaws(np.array([40.0, 0.0]), 40.0, 40.0)
+    pairs = ("01100/01100", "00000/01100", "01100/00000")
+    expected = grasp_rows(grasped(scene, rigid, Held.FIXED, *pairs))["resets"]
+    stiff = replace(rigid, stiffness=1e9)
+    found = grasped(scene, stiff, Held.FIXED, *pairs)
+    assert any(expected)
+    assert grasp_rows(found)["resets"].tolist() == expected.tolist()
+    upper, lower = found.fingers
+    flags = np.eye(5, 2, dtype=bool)
+    lanes, load, push = np.array([0, 2]), np.array([0.25, 0.5]), np.zeros((1, 2))
+    one = Reset(lanes, load, flags, push, ~flags, flags & False)
+    gone = replace(one, of_release=True)
+    told = replace(found, fingers=(replace(upper, resets=(one, gone)), replace(lower, resets=())))
+    assert grasp_rows(told)["resets"].tolist() == [
+        "1 at 0.25; 1 at 0.25 of letting go/–",
+        "",
+        "2 at 0.5; 2 at 0.5 of letting go/–",
+    ]
