@@ -25,11 +25,11 @@ from dpgcli.api.tables import Table
 from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
 from dpgcli.design.bodies import Friction
 from dpgcli.design.loads import direction_text
-from dpgcli.design.scene import Held, Scene
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing
-from dpgcli.grasping.costs import Work
+from dpgcli.grasping.costs import Work, effort, is_moving
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
@@ -262,9 +262,10 @@ def work_of(
     """What pairs of states will take."""
     n_ramps = 0 if closing is None else len(closing.history.pressure)
     n_states = sum(len(distinct(codes)) for codes in pairs)
-    is_moving = scene.held is not Held.FIXED
+    assert scene.body is not None, "a scene with a body"
     sizes = n_states, len(pairs[0]), scene.finger.n_units, len(pairs)
-    return Work(*sizes, is_moving, way, n_ramps, scene.friction is not None)
+    has_friction = scene.friction is not None
+    return Work(*sizes, is_moving(scene), way, n_ramps, has_friction, effort(scene, scene.body))
 
 
 def check_work(work: Work) -> None:

@@ -192,10 +192,10 @@ def _open_jaws(
     if plot is not None:
         check_drawable(n_states)
     check_outputs(given.files, (output, Mark.TABLE), (plot, Mark.FIGURE))
-    seconds = jaw_seconds(n_states, given.scene.finger.n_units)
+    seconds = jaw_seconds(given.scene, n_states)
     if seconds > LONG and not quiet:
         many, took = counted(n_states, "state"), time_text(seconds)
-        say(f"{many}: about {took} on one core, or several times that")
+        say(f"{many}: about {took} on one core (rough)")
     with under_way("opening the jaws", quiet=quiet):
         found = jaws_of(given, gaps, at, chosen)
     if output is not None:

@@ -7,6 +7,7 @@ there; then the body goes on.
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class Reset:
     def take(self, index: Indices) -> "Reset":
         """The same of some of the lanes, by their places here."""
         arrays = {key: part for key, part in vars(self).items() if isinstance(part, np.ndarray)}
-        parts = {key: part[..., index] for key, part in arrays.items()}
+        parts: dict[str, Any] = {key: part[..., index] for key, part in arrays.items()}
         return replace(self, **parts)
 
     def take_units(self, units: slice) -> "Reset":

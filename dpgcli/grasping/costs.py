@@ -2,15 +2,22 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from dpgcli.design.bodies import Body, Disc, Jaws, Polygon
+from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.grasp import BLOCK, LANE
 
 # Measured on one core of a 2020s server, in seconds, times the square of the number of units.
-STATE_SECONDS = {Way.PLACE: 6e-5, Way.CLOSE: 6e-5, Way.INSERT: 3e-4}
+STATE_SECONDS = {Way.PLACE: 1.5e-4, Way.CLOSE: 1.5e-4, Way.INSERT: 7.5e-4}
 RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
-JAW_SECONDS = 0.03  # of a state at all apertures; with a calibration's curve several times as much
+JAW_SECONDS = 0.03  # of a state at all apertures
+BODIES = {Disc: 1.0, Jaws: 2.0, Polygon: 8.0}  # times as long: a polygon's corners take most
+CURVE = 10.0  # times as long with a calibration's curve
+WITHOUT_MARGINS = 0.5
 START_SECONDS, ROW_SECONDS = 1.0, 3e-5
 LIBRARY_BYTES = 2**26
 KEPT_BYTES, ROW_BYTES = 200, 180  # of a finger and of a row, times the number of units
@@ -28,20 +35,22 @@ class Work:
     way: Way = Way.PLACE
     n_ramps: int = 0
     has_friction: bool = False
+    effort: float = 1.0  # times that of a disc and the published law
 
     @property
     def seconds(self) -> float:
         """Of one core.
 
         >>> round(Work(1024, 1024, 10, 1, False).seconds)
-        7
+        16
         """
         square = self.n_units**2
         let_go = self.n_rows * MOVING_SECONDS * square if self.is_moving else 0.0
         one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
         placed = self.n_states * one * square
         pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
-        return START_SECONDS + placed + let_go + pulled + self.n_rows * ROW_SECONDS
+        met = placed + let_go + pulled
+        return START_SECONDS + self.effort * met + self.n_rows * ROW_SECONDS
 
     @property
     def peak_bytes(self) -> int:
@@ -57,10 +66,31 @@ class Work:
         )
 
 
-def jaw_seconds(n_states: int, n_units: int) -> float:
-    """Seconds of one core for states at jaws that open and close.
+def effort(scene: Scene, body: Body) -> float:
+    """How many times as long a body takes as a disc does with the published law."""
+    return BODIES[type(body)] * _of_law(scene)
 
-    >>> round(jaw_seconds(32, 5))
-    25
-    """
-    return START_SECONDS + n_states * JAW_SECONDS * n_units**2
+
+def is_moving(scene: Scene) -> bool:
+    """Whether the scene's body is let go of once it is in its place."""
+    gives_way = isinstance(scene.body, Jaws) and scene.body.stiffness is not None
+    return scene.held is not Held.FIXED or gives_way
+
+
+def design_seconds(scene: Scene) -> float:
+    """Seconds of one core for a state of a design with the scene's body, by its units squared."""
+    assert scene.body is not None, "a scene with a body"
+    n_fingers = 1 if scene.gripper is None or bool(np.all(scene.body.is_mirrored)) else 2
+    let_go = MOVING_SECONDS if is_moving(scene) else 0.0
+    pulled = PULLED_SECONDS if scene.friction is not None else 0.0
+    placed = n_fingers * STATE_SECONDS[Way.PLACE]
+    return effort(scene, scene.body) * (WITHOUT_MARGINS * (placed + let_go) + pulled)
+
+
+def jaw_seconds(scene: Scene, n_states: int) -> float:
+    """Seconds of one core for states at jaws that open and close."""
+    return START_SECONDS + n_states * JAW_SECONDS * scene.finger.n_units**2 * _of_law(scene)
+
+
+def _of_law(scene: Scene) -> float:
+    return 1.0 if scene.finger.law.curve is None else CURVE

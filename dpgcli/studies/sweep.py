@@ -34,6 +34,7 @@ from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
+CHUNK_SECONDS = 4.0  # of work with bodies: several times what a batch takes to begin
 STATES, DESIGNS = "states.parquet", "designs.parquet"
 RUN, REPORT = "run.json", "report.md"
 PARTS = ".parts"
@@ -149,12 +150,15 @@ class Study:
         """Designs per chunk: many states, but never so many that one waits for it.
 
         They are whole batches, since a small one takes longer by the state. Under pressure a batch
-        takes a second or more.
+        takes a second or more, as do a few designs with a body.
         """
         most_units = self.extent.most_units
         if self.extent.has_pressure:
             return designs_at_once(most_units)
         most, at_once = STATES_PER_CHUNK >> most_units, designs_at_once(most_units)
+        if self.extent.body_seconds:
+            of_design = (self.extent.body_seconds * most_units**2) * 2**most_units
+            most = min(most, int(CHUNK_SECONDS / of_design))
         return most // at_once * at_once or max(1, most)
 
     @cached_property
@@ -163,7 +167,12 @@ class Study:
         allowed = self.evaluation.allowed if self.sweep.constraints else None
         base = self.sweep.base
         has_pressure = base.design.pressure is not None
-        return Extent(self.sweep.space, base.finger.units, allowed, has_pressure)
+        body_seconds = 0.0
+        if base.design.body is not None:
+            from dpgcli.grasping.costs import design_seconds
+
+            body_seconds = design_seconds(scene_of(base))
+        return Extent(self.sweep.space, base.finger.units, allowed, has_pressure, body_seconds)
 
     def ranges(self, shard: Shard) -> list[tuple[int, int]]:
         """Designs of a shard: its chunks, as ranges."""

@@ -34,13 +34,15 @@ class Extent:
 
     `base_units` is the number of units where the space leaves it alone. `allowed` says, if there
     are constraints, which designs meet them, from their values by key. With `has_pressure` every
-    state is followed under pressure, too.
+    state is followed under pressure, too. With a body a state takes `body_seconds` times the square
+    of its units more.
     """
 
     space: Space
     base_units: int
     allowed: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.bool_]] | None = None
     has_pressure: bool = False
+    body_seconds: float = 0.0
 
     @cached_property
     def most_units(self) -> int:
@@ -86,7 +88,7 @@ class Extent:
     def seconds_of(self, n_states: int) -> float:
         """The same, with another number of states."""
         of_unit = UNIT_STATE_SECONDS["chain"] + (PRESSED_SECONDS if self.has_pressure else 0.0)
-        of_states = n_states * self.most_units * of_unit
+        of_states = n_states * (self.most_units * of_unit + self.most_units**2 * self.body_seconds)
         return START_SECONDS + self.space.size * DESIGN_SECONDS + of_states
 
     def check(self, chunk_size: int, *, is_sent: bool) -> None:

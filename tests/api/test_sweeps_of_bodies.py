@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dpgcli as dpg
-from dpgcli.api.sweep import SweepResult
+from dpgcli.api.sweep import SweepResult, study_of
 from dpgcli.arrays import Codes, Columns
 from dpgcli.errors import SpecError
 from dpgcli.states.certify import Status
@@ -204,3 +204,15 @@ def test_grasps_that_are_not_found_are_counted(monkeypatch: pytest.MonkeyPatch) 
     assert [verdict.rows.tolist() for verdict in result.verdicts] == [[0, 1], [0]]
     assert "searches failed in 2 designs (n_unknown_grasps)" in result.report
     assert any("searches failed in 2 designs" in str(line) for line in result.warnings)
+
+
+def test_chunks_of_bodies_take_seconds(folder: Path) -> None:
+    """So that there is parallel work to do, something to resume, and a time to say."""
+    axis = {"key": "object.at_x_mm", "linear": {"from": 30.0, "to": 34.0, "count": 1000}}
+    bare = {key: value for key, value in SPEC.items() if key != "object"}
+    bodies = {"base": SPEC, "space": [axis]}
+    width = {"key": "gripper.base_spacing_mm", "linear": {"from": 30.0, "to": 34.0, "count": 1000}}
+    met, without = (study_of(found, folder) for found in (bodies, {"base": bare, "space": [width]}))
+    assert met.extent.seconds > 5.0 * without.extent.seconds
+    n_chunks = 1000 / met.chunk_size
+    assert n_chunks > 1.0 and 1.0 < met.extent.seconds / n_chunks < 10.0

@@ -1,24 +1,30 @@
 """Work in blocks of lanes: the same rows, in memory that has a bound, and said before."""
 
 import tracemalloc
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import dpgcli as dpg
 from dpgcli.api.grasp import check_work, pairs_of, work_of
+from dpgcli.api.inputs import scene_input
+from dpgcli.design.bodies import Disc, Jaws, Polygon
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.errors import UsageError
 from dpgcli.grasping import grasp
 from dpgcli.grasping.approach import Way
-from dpgcli.grasping.costs import Work
+from dpgcli.grasping.costs import Work, design_seconds, is_moving
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 GRIPPER = Gripper(base_spacing=30.0, mounting_angle=0.0)
 
 
 def scene(n_units: int, held: Held = Held.FIXED) -> Scene:
-    return Scene(uniform_finger(n_units, **STUDY), (), GRIPPER, 1.5, held=held)
+    disc = Disc(np.array([32.0, 0.0]), 10.0)
+    return Scene(uniform_finger(n_units, **STUDY), (), GRIPPER, 1.5, body=disc, held=held)
 
 
 @pytest.mark.parametrize(
@@ -85,6 +91,25 @@ def test_work_counts_states_once_and_rows_of_bodies_that_move() -> None:
     assert (fixed.n_states, fixed.n_rows) == (16, 64)
     assert moving.seconds > 3.0 * fixed.seconds
     assert work_of(scene(5), pairs, Way.INSERT).seconds > fixed.seconds
+
+
+def test_work_knows_bodies_and_laws() -> None:
+    """Estimates from measured times: corners take longer than a disc, curves longer than both."""
+    disc, pairs = scene(8), pairs_of(["*"], scene(8), both=False)
+    center = np.array([40.0, 0.0])
+    jaws = replace(disc, body=Jaws(center, 20.0, 40.0))
+    soft = replace(disc, body=Jaws(center, 20.0, 40.0, 1.0))
+    wedge = replace(disc, body=Polygon(center, np.array([[0.0, 9.0, 9.0], [0.0, -9.0, 9.0]])))
+    times = [work_of(own, pairs).seconds for own in (disc, jaws, wedge, soft)]
+    assert times == sorted(times) and times[-1] > 10.0 * times[0]
+    assert not is_moving(jaws) and is_moving(soft)
+    curved = scene_input(CONFIGS / "gripper_and_can.yaml").scene
+    published = scene_input(
+        CONFIGS / "gripper_and_can.yaml", ["finger.calibration=published"]
+    ).scene
+    assert design_seconds(curved) == 10.0 * design_seconds(published)
+    beside = replace(disc, body=Disc(np.array([32.0, 1.0]), 10.0))
+    assert design_seconds(beside) == 2.0 * design_seconds(disc)
 
 
 def test_too_many_pairs_are_refused_before_they_are_made() -> None:
