@@ -10,6 +10,7 @@ from dpgcli.api.inputs import (
     Settings,
     SpecInput,
     as_texts,
+    check_callable,
     check_installed,
     check_numbers,
     check_whole,
@@ -111,6 +112,7 @@ def bench(
     """
     check_installed("dpg bench", "mpmath")
     check_whole(repeats=repeats)
+    check_callable(watch=watch)
     if repeats is None or not 1 <= repeats <= MOST_REPEATS:
         raise UsageError(Field("repeats"), f" {repeats}: expected from 1 to {MOST_REPEATS:,}")
     check_numbers(target_error=target_error)

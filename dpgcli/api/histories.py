@@ -61,7 +61,7 @@ def history_input(pressure: PressureInput | None, known: Pressure) -> GivenHisto
             for line, said in by_text("pressure", pressure).items()
         }
         return _of_table(ramps, known.lines)
-    parts = each_of(pressure)
+    parts = each_of("pressure", pressure)
     are_texts = [isinstance(part, str | Path) for part in parts]
     if not (parts and all(are_texts)):
         if not parts or any(are_texts) or not _is_array(pressure):

@@ -9,6 +9,7 @@ from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
 from importlib import util
+from itertools import islice
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType
@@ -50,6 +51,7 @@ Place: TypeAlias = Sequence[float] | None
 ORIGINS = ("as given", "from the data's header", "from the spec")
 N_COORDINATES = 2
 BYTES = (bytes, bytearray, memoryview)  # whose items are numbers of letters
+MOST_ITEMS = 10**6  # of a sequence that is handed in
 LARGEST_WHOLE = 2**1000  # far beyond any seed
 NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
 FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
@@ -233,18 +235,23 @@ def _number(value: Decimal | Fraction | int) -> float | int:
     return number
 
 
-def each_of(value: Any) -> tuple[Any, ...]:
+def each_of(field: str, value: Any) -> tuple[Any, ...]:
     """The items of a sequence; of what is none, such as a text, itself.
 
-    >>> each_of("abc"), each_of(["a", "b"]), each_of(b"ab")
+    Raises UsageError for more than MOST_ITEMS of them, which may go on without end.
+
+    >>> each_of("only", "abc"), each_of("only", ["a", "b"]), each_of("only", b"ab")
     (('abc',), ('a', 'b'), (b'ab',))
     """
     if isinstance(value, (str, *BYTES)) or not isinstance(value, Iterable):
         return (value,)
     try:
-        return tuple(value)
+        found = tuple(islice(value, MOST_ITEMS + 1))
     except TypeError:  # an array without axes
         return (value,)
+    if len(found) > MOST_ITEMS:
+        raise UsageError(Field(field), f": expected at most {MOST_ITEMS:,} items")
+    return found
 
 
 def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
@@ -253,7 +260,7 @@ def as_texts(field: str, texts: str | Iterable[str]) -> tuple[str, ...]:
     >>> as_texts("only", "abc"), as_texts("only", ["a", "b"])
     (('abc',), ('a', 'b'))
     """
-    listed = each_of(texts)
+    listed = each_of(field, texts)
     if not all(isinstance(text, str) for text in listed):
         raise UsageError(Field(field), f" {quoted(texts)}: expected a text or several")
     return listed
@@ -316,6 +323,16 @@ def check_whole(**values: int | None) -> None:
             raise UsageError(Field(field), f" {quoted(value)}: expected a whole number")
 
 
+def check_callable(**values: object) -> None:
+    """Raise UsageError for an argument that cannot be called, before any work.
+
+    >>> check_callable(watch=print)
+    """
+    for field, value in values.items():
+        if not callable(value):
+            raise UsageError(Field(field), f" {quoted(value)}: expected a function")
+
+
 def check_texts(**values: str | None) -> None:
     """Raise UsageError for an argument that is no text; none where it is optional.
 
@@ -364,7 +381,7 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     (5.375, -0.75)
     """
     is_listed = isinstance(place, Sequence) or hasattr(place, "tolist")  # no set, and no table
-    parts = each_of(place) if is_listed else ()
+    parts = each_of(field, place) if is_listed else ()
     numbers = [float(part) for part in parts if is_number(part) and abs(part) <= LARGEST]
     if not len(numbers) == len(parts) == N_COORDINATES:
         raise UsageError(

@@ -9,6 +9,7 @@ from dpgcli.api.inputs import (
     Settings,
     SpecInput,
     as_texts,
+    check_callable,
     check_installed,
     scene_input,
     setting_texts,
@@ -83,6 +84,7 @@ def stress(
     >>> len(result.failures), set(result.table["verdict"].tolist())
     (0, {'right'})
     """
+    check_callable(watch=watch)
     cases = hard_cases(spec, as_texts("only", only), settings)
     found = []
     for outcome in cases.outcomes():

@@ -12,6 +12,7 @@ from dpgcli.api.given import SweepInput, sweep_input
 from dpgcli.api.inputs import (
     Settings,
     as_texts,
+    check_callable,
     check_flags,
     check_numbers,
     check_texts,
@@ -149,6 +150,7 @@ def sweep(
     """
     place = Place(executor, jobs, scheduler, wait)
     check_flags(restart=restart, force=force, strict=strict)
+    check_callable(watch=watch)
     texts, part = setting_texts(settings), shard_of(shard)
     _check_part(part, output, require)
     with _folder(output) as folder:
@@ -346,7 +348,7 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
         ...
     dpgcli.errors.UsageError: nowhere: expected the output of one dpg sweep shard, found no shard
     """
-    folders = each_of(shards)
+    folders = each_of("shards", shards)
     if not folders:
         raise UsageError("shards: expected one folder or more")
     paths = [path_of("shards", folder) for folder in folders]
@@ -356,14 +358,11 @@ def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> Swee
 def merged(shards: Sequence[Path], folder: Path) -> SweepResult:
     """The same, of paths."""
     found = [_store(shard) for shard in shards]
+    check_not_read(shards, [path for path, _ in outputs(folder)])
     with sole_use(folder):
         drop_half_written(folder)
         check_outputs((), *(each for each in outputs(folder) if each[0] != folder / RUN))
-        result = _summarized(folder, assemble(found, folder), is_new=True)
-        for store in found:
-            if store.folder.parent.parent.samefile(folder):
-                store.drop()
-    return result
+        return _summarized(folder, assemble(found, folder), is_new=True)
 
 
 def _store(folder: Path) -> PartStore:

@@ -47,6 +47,8 @@ def _is_no_cell(value: Any) -> bool:
     """
     import numpy as np
 
+    if isinstance(value, np.ndarray) and not value.ndim:  # as what masked arrays mask
+        return False
     if isinstance(value, many := list | tuple | dict | set | np.ndarray):
         parts = value.values() if isinstance(value, dict) else value
         return any(isinstance(part, many) for part in parts)

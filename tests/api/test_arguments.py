@@ -2,7 +2,7 @@
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -427,3 +427,42 @@ def study(calibration: str) -> dict[str, Any]:
     geometry |= {"chamber_length_mm": 9, "channel_width_mm": 10, "unit_separation_mm": 3}
     geometry |= {"limiting_layer_thickness_mm": 1.5, "elastic_modulus_MPa": 26}
     return {"finger": {"units": 2, "calibration": calibration, "geometry": geometry}}
+
+
+def _without_end() -> Iterator[str]:
+    while True:
+        yield "0"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: dpg.grasp(BASE, object="disc:20", at=(22, 0), patterns=range(10**9)),
+        lambda: dpg.predict(BASE, patterns=_without_end()),
+        lambda: dpg.stress(only=_without_end()),
+    ],
+)
+def test_sequences_that_are_too_long_are_refused_at_once(call: Callable[[], Any]) -> None:
+    with pytest.raises(dpg.UsageError, match=r"expected at most 1,000,000 items"):
+        call()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: dpg.stress(only=["scale"], watch=3),
+        lambda: dpg.bench(BASE, watch="print"),
+        lambda: dpg.sweep({"base": BASE, "space": []}, watch=None),
+    ],
+)
+def test_who_watches_is_a_function(call: Callable[[], Any]) -> None:
+    with pytest.raises(dpg.UsageError, match=r"^watch .*: expected a function"):
+        call()
+
+
+def test_what_masked_arrays_mask_is_missing() -> None:
+    spec = {**BASE, "pressure": {"effective_area_mm2": 31.6}}
+    masked = np.ma.array([0.0, 0.2, 0.0], mask=[False, True, False])
+    for pressure in (masked, {"A": masked}):
+        with pytest.raises(dpg.SpecError, match=r"A: expected a number, found"):
+            dpg.actuate(spec, pressure=pressure)

@@ -181,9 +181,21 @@ def test_shards_stay_until_all_is_written(
     shards = shard(1, 2, 3)
     with monkeypatch.context() as patch:
         patch.setattr("dpgcli.api.report.page", _stop)
-        assert call("merge", *shards, "-o", "s1").exit_code != ExitCode.DONE
-    assert call("merge", *shards, "-o", "s1").exit_code == ExitCode.DONE
-    assert not (folder / "s1" / ".parts").exists()
+        assert call("merge", *shards, "-o", "all").exit_code != ExitCode.DONE
+    assert call("merge", *shards, "-o", "all").exit_code == ExitCode.DONE
+
+
+@pytest.mark.parametrize("output", ["s1", "s2/all"])
+def test_a_shard_is_no_place_for_the_whole(
+    call: Any, folder: Path, shard: Any, output: str
+) -> None:
+    """Its parts were removed: what is read is never replaced."""
+    shards = shard(1, 2, 3)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    result = call("merge", *shards, "-o", output)
+    assert result.exit_code == ExitCode.USAGE
+    assert "would lie in a folder that is read: give another name" in result.stderr
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
 def _stop(*_: Any) -> None:
