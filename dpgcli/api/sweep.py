@@ -1,6 +1,7 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -323,6 +324,7 @@ class Place:
         n_workers = self.jobs or cores().usable
         if self.executor == "serial" or n_workers == 1:
             return executors.serial()
+        _check_importable()
         return pool.processes(n_workers)
 
     def _cluster(self, scheduler: str, say: Say) -> Backend:
@@ -335,6 +337,18 @@ class Place:
             what = f" {scheduler}: no scheduler or no worker answers"
             why = f"{what}: {str(error) or 'time is up'}"
             raise UsageError(Field("scheduler"), why) from error
+
+
+def _check_importable() -> None:
+    """Raise UsageError where processes cannot import the program that starts them."""
+    program = sys.modules["__main__"]
+    file, spec = (getattr(program, name, None) for name in ("__file__", "__spec__"))
+    if spec is None and file is not None and not Path(file).exists():
+        raise UsageError(
+            Field("executor"),
+            f" processes: each of them imports the program that starts it, and {file} is no file, "
+            "as where it is read from standard input: save it in a file, or take serial",
+        )
 
 
 def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> SweepResult:

@@ -42,16 +42,24 @@ def init(
 
 def _write_sweep(path: Path, text: str, base_name: str, base_text: str, *, force: bool) -> None:
     """The sweep, and its base unless that is there; what is there is never replaced."""
-    from dpgcli.errors import UsageError
+    from dpgcli.errors import OutputError, UsageError
 
     base = path.parent / base_name
     if os.path.realpath(path) == os.path.realpath(base):
         raise UsageError(f"{path} is the base of the sweep: give the sweep another name")
-    if not _write(path, text, force=force):
+    if path == Path("-"):
+        _write(path, text, force=force)
         return
+    _check_new(path, force=force)
     is_there = os.path.lexists(base)
     if not is_there:
         _write(base, base_text, force=False)
+    try:
+        _write(path, text, force=force)
+    except OutputError:
+        if not is_there:  # half of a pair is none
+            base.unlink()
+        raise
     say(
         f"wrote {path}, around {base}, {'as it was there' if is_there else 'written with it'}; "
         f"next: dpg explain {path}, dpg sweep {path} --output out"
@@ -62,14 +70,20 @@ def _write(path: Path, text: str, *, force: bool) -> bool:
     """Write a file whole, or standard output; whether it was a file."""
     import sys
 
-    from dpgcli.errors import OutputError
     from dpgcli.files.output import Mark, whole_file
 
     if path == Path("-"):
         sys.stdout.write(text)
         return False
-    if os.path.lexists(path) and not force:
-        raise OutputError(f"{path} exists: give another name, or --force to overwrite it")
+    _check_new(path, force=force)
     with whole_file(path, Mark.ANY) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return True
+
+
+def _check_new(path: Path, *, force: bool) -> None:
+    """Raise OutputError for what is there, unless it is to be replaced."""
+    from dpgcli.errors import OutputError
+
+    if os.path.lexists(path) and not force:
+        raise OutputError(f"{path} exists: give another name, or --force to overwrite it")

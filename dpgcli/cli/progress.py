@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 FIRST_SHOWN = 1.0  # s: what is over sooner needs no progress
 TERMINAL_PERIOD, PLAIN_PERIOD = 0.2, 5.0  # s
 ELAPSED_PERIOD = 30.0  # s
+FAST = 10.0  # per s: slower rates have digits behind the point
 LINE = 70  # characters on a terminal
 
 
@@ -68,8 +69,10 @@ class ProgressLine:
         if self.quiet or now < self.due:
             return
         rate = (done - self.start) / max(now - self.began, 1e-9)
-        left = f", {(self.total - done) / rate:,.0f} s left" if rate > 0 else ""
-        line = f"{done:,} of {self.total:,} {self.things}, {rate:,.0f}/s{left}"
+        is_under_way = rate > 0.0 and done < self.total
+        left = f", {(self.total - done) / rate:,.0f} s left" if is_under_way else ""
+        speed = f"{rate:.2g}" if 0.0 < rate < FAST else f"{rate:,.0f}"
+        line = f"{done:,} of {self.total:,} {self.things}, {speed}/s{left}"
         if self.interactive:
             (task,) = self._bar.task_ids
             self._bar.update(task, description=line, completed=done, total=self.total, refresh=True)

@@ -136,7 +136,8 @@ def run_summary(output: Path, progress: Progress, part: Shard | None) -> str:
     if progress.n_states:
         core, writing, pool = (f"{100 * share:.0f} %" for share in _shares(progress))
         of = "the worker's time" if progress.n_workers == 1 else "the workers' time"
-        text += f"; {core} of {of} in states, {writing} in parts, {pool} in the pool"
+        rest = "waiting" if progress.n_workers == 1 else "in the pool"
+        text += f"; {core} of {of} in states, {writing} in parts, {pool} {rest}"
         text += f"; tables {progress.tables_seconds:.2g} s" if part is None else ""
     if progress.deaths:
         held = ", ".join(f"{chunk.start}-{chunk.stop - 1}" for chunk in progress.deaths[:MOST_HELD])

@@ -243,9 +243,9 @@ def check_requirements(
     """
     n_checked = int(_in_question(designs).sum())
     if not n_checked:
-        raise NothingSelectedError(
-            f"no design to check: the table has {len(designs['status']):,}, all of them excluded"
-        )
+        n = len(designs["status"])
+        found = f"{n:,}, all of them excluded" if n else "no rows"
+        raise NothingSelectedError(f"no design to check: the table has {found}")
     return tuple(
         RequirementVerdict(
             designs,

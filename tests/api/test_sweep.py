@@ -207,3 +207,19 @@ def test_what_a_killed_sweep_without_a_folder_leaves_goes_with_the_next(space: P
         )
         left.append(len(list((space / "temporary").iterdir())))
     assert left == [1, 0]
+
+
+def test_a_program_from_standard_input_is_told_what_helps(folder: Path) -> None:
+    """Processes cannot import it: without tracebacks of theirs."""
+    (folder / "sweep.yaml").write_text(FILE)
+    program = """import dpgcli as dpg
+try:
+    dpg.sweep("sweep.yaml", jobs=2)
+except dpg.UsageError as error:
+    print(error)
+"""
+    ran = subprocess.run(
+        [sys.executable, "-"], input=program, capture_output=True, text=True, check=True, cwd=folder
+    )
+    assert ran.stderr == ""
+    assert "standard input: save it in a file, or take serial" in ran.stdout

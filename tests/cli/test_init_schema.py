@@ -9,6 +9,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+from dpgcli.errors import OutputError
+from dpgcli.files import output
+
 Call = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
@@ -112,6 +115,26 @@ def test_a_sweep_that_is_there_is_kept_and_gets_no_base(call: Call, folder: Path
 
 
 @pytest.mark.parametrize("path", ["finger.yaml", "./finger.yaml", "link.yaml"])
+def test_half_of_a_new_sweep_is_none(
+    call: Call, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the disk is full once one of both is there."""
+    whole, paths = output.whole_file, []
+
+    def failing(path: Path, *others: Any) -> Any:
+        paths.append(path)
+        if len(paths) > 1:
+            raise OutputError(f"{path}: No space left on device")
+        return whole(path, *others)
+
+    monkeypatch.setattr(output, "whole_file", failing)
+    result = call("init", "--sweep", "s.yaml")
+    assert result.exit_code != 0
+    assert "No space left" in result.stderr
+    assert len(paths) == 2
+    assert list(folder.iterdir()) == []
+
+
 @pytest.mark.parametrize("force", [(), ("--force",)])
 def test_a_sweep_is_not_its_own_base(
     call: Call, folder: Path, path: str, force: tuple[str, ...]

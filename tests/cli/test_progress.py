@@ -47,6 +47,15 @@ def test_in_a_log_each_line_stands(line: Line) -> None:
     )
 
 
+def test_slow_work_has_a_rate_and_the_end_has_nothing_left(line: Line) -> None:
+    shown, log = line(io.StringIO())
+    shown.show(1)
+    shown.show(2000)
+    first, last = log.getvalue().splitlines()
+    assert first.startswith("1 of 2,000 designs, 1/s, ")
+    assert last == "2,000 of 2,000 designs, 1,000/s"
+
+
 def test_on_a_terminal_a_bar_comes_and_goes(line: Line) -> None:
     shown, terminal = line(Terminal())
     shown.show(500)

@@ -110,7 +110,9 @@ def test_a_requirement_that_all_meet() -> None:
 
 @pytest.mark.parametrize("designs", [rows(slice(5, 6)), rows(slice(0))])
 def test_an_empty_space_meets_nothing(designs: Columns) -> None:
-    with pytest.raises(NothingSelectedError, match="no design to check"):
+    """Of no rows none is said to be excluded."""
+    found = "1, all of them excluded" if len(designs["design"]) else "no rows"
+    with pytest.raises(NothingSelectedError, match=f"no design to check: the table has {found}$"):
         check_requirements(designs, [requirement("area_mm2 > 0", COLUMNS)])
 
 
