@@ -149,13 +149,12 @@ def sweep(
     >>> result.designs["n_stable"].tolist(), len(result.states)
     ([4, 4], 8)
     """
-    place = Place(executor, jobs, scheduler, wait)
+    place, part = Place(executor, jobs, scheduler, wait), shard_of(shard)
     check_flags(restart=restart, force=force, strict=strict)
     check_callable(watch=watch)
-    texts, part = setting_texts(settings), shard_of(shard)
     _check_part(part, output, require)
     with _folder(output) as folder:
-        study = study_of(sweep, folder, texts, tolerance, target_error)
+        study = study_of(sweep, folder, settings, tolerance, target_error)
         check_not_read(study.sweep.files, [path for path, _ in outputs(folder)])
         rules, _ = rules_of(study, require, strict=strict)
         with sole_use(folder):
@@ -167,7 +166,7 @@ def sweep(
                 restart=restart,
                 force=force,
                 is_sent=place.is_sent,
-                settings=texts,
+                settings=setting_texts(settings),
                 warn=silent,
                 tell=silent,
             )
