@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.actuation.cascades import let_go
-from dpgcli.actuation.domes import PushingDomes, kept_places
+from dpgcli.actuation.domes import PushingDomes
 from dpgcli.actuation.folding import folded
 from dpgcli.actuation.pressed import (
+    DISPLACED,
     LARGEST_RESIDUAL,
     TIE,
     TOLERANCE,
@@ -58,7 +59,8 @@ class _Rest(NamedTuple):
 def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     """What becomes of shapes that halted, at their pressures.
 
-    Domes that meet or leave their neighbors change nothing else.
+    Domes that meet or leave their neighbors change nothing else; one that leaves where it cannot
+    rest goes back by itself.
     """
     shapes, n = halted.shapes, len(halted.unit)
     is_first = np.arange(pressed.finger.n_units)[:, None] == halted.unit
@@ -67,16 +69,15 @@ def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     if touching is not None:
         touching = touching ^ (is_first & meets)
     falls = np.flatnonzero((halted.reason == Halt.FOLD) | (halted.reason == Halt.ALONE))
-    moved = replace(
-        shapes,
-        coordinates=shapes.coordinates.copy(),
-        inverted=shapes.inverted.copy(),
-        touching=touching,
-    )
+    moved = replace(shapes.take_lanes(np.arange(n)), touching=touching)
+    if touching is not None:
+        moved = _left(pressed, moved, shapes.touching & ~touching)
     ending, tied = np.full(n, Halt.ARRIVED), halted.tied.copy()
     if len(falls):
         alone = (halted.reason == Halt.ALONE) & (is_first | halted.tied)
-        start = replace(moved, coordinates=halted.start, inverted=shapes.inverted ^ alone)
+        start = replace(moved, coordinates=halted.start)
+        if shapes.place is not None:
+            start = replace(start, place=pressed.lost(shapes, alone))
         own, few = pressed.take_lanes(falls), halted.take_lanes(falls)
         rest, undecided = _decided(own, few, start.take_lanes(falls))
         is_folded = folded(own.coordinates, rest.shapes.coordinates)
@@ -85,6 +86,14 @@ def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
         tied[:, falls] |= undecided
         moved.put(falls, rest.shapes)
     return SnapOutcome(replace(halted, tied=tied), moved, ending)
+
+
+def _left(pressed: Pressed, shapes: Shapes, leave: Flags) -> Shapes:
+    """Shapes of which some domes leave their neighbors: where these cannot rest they fall back."""
+    extension = pressed.extensions(shapes.coordinates)
+    place = np.where(leave, pressed.fallen_back(extension, shapes.pressure), shapes.place)
+    is_beyond = place > pressed.units.wells.spring_barrier
+    return replace(shapes, inverted=np.where(leave, is_beyond, shapes.inverted), place=place)
 
 
 def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:
@@ -102,7 +111,8 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
         n, three = len(doubtful), np.tile(doubtful, 3)
         begin = start.take_lanes(three)
         pressure = begin.pressure * (1.0 + TIE * np.array([0.0, 1.0, -1.0]).repeat(n))
-        gone = (units == halted.unit[three]) | (start.inverted ^ halted.shapes.inverted)[:, three]
+        is_alone = halted.reason == Halt.ALONE
+        gone = ((units == halted.unit) | (halted.tied & is_alone))[:, three]
         again = _relaxed(pressed.take_lanes(three), replace(begin, pressure=pressure), gone)
         here, above, below = again.shapes.inverted.reshape(len(units), 3, n).swapaxes(0, 1)
         undecided[:, doubtful] = (above ^ here) | (below ^ here)
@@ -119,35 +129,33 @@ def _ahead(halted: Halted, start: Array) -> Array:
 def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
     """Go downhill from shapes at their pressures to the next minima, units that are `gone` slowly.
 
-    Domes that only push and are pushed out of their places fall back, and the others go on.
+    Domes that only push and are pushed out of their places fall back to the wells before, and the
+    others go on.
     """
-    inverted, coordinates = shapes.inverted, shapes.coordinates
-    if pressed.limits is not None:
-        inverted = kept_places(pressed.limits, shapes.pressure, inverted)
-    slowly, step = gone.any(axis=0), _downhill_step(pressed)
-    for _ in range(pressed.finger.n_units + 1):
-        law = pressed.domes(shapes.pressure, inverted)
-        coordinates = let_go(pressed, law, coordinates, gone)
+    start, slowly, step = pressed.places(shapes), gone.any(axis=0), _downhill_step(pressed)
+    n_wells = 1 if pressed.stretches is None else len(pressed.stretches.begins)
+    for _ in range(pressed.finger.n_units * n_wells + 1):
+        law = pressed.domes(shapes.pressure, start)
+        coordinates = let_go(pressed, law, shapes.coordinates, gone)
         there = minimize(pressed.with_domes(law), coordinates, TOLERANCE, largest_step=step)
         coordinates = there.coordinates
-        extension = pressed.extensions(coordinates)
+        extension = place = pressed.extensions(coordinates)
         if not isinstance(law, PushingDomes):
             break
-        fallen = inverted & (extension <= law.low)
-        inverted = inverted & ~fallen
-        gone = fallen & slowly
+        place, fallen = np.minimum(extension, law.high), extension <= law.low
         if not fallen.any():
             break
+        start = np.where(fallen, law.low - DISPLACED * pressed.finger.stroke, start)
+        gone = gone | (fallen & slowly)
     is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
-    beyond, touching = extension > pressed.units.wells.spring_barrier, None
+    beyond = np.asarray(place > pressed.units.wells.spring_barrier)
+    found = replace(shapes, coordinates=coordinates, inverted=beyond)
     if isinstance(law, PushingDomes):
-        touching = law.touches(extension)
-        beyond = np.where(touching, beyond, inverted)
-    found = replace(shapes, coordinates=coordinates, inverted=beyond, touching=touching)
+        found = replace(found, touching=law.touches(extension), place=place)
     return _Rest(found, there.curvature, np.asarray(is_there))
 
 
 def _downhill_step(pressed: Pressed) -> float:
     """Of the step cap: shorter where curves bend often, or barriers end where domes let go."""
-    is_plain = pressed.limits is None and pressed.finger.law.curve is None
+    is_plain = pressed.stretches is None and pressed.finger.law.curve is None
     return 1.0 if is_plain else SHORT_STEP

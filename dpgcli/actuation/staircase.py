@@ -164,11 +164,5 @@ def staircase(
 
 
 def _copied(shapes: Shapes) -> Shapes:
-    touching = None if shapes.touching is None else shapes.touching.copy()
-    return replace(
-        shapes,
-        coordinates=shapes.coordinates.copy(),
-        pressure=shapes.pressure + np.zeros(shapes.inverted.shape),
-        inverted=shapes.inverted.copy(),
-        touching=touching,
-    )
+    whole = replace(shapes, pressure=shapes.pressure + np.zeros(shapes.inverted.shape))
+    return whole.take_lanes(np.arange(shapes.inverted.shape[1]))

@@ -128,7 +128,7 @@ def travel(
 
 
 def _bits(shapes: Shapes) -> bytes:
-    parts = shapes.coordinates, shapes.pressure, shapes.inverted, shapes.touching
+    parts = vars(shapes).values()
     return b"".join(part.tobytes() for part in parts if part is not None)
 
 
@@ -207,6 +207,7 @@ class _Traveler:
             coordinates=np.concatenate([start.coordinates[:, :0], *(passed[i] for i in inner)], 1),
             pressure=start.pressure + share * (target - start.pressure),
         )
+        way = self.pressed.resting(way)
         done = self.share
         self.reason, self.pressure = Halt(halted.reason[0]), halted.shapes.pressure[:, 0]
         if self._pass(way, done + share * (1.0 - done)):
@@ -275,12 +276,13 @@ class _Traveler:
 
 def joined(parts: Sequence[PathPoints]) -> PathPoints:
     """Points one after the other."""
-    touching = [part.shapes.touching for part in parts if part.shapes.touching is not None]
+    first = vars(parts[0].shapes)
+    each = {name: [vars(part.shapes)[name] for part in parts] for name in first}
     shapes = Shapes(
-        np.concatenate([part.shapes.coordinates for part in parts], axis=1),
-        np.concatenate([part.shapes.pressure for part in parts], axis=1),
-        np.concatenate([part.shapes.inverted for part in parts], axis=1),
-        np.concatenate(touching, axis=1) if touching else None,
+        **{
+            name: None if first[name] is None else np.concatenate(arrays, axis=1)
+            for name, arrays in each.items()
+        }
     )
     return PathPoints(
         shapes,

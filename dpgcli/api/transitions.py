@@ -174,7 +174,7 @@ class TransitionsResult:
     def _n_closed(self) -> int:
         """How many states are left out that are stable until pressure comes."""
         pressed = self.given.pressed
-        if pressed.limits is None:
+        if pressed.stretches is None:
             return 0
         codes = np.flatnonzero(~self.graph.is_stable).astype(np.uint64)
         _, settled = at_rest(pressed, inverted_units(codes, pressed.finger.n_units))
