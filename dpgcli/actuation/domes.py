@@ -14,7 +14,6 @@ from dpgcli.mechanics.laws import Dome
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
 
 
-
 @dataclass(frozen=True)
 class PressedDomes:
     """The law of domes under pressures that change by a load λ: p = p₀ + λ Δp, MPa by unit.
@@ -81,16 +80,14 @@ class PressedDomes:
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""
-        parts = (self.touching, self.furthest)
-        touching, furthest = (None if part is None else take_lanes(part, index) for part in parts)
         return replace(
             self,
             finger=self.finger.take_lanes(index),
             volumes=self.volumes.take_lanes(index),
             pressure=take_lanes(self.pressure, index),
             change=take_lanes(self.change, index),
-            touching=touching,
-            furthest=furthest,
+            touching=None if self.touching is None else take_lanes(self.touching, index),
+            furthest=None if self.furthest is None else take_lanes(self.furthest, index),
         )
 
 

@@ -20,7 +20,7 @@ from dpgcli.actuation.meeting import about_to_touch, with_touching
 from dpgcli.actuation.stretches import Stretches, picked, stretches
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
-from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
+from dpgcli.equilibrium.contracts import ScalarLaw, Term
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, Watch, follow
@@ -72,8 +72,10 @@ class Shapes:
 
     def take_lanes(self, index: Indices) -> "Shapes":
         """Some of them."""
-        parts = vars(self).items()
-        return Shapes(**{name: None if part is None else part[:, index] for name, part in parts})
+        touching = None if self.touching is None else self.touching[:, index]
+        place = None if self.place is None else self.place[:, index]
+        which = self.coordinates[:, index], self.pressure[:, index], self.inverted[:, index]
+        return Shapes(*which, touching, place)
 
     def put(self, index: Indices, others: "Shapes") -> None:
         """Replace the lanes at `index`."""
@@ -144,19 +146,24 @@ class Pressed:
         """The fingers."""
         return self.units.finger
 
-    @cached_property
+    @property
     def stretches(self) -> Stretches | None:
         """Where domes by themselves rest; None for those that always act."""
-        if not isinstance(self.finger.law, PushOnly):
-            return None
-        return stretches(self.finger, self.volumes)
+        return self._wells if isinstance(self.finger.law, PushOnly) else None
+
+    @cached_property
+    def _wells(self) -> Stretches | None:
+        """The same; None for those that have no more than two wells, and always act."""
+        law = self.finger.law
+        has_two = law.curve is None and not isinstance(law, PushOnly)
+        return None if has_two else stretches(self.finger, self.volumes)
 
     def take_lanes(self, index: Indices) -> "Pressed":
         """The fingers of some lanes; what paths need of designs is found once, before."""
         _ = self.units.holding_stiffness
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
-        if self.stretches is not None:
-            taken.__dict__["stretches"] = self.stretches.take_lanes(index)
+        wells = self._wells
+        taken.__dict__["_wells"] = None if wells is None else wells.take_lanes(index)
         return taken
 
     @cached_property
@@ -238,6 +245,20 @@ class Pressed:
         """Energy less the work of the pressures, mJ, (batch,)."""
         return self.with_domes(self._domes_of(shapes)).evaluate(shapes.coordinates).energy
 
+    def left(self, before: Shapes, after: Shapes) -> Flags:
+        """Units that go to another well from some shapes to others, (unit, batch).
+
+        They flip, or their domes go to another stretch of a curve with ripples, further than others
+        move beside them.
+        """
+        flipped = before.inverted ^ after.inverted
+        if self._wells is None:
+            return flipped
+        one, other = self.places(before), self.places(after)
+        is_far = np.abs(one - other) > LEFT * self.finger.stroke
+        is_other = self._wells.of(one) != self._wells.of(other)
+        return np.asarray(flipped | (is_far & is_other))
+
     def fallen_back(self, place: Array, pressure: Array) -> Array:
         """Where domes rest that nothing holds at a place any more, mm, (unit, batch)."""
         own = self.stretches
@@ -246,9 +267,9 @@ class Pressed:
         return rest_on(self.finger, self.volumes, own, pressure, stretch)
 
     def lost(self, shapes: Shapes, which: Flags) -> Array:
-        """Places of domes, mm, (unit, batch), of which these are beyond the ends of their stretches.
+        """Places of domes, mm, (unit, batch), these half-way from their stretches to the next.
 
-        Their pressures are at what these bear, at most or at least: half-way to the next stretch.
+        Their pressures are at what their stretches bear, at most or at least.
         """
         own = self.stretches
         assert own is not None and shapes.place is not None, "others have no places"

@@ -90,6 +90,7 @@ def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
 
 def _left(pressed: Pressed, shapes: Shapes, leave: Flags) -> Shapes:
     """Shapes of which some domes leave their neighbors: where these cannot rest they fall back."""
+    assert shapes.place is not None, "given beside touching"
     extension = pressed.extensions(shapes.coordinates)
     place = np.where(leave, pressed.fallen_back(extension, shapes.pressure), shapes.place)
     is_beyond = place > pressed.units.wells.spring_barrier
@@ -104,7 +105,8 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
     units = np.arange(pressed.finger.n_units)[:, None]
     ahead = replace(start, coordinates=_ahead(halted, start.coordinates))
     rest = _relaxed(pressed, ahead, np.zeros(halted.tied.shape, bool))
-    others = (rest.shapes.inverted ^ halted.shapes.inverted) & ~halted.tied & (units != halted.unit)
+    left = pressed.left(halted.shapes, rest.shapes)
+    others = left & ~halted.tied & (units != halted.unit)
     is_clear = rest.is_there & ~others.any(axis=0) & (rest.curvature >= NEAR_FOLD)
     doubtful, undecided = np.flatnonzero(~is_clear), np.zeros(halted.tied.shape, bool)
     if len(doubtful):
@@ -114,8 +116,10 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
         is_alone = halted.reason == Halt.ALONE
         gone = ((units == halted.unit) | (halted.tied & is_alone))[:, three]
         again = _relaxed(pressed.take_lanes(three), replace(begin, pressure=pressure), gone)
-        here, above, below = again.shapes.inverted.reshape(len(units), 3, n).swapaxes(0, 1)
-        undecided[:, doubtful] = (above ^ here) | (below ^ here)
+        own, here = pressed.take_lanes(doubtful), again.shapes.take_lanes(np.arange(n))
+        for side in (1, 2):
+            others_there = again.shapes.take_lanes(side * n + np.arange(n))
+            undecided[:, doubtful] |= own.left(here, others_there)
         rest.put(doubtful, again, np.arange(n))
     return rest, undecided & (units != halted.unit)
 

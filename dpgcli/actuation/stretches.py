@@ -44,7 +44,7 @@ class Stretches:
         """The stretch to which domes go from a place at a pressure, up or back."""
         up = ((self.ends > place) & (self.most > pressure)).argmax(axis=0)
         back = ((self.begins < place) & (self.least < pressure))[::-1].argmax(axis=0)
-        return np.where(goes_up, up, len(self.begins) - 1 - back)
+        return np.asarray(np.where(goes_up, up, len(self.begins) - 1 - back))
 
     def top_before(self, stretch: Indices, pressure: Array) -> Indices:
         """The last stretch before one whose top bears more than a pressure; −1 where none does."""
@@ -61,7 +61,8 @@ def picked(parts: Array, stretch: Indices) -> Array:
     """Of parts (stretch, unit, batch) those of one stretch each, (unit, batch)."""
     shape = len(parts), *np.broadcast_shapes(parts.shape[1:], stretch.shape)
     every = np.broadcast_to(parts, shape)
-    return np.take_along_axis(every, np.broadcast_to(stretch, shape[1:])[None], axis=0)[0]
+    at = np.broadcast_to(stretch, shape[1:])[None]
+    return np.asarray(np.take_along_axis(every, at, axis=0)[0])
 
 
 def stretches(finger: Finger, volumes: DomeVolumes) -> Stretches:
@@ -77,7 +78,9 @@ def stretches(finger: Finger, volumes: DomeVolumes) -> Stretches:
     """
     domes = finger.domes
     shape = np.broadcast_shapes(*(np.shape(part) for part in domes), volumes.area.shape)
-    start, well = (np.broadcast_to(x, shape) for x in (-domes.contact, finger.law.rests(domes).well))
+    start, well = (
+        np.broadcast_to(x, shape) for x in (-domes.contact, finger.law.rests(domes).well)
+    )
     way = np.where(np.isnan(well), domes.stroke, well) - start
 
     def pressure(share: Array) -> Array:

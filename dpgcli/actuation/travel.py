@@ -32,9 +32,9 @@ MEETINGS = {Halt.CONTACT: EventKind.CONTACT, Halt.RELEASE: EventKind.RELEASE}
 class Event:
     """Something that happened to a finger, at once.
 
-    `units` (from 0) are those that flip, the one that gives rise to it first; `tied` are others
-    whose threshold is the same as its. `before` and `after` are places among the points of the
-    way; `released` is the energy (mJ) that is lost.
+    `units` (from 0) are those that go to another well, the one that gives rise to it first; `tied`
+    are others whose threshold is the same as its. `before` and `after` are places among the points
+    of the way; `released` is the energy (mJ) that is lost.
     """
 
     kind: EventKind
@@ -128,7 +128,10 @@ def travel(
 
 
 def _bits(shapes: Shapes) -> bytes:
-    parts = vars(shapes).values()
+    parts = (
+        *(shapes.coordinates, shapes.pressure, shapes.inverted),
+        *(shapes.touching, shapes.place),
+    )
     return b"".join(part.tobytes() for part in parts if part is not None)
 
 
@@ -231,7 +234,7 @@ class _Traveler:
         """What happened, its points aside. Of tied units none is the first but by its number."""
         pressed, before = self.pressed, halted.shapes
         first, reason = int(halted.unit[0]), Halt(halted.reason[0])
-        flipped = (before.inverted ^ after.inverted)[:, 0]
+        flipped = pressed.left(before, after)[:, 0]
         alike = sorted({first, *np.flatnonzero(halted.tied[:, 0]).tolist()})
         order = [*alike, *(unit for unit in range(len(flipped)) if unit not in alike)]
         units = tuple(unit for unit in order if flipped[unit]) or (alike[0],)
@@ -276,13 +279,14 @@ class _Traveler:
 
 def joined(parts: Sequence[PathPoints]) -> PathPoints:
     """Points one after the other."""
-    first = vars(parts[0].shapes)
-    each = {name: [vars(part.shapes)[name] for part in parts] for name in first}
+    touching = [part.shapes.touching for part in parts if part.shapes.touching is not None]
+    place = [part.shapes.place for part in parts if part.shapes.place is not None]
     shapes = Shapes(
-        **{
-            name: None if first[name] is None else np.concatenate(arrays, axis=1)
-            for name, arrays in each.items()
-        }
+        np.concatenate([part.shapes.coordinates for part in parts], axis=1),
+        np.concatenate([part.shapes.pressure for part in parts], axis=1),
+        np.concatenate([part.shapes.inverted for part in parts], axis=1),
+        np.concatenate(touching, axis=1) if touching else None,
+        np.concatenate(place, axis=1) if place else None,
     )
     return PathPoints(
         shapes,

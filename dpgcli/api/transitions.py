@@ -114,7 +114,7 @@ class TransitionsResult:
             tied = counted(n_tied, "transition")
             yield f"ties in {tied}: the model does not say which of these units goes first"
         yield f"reachable from rest: {_listed(self.reachable)}"
-        if graph.n_unknown:
+        if graph.n_unknown and self.unreachable:
             yield (
                 f"not found to be reachable from rest: {_listed(self.unreachable)}; "
                 f"{failed_searches(graph.n_unknown)}, which may lead there"
