@@ -8,10 +8,12 @@ import numpy as np
 
 from dpgcli.actuation.stretches import BISECTIONS, PLACES, Stretches, highest_near, picked
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import Measured, Response, WideMeasured, take_lanes
+from dpgcli.equilibrium.contracts import Measured, Response, ScalarLaw, WideMeasured, take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import Dome
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
+
+NEAREST = 1e-15  # of extensions: as near as rounding tells
 
 
 @dataclass(frozen=True)
@@ -214,12 +216,9 @@ def pushing(
     high = rest_on(finger, volumes, own, pressure, stretch)
     before = own.top_before(stretch, pressure)
     has_top, place_of_top = before >= 0, np.maximum(before, 0)
-
-    def force(extension: Array) -> Array:
-        return free_force(finger, volumes, extension, pressure)
-
     bottom, top = picked(own.begins, place_of_top + has_top), picked(own.ends, place_of_top)
-    low = _zero(force, np.where(has_top, bottom, 0.0), np.where(has_top, top, 0.0))
+    law = DomesAt(finger, PressureWork(pressure, volumes, finger.domes))
+    low = _zero(law, np.where(has_top, bottom, 0.0), np.where(has_top, top, 0.0))
     low = np.where(has_top, low, -np.inf)
     return PushingDomes(finger, PressureWork(pressure, volumes, finger.domes), low, high)
 
@@ -232,14 +231,27 @@ def rest_on(
     far = domes.contact + 2.0 * domes.stroke  # beyond all wells, whatever the pressure
     begin = np.maximum(picked(own.begins, stretch), -2.0 * far)
     end = np.minimum(picked(own.ends, stretch), 4.0 * far)
-    return _zero(lambda x: free_force(finger, volumes, x, pressure), begin, end)
+    return _zero(DomesAt(finger, PressureWork(pressure, volumes, domes)), begin, end)
 
 
-def _zero(force: Callable[[Array], Array], negative: Array, positive: Array) -> Array:
-    """Where a force changes sign between two extensions, by bisection."""
+def _zero(law: ScalarLaw, negative: Array, positive: Array) -> Array:
+    """Where a force changes sign between two extensions: Newton's steps, within bisections.
+
+    Each lane stops by itself, so that others beside it change no digit.
+    """
+    nearest = NEAREST * (np.abs(negative) + np.abs(positive))
+    place, is_found = 0.5 * (negative + positive), np.zeros(np.shape(nearest), bool)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (negative + positive)
-        is_negative = force(middle) < 0.0
-        negative = np.where(is_negative, middle, negative)
-        positive = np.where(is_negative, positive, middle)
-    return 0.5 * (negative + positive)
+        _, force, stiffness = law(place)
+        is_negative = force < 0.0
+        negative = np.where(is_negative, place, negative)
+        positive = np.where(is_negative, positive, place)
+        by_newton = place - force / np.where(stiffness != 0.0, stiffness, 1.0)
+        is_within = (by_newton - negative) * (by_newton - positive) <= 0.0
+        onward = np.where(is_within, by_newton, 0.5 * (negative + positive))
+        is_near = np.abs(onward - place) <= nearest
+        place = np.where(is_found, place, onward)
+        is_found |= is_near
+        if is_found.all():
+            break
+    return place
