@@ -138,9 +138,9 @@ def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
     """
     start, slowly, step = pressed.places(shapes), gone.any(axis=0), _downhill_step(pressed)
     n_wells = 1 if pressed.stretches is None else len(pressed.stretches.begins)
+    law, begin = pressed.domes(shapes.pressure, start), shapes.coordinates
     for _ in range(pressed.finger.n_units * n_wells + 1):
-        law = pressed.domes(shapes.pressure, start)
-        coordinates = let_go(pressed, law, shapes.coordinates, gone)
+        coordinates = let_go(pressed, law, begin, gone)
         there = minimize(pressed.with_domes(law), coordinates, TOLERANCE, largest_step=step)
         coordinates = there.coordinates
         extension = place = pressed.extensions(coordinates)
@@ -149,11 +149,18 @@ def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
         place, fallen = np.minimum(extension, law.high), extension <= law.low
         if not fallen.any():
             break
-        start = np.where(fallen, law.low - DISPLACED * pressed.finger.stroke, start)
-        gone = gone | (fallen & slowly)
+        beyond = law.low - DISPLACED * pressed.finger.stroke
+        law = pressed.domes(shapes.pressure, np.where(fallen, beyond, place))
+        assert isinstance(law, PushingDomes), "as before"
+        again = (fallen & (extension <= law.low)).any(axis=0)  # over another top, without a push
+        start = np.where(fallen, beyond, np.where(again, start, place))
+        begin = np.where(again, shapes.coordinates, coordinates)
+        gone = np.where(again, gone | fallen, fallen) & slowly
+        if again.any():
+            law = pressed.domes(shapes.pressure, start)
     is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
-    beyond = np.asarray(place > pressed.units.wells.spring_barrier)
-    found = replace(shapes, coordinates=coordinates, inverted=beyond)
+    inverted = np.asarray(place > pressed.units.wells.spring_barrier)
+    found = replace(shapes, coordinates=coordinates, inverted=inverted)
     if isinstance(law, PushingDomes):
         found = replace(found, touching=law.touches(extension), place=place)
     return _Rest(found, there.curvature, np.asarray(is_there))
