@@ -63,7 +63,8 @@ def thresholds_alone(pressed: Pressed) -> Thresholds:
     stairs, _ = staircase(both.take_lanes(begins), shapes.take_lanes(begins), target[:, begins], 1)
     found = np.full(2 * n, np.nan)
     for stair in stairs:
-        found[begins[stair.events.lanes]] = stair.events.halted.shapes.pressure[0]
+        events = stair.events.take(np.flatnonzero(stair.events.flipped[0]))
+        found[begins[events.lanes]] = events.halted.shapes.pressure[0]
     units = (pressed.finger.n_units, shape[1])
     snap, reset = (np.broadcast_to(part, units) for part in found.reshape(2, *shape))
     return Thresholds(snap, reset, furthest.reshape(shape).max(axis=0))

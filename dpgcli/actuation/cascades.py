@@ -76,7 +76,7 @@ def let_go(pressed: Pressed, law: ScalarLaw, start: Array, gone: Flags) -> Array
     >>> from dpgcli.states.units import UnitSolutions
     >>> unit = UnitSolutions.of(uniform_finger(1, **STUDY))
     >>> pressed = Pressed(unit, DomeVolumes(np.array([[31.61]])))
-    >>> law = pressed.domes(np.zeros((1, 1)), np.zeros((1, 1), bool))
+    >>> law = pressed.domes(np.zeros((1, 1)))
     >>> beyond = np.full((2, 1), 0.1)  # rad, corners: the unit is open by 2.15 mm
     >>> there = let_go(pressed, law, beyond, np.ones((1, 1), bool))
     >>> print(pressed.extensions(there).round(6))  # mm, its inverted well

@@ -6,14 +6,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from dpgcli.actuation.stretches import BISECTIONS, PLACES, Stretches, highest_near, picked
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import Measured, Response, WideMeasured, take_lanes
+from dpgcli.equilibrium.contracts import Measured, Response, ScalarLaw, WideMeasured, take_lanes
 from dpgcli.mechanics.finger import Finger
-from dpgcli.mechanics.laws import Dome, PushOnly
+from dpgcli.mechanics.laws import Dome
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
 
-BISECTIONS = 60
-PLACES = 512  # of a dome's travel, at which its own pressure is looked at
+NEAREST = 1e-15  # of extensions: as near as rounding tells
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class PressedDomes:
     """The law of domes under pressures that change by a load λ: p = p₀ + λ Δp, MPa by unit.
 
     `pulling` is the law of a dome in touch. `touching` (unit, batch) says which domes are, None
-    where all are, whatever happens: those of laws that push and pull. `peak` (mm) is the extension
-    up to which a ground dome may push.
+    where all are, whatever happens: those of laws that push and pull. `furthest` (mm) is the
+    extension up to which a dome that is apart may go without losing its place.
     """
 
     finger: Finger
@@ -30,8 +30,7 @@ class PressedDomes:
     pressure: Array
     change: Array
     touching: Flags | None = None
-    inverted: Flags | None = None
-    peak: Array | None = None
+    furthest: Array | None = None
 
     @property
     def is_smooth(self) -> bool:
@@ -69,31 +68,28 @@ class PressedDomes:
     def margin(self, measured: Measured | WideMeasured, load: Array) -> Array | None:
         """Push of domes in touch, and what keeps the others from it, over the forces in play.
 
-        A dome that is apart rests where its own force is zero, before its neighbor; it is further
-        away than a ground dome can travel where the opening is beyond its `peak`.
+        A dome that is apart rests where its own force is zero, before its neighbor; it cannot go
+        so far without losing its place where the opening is beyond its `furthest`.
         """
         if self.touching is None:
             return None
-        assert self.inverted is not None and self.peak is not None, "given beside touching"
+        assert self.furthest is not None, "given beside touching"
         scalar = measured.value
         force = self.free(scalar, load).force
-        is_away = ~self.touching & ~self.inverted & (scalar > self.peak)
+        is_away = ~self.touching & (scalar > self.furthest)
         margin = np.where(self.touching, -force, force) / self.finger.force_scale
         return np.where(is_away, np.inf, margin)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same law for some lanes of the batch."""
-        flags = (self.touching, self.inverted)
-        touching, inverted = (None if part is None else take_lanes(part, index) for part in flags)
         return replace(
             self,
             finger=self.finger.take_lanes(index),
             volumes=self.volumes.take_lanes(index),
             pressure=take_lanes(self.pressure, index),
             change=take_lanes(self.change, index),
-            touching=touching,
-            inverted=inverted,
-            peak=None if self.peak is None else take_lanes(self.peak, index),
+            touching=None if self.touching is None else take_lanes(self.touching, index),
+            furthest=None if self.furthest is None else take_lanes(self.furthest, index),
         )
 
 
@@ -199,53 +195,63 @@ def limits(finger: Finger, volumes: DomeVolumes) -> DomeLimits:
 
 def _largest(function: Callable[[Array], Array], start: Array, end: Array) -> Array:
     """Where a function is largest between two extensions: the best place, then golden sections."""
-    share = np.linspace(0.0, 1.0, PLACES)[:, None, None]
-    values = function(start + share * (end - start))
-    best = values.argmax(axis=0) / (PLACES - 1)
-    low, high = (np.clip(best + side / (PLACES - 1), 0.0, 1.0) for side in (-1.0, 1.0))
-    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
-    for _ in range(BISECTIONS):
-        left, right = high - ratio * (high - low), low + ratio * (high - low)
-        rises = function(start + left * (end - start)) < function(start + right * (end - start))
-        low, high = np.where(rises, left, low), np.where(rises, high, right)
-    return np.asarray(start + 0.5 * (low + high) * (end - start))
+
+    def by_share(share: Array) -> Array:
+        return function(start + share * (end - start))
+
+    values = by_share(np.linspace(0.0, 1.0, PLACES)[:, None, None])
+    best = highest_near(by_share, values.argmax(axis=0) / (PLACES - 1))
+    return np.asarray(start + best * (end - start))
 
 
 def pushing(
-    finger: Finger, volumes: DomeVolumes, own: DomeLimits, pressure: Array, inverted: Flags
+    finger: Finger, volumes: DomeVolumes, own: Stretches, pressure: Array, place: Array
 ) -> PushingDomes:
-    """Domes that only push, each in the place that it has at these pressures, (unit, batch).
+    """Domes that only push, each where it goes by itself from a place, mm, (unit, batch).
 
-    `inverted` are the domes that are, as far as the pressures let them be: see `kept_places`.
+    Those that push there go on to the next place at which they rest, others back to the one before.
     """
-    assert isinstance(finger.law, PushOnly), "other domes act everywhere"
-
-    def force(extension: Array) -> Array:
-        return free_force(finger, volumes, extension, pressure)
-
-    contact = np.broadcast_to(finger.domes.contact, inverted.shape)
-    far = contact + finger.domes.stroke  # the travel of the inverted dome
-    peak, dip = (np.broadcast_to(part, inverted.shape) for part in (own.peak, own.dip))
-    ground = _zero(force, -contact - far, peak)
-    well = _zero(force, dip, dip + 2.0 * far)
-    before = np.where(pressure < own.snap_pressure, _zero(force, dip, peak), -np.inf)
-    low = np.where(inverted, before, -np.inf)
-    high = np.where(inverted, well, ground)
+    goes_up = free_force(finger, volumes, place, pressure) < 0.0
+    stretch = own.beyond(place, pressure, goes_up)
+    high = rest_on(finger, volumes, own, pressure, stretch)
+    before = own.top_before(stretch, pressure)
+    has_top, place_of_top = before >= 0, np.maximum(before, 0)
+    bottom, top = picked(own.begins, place_of_top + has_top), picked(own.ends, place_of_top)
+    law = DomesAt(finger, PressureWork(pressure, volumes, finger.domes))
+    low = _zero(law, np.where(has_top, bottom, 0.0), np.where(has_top, top, 0.0))
+    low = np.where(has_top, low, -np.inf)
     return PushingDomes(finger, PressureWork(pressure, volumes, finger.domes), low, high)
 
 
-def _zero(force: Callable[[Array], Array], negative: Array, positive: Array) -> Array:
-    """Where a force changes sign between two extensions, by bisection."""
+def rest_on(
+    finger: Finger, volumes: DomeVolumes, own: Stretches, pressure: Array, stretch: Indices
+) -> Array:
+    """Where domes rest on a stretch of theirs, mm, (unit, batch); its end beyond its pressures."""
+    domes = finger.domes
+    far = domes.contact + 2.0 * domes.stroke  # beyond all wells, whatever the pressure
+    begin = np.maximum(picked(own.begins, stretch), -2.0 * far)
+    end = np.minimum(picked(own.ends, stretch), 4.0 * far)
+    return _zero(DomesAt(finger, PressureWork(pressure, volumes, domes)), begin, end)
+
+
+def _zero(law: ScalarLaw, negative: Array, positive: Array) -> Array:
+    """Where a force changes sign between two extensions: Newton's steps, within bisections.
+
+    Each lane stops by itself, so that others beside it change no digit.
+    """
+    nearest = NEAREST * (np.abs(negative) + np.abs(positive))
+    place, is_found = 0.5 * (negative + positive), np.zeros(np.shape(nearest), bool)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (negative + positive)
-        is_negative = force(middle) < 0.0
-        negative = np.where(is_negative, middle, negative)
-        positive = np.where(is_negative, positive, middle)
-    return 0.5 * (negative + positive)
-
-
-def kept_places(own: DomeLimits, pressure: Array, inverted: Flags) -> Flags:
-    """Which domes are inverted, once those have snapped or reset that these pressures make."""
-    return np.asarray(
-        (inverted | (pressure > own.snap_pressure)) & ~(pressure < own.reset_pressure)
-    )
+        _, force, stiffness = law(place)
+        is_negative = force < 0.0
+        negative = np.where(is_negative, place, negative)
+        positive = np.where(is_negative, positive, place)
+        by_newton = place - force / np.where(stiffness != 0.0, stiffness, 1.0)
+        is_within = (by_newton - negative) * (by_newton - positive) <= 0.0
+        onward = np.where(is_within, by_newton, 0.5 * (negative + positive))
+        is_near = np.abs(onward - place) <= nearest
+        place = np.where(is_found, place, onward)
+        is_found |= is_near
+        if is_found.all():
+            break
+    return place

@@ -60,7 +60,8 @@ def _level(law: PressedDomes, value: Array) -> Flags:
     """Domes whose own rest is where their neighbors are, within rounding."""
     free = law.free(value, np.zeros(value.shape[1]))
     is_rest = (np.abs(free.force) <= AWAY * law.finger.force_scale) & (free.stiffness > 0.0)
-    return np.asarray(is_rest)
+    assert law.touching is not None and law.furthest is not None, "domes that can be apart"
+    return np.asarray(is_rest & (law.touching | (value <= law.furthest)))
 
 
 def _wrong(family: PressedFamily, coordinates: Array, touching: Flags, is_level: Flags) -> Flags:

@@ -8,18 +8,19 @@ from typing import TypeVar
 import numpy as np
 
 from dpgcli.actuation.domes import (
-    DomeLimits,
     DomesAt,
     PressedDomes,
     PushingDomes,
     limits,
     pushing,
+    rest_on,
 )
 from dpgcli.actuation.folding import folded
 from dpgcli.actuation.meeting import about_to_touch, with_touching
+from dpgcli.actuation.stretches import Stretches, picked, stretches
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.pressure import Pressure
-from dpgcli.equilibrium.contracts import ScalarLaw, Term, take_lanes
+from dpgcli.equilibrium.contracts import ScalarLaw, Term
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, Watch, follow
@@ -59,20 +60,22 @@ class Shapes:
     """Fingers under pressure, a lane each: coordinates (size, batch), the rest (unit, batch).
 
     `pressure` in MPa by unit; `inverted` domes; `touching` those in touch with their neighbors,
-    None for laws under which all are.
+    None for laws under which all are. `place` (mm) are the extensions at which domes rest that are
+    apart from their neighbors, each in a well of its own; of no meaning for those in touch.
     """
 
     coordinates: Array
     pressure: Array
     inverted: Flags
     touching: Flags | None = None
+    place: Array | None = None
 
     def take_lanes(self, index: Indices) -> "Shapes":
         """Some of them."""
         touching = None if self.touching is None else self.touching[:, index]
-        return Shapes(
-            self.coordinates[:, index], self.pressure[:, index], self.inverted[:, index], touching
-        )
+        place = None if self.place is None else self.place[:, index]
+        which = self.coordinates[:, index], self.pressure[:, index], self.inverted[:, index]
+        return Shapes(*which, touching, place)
 
     def put(self, index: Indices, others: "Shapes") -> None:
         """Replace the lanes at `index`."""
@@ -80,6 +83,8 @@ class Shapes:
         self.inverted[:, index] = others.inverted
         if self.touching is not None and others.touching is not None:
             self.touching[:, index] = others.touching
+        if self.place is not None and others.place is not None:
+            self.place[:, index] = others.place
 
 
 @dataclass(frozen=True)
@@ -141,21 +146,24 @@ class Pressed:
         """The fingers."""
         return self.units.finger
 
+    @property
+    def stretches(self) -> Stretches | None:
+        """Where domes by themselves rest; None for those that always act."""
+        return self._wells if isinstance(self.finger.law, PushOnly) else None
+
     @cached_property
-    def limits(self) -> DomeLimits | None:
-        """Where domes by themselves lose their places; None for those that always act."""
-        if not isinstance(self.finger.law, PushOnly):
-            return None
-        return limits(self.finger, self.volumes)
+    def _wells(self) -> Stretches | None:
+        """The same; None for those that have no more than two wells, and always act."""
+        law = self.finger.law
+        has_two = law.curve is None and not isinstance(law, PushOnly)
+        return None if has_two else stretches(self.finger, self.volumes)
 
     def take_lanes(self, index: Indices) -> "Pressed":
         """The fingers of some lanes; what paths need of designs is found once, before."""
         _ = self.units.holding_stiffness
         taken = Pressed(self.units.take_lanes(index), self.volumes.take_lanes(index))
-        if self.limits is not None:
-            taken.__dict__["limits"] = DomeLimits(
-                *(take_lanes(part, index) for part in self.limits)
-            )
+        wells = self._wells
+        taken.__dict__["_wells"] = None if wells is None else wells.take_lanes(index)
         return taken
 
     @cached_property
@@ -170,9 +178,10 @@ class Pressed:
     ) -> LoadedPotential[FingerCoordinates, PressedDomes]:
         """The energies on the way from the pressures of shapes to others, (unit, batch)."""
         law = PressedDomes(self.finger, self.volumes, shapes.pressure, target - shapes.pressure)
-        if self.limits is not None:
-            peak = np.broadcast_to(self.limits.peak, shapes.inverted.shape)
-            law = replace(law, touching=shapes.touching, inverted=shapes.inverted, peak=peak)
+        if self.stretches is not None:
+            assert shapes.place is not None, "given beside touching"
+            furthest = picked(self.stretches.ends, self.stretches.of(shapes.place))
+            law = replace(law, touching=shapes.touching, furthest=furthest)
         return self.loaded(law)
 
     def loaded(self, law: Loaded) -> LoadedPotential[FingerCoordinates, Loaded]:
@@ -182,11 +191,12 @@ class Pressed:
         dome, scale, stiffness = coordinates.dome, self.finger.stroke, self.units.holding_stiffness
         return LoadedPotential(coordinates, bare.terms, dome, law, dome, scale, stiffness)
 
-    def domes(self, pressure: Array, inverted: Flags) -> DomesAt | PushingDomes:
-        """The law of the domes under fixed pressures."""
-        if self.limits is None:
+    def domes(self, pressure: Array, place: Array | None = None) -> DomesAt | PushingDomes:
+        """The law of the domes under fixed pressures, from their places where they only push."""
+        if self.stretches is None:
             return DomesAt(self.finger, PressureWork(pressure, self.volumes, self.finger.domes))
-        return pushing(self.finger, self.volumes, self.limits, pressure, inverted)
+        assert place is not None, "domes that only push are somewhere"
+        return pushing(self.finger, self.volumes, self.stretches, pressure, place)
 
     def as_touching(self, shapes: Shapes) -> Potential[FingerCoordinates]:
         """The energy less the work of the pressures, each dome in touch or not as it is."""
@@ -210,27 +220,74 @@ class Pressed:
 
     def travels(self, shapes: Shapes) -> Array:
         """Travels of the domes' poles, mm, (unit, batch): apart from their neighbors, their own."""
-        law = self._domes_of(shapes)
+        return self.places(shapes) + self.finger.domes.contact
+
+    def places(self, shapes: Shapes) -> Array:
+        """Extensions at which domes are, mm, (unit, batch), in touch those of their units."""
         extension = self.extensions(shapes.coordinates)
-        if isinstance(law, PushingDomes):
-            extension = np.clip(extension, law.low, law.high)
-        return extension + self.finger.domes.contact
+        if shapes.touching is None or shapes.place is None:
+            return extension
+        return np.where(shapes.touching, extension, shapes.place)
+
+    def resting(self, shapes: Shapes) -> Shapes:
+        """Shapes whose domes that are apart have gone along with their pressures.
+
+        Each has kept its stretch: beyond the pressures of that it is at its end.
+        """
+        own = self.stretches
+        if own is None or shapes.place is None:
+            return shapes
+        stretch = own.of(shapes.place)
+        place = rest_on(self.finger, self.volumes, own, shapes.pressure, stretch)
+        return replace(shapes, place=place)
 
     def energy(self, shapes: Shapes) -> Array:
         """Energy less the work of the pressures, mJ, (batch,)."""
         return self.with_domes(self._domes_of(shapes)).evaluate(shapes.coordinates).energy
 
-    def _domes_of(self, shapes: Shapes) -> DomesAt | PushingDomes:
-        """The law of domes where they are.
+    def left(self, before: Shapes, after: Shapes) -> Flags:
+        """Units that go to another well from some shapes to others, (unit, batch).
 
-        One in touch may be pressed beyond its own limit, as the hinge holds it back: from there on
-        it pushes up to the inverted well.
+        They flip, or their domes go to another stretch of a curve with ripples, further than others
+        move beside them.
         """
-        inverted = shapes.inverted
-        if self.limits is not None and shapes.touching is not None:
-            is_beyond = shapes.pressure > self.limits.snap_pressure
-            inverted = inverted | (shapes.touching & is_beyond)
-        return self.domes(shapes.pressure, inverted)
+        flipped = before.inverted ^ after.inverted
+        if self._wells is None:
+            return flipped
+        one, other = self.places(before), self.places(after)
+        is_far = np.abs(one - other) > LEFT * self.finger.stroke
+        is_other = self._wells.of(one) != self._wells.of(other)
+        return np.asarray(flipped | (is_far & is_other))
+
+    def fallen_back(self, place: Array, pressure: Array) -> Array:
+        """Where domes rest that nothing holds at a place any more, mm, (unit, batch)."""
+        own = self.stretches
+        assert own is not None, "others have no places"
+        stretch = own.beyond(place, pressure, np.zeros(place.shape, bool))
+        return rest_on(self.finger, self.volumes, own, pressure, stretch)
+
+    def lost(self, shapes: Shapes, which: Flags) -> Array:
+        """Places of domes, mm, (unit, batch), these half-way from their stretches to the next.
+
+        Their pressures are at what their stretches bear, at most or at least.
+        """
+        own = self.stretches
+        assert own is not None and shapes.place is not None, "others have no places"
+        stretch, last = own.of(shapes.place), len(own.begins) - 1
+        to_most, to_least = (
+            np.abs(shapes.pressure - picked(part, stretch)) for part in (own.most, own.least)
+        )
+        before = np.where(to_most < to_least, stretch, np.maximum(stretch - 1, 0))
+        between = picked(own.ends, before) + picked(own.begins, np.minimum(before + 1, last))
+        return np.where(which, 0.5 * between, shapes.place)
+
+    def _domes_of(self, shapes: Shapes) -> DomesAt | PushingDomes:
+        """The law of domes where they are: in touch, or at rest in their places."""
+        work = PressureWork(shapes.pressure, self.volumes, self.finger.domes)
+        if shapes.touching is None or shapes.place is None:
+            return DomesAt(self.finger, work)
+        low, high = (np.where(shapes.touching, end, shapes.place) for end in (-np.inf, np.inf))
+        return PushingDomes(self.finger, work, low, high)
 
     def followed(
         self,
@@ -243,13 +300,15 @@ class Pressed:
 
         `watch` is told what is on the way, with shares of it as loads.
         """
+        if shapes.place is not None:
+            shapes = replace(shapes, place=self.places(shapes))
         family = self.family(shapes, target)
         touching = about_to_touch(family, shapes.coordinates)
         shapes, family = replace(shapes, touching=touching), with_touching(family, touching)
         end, alone = self._lost_alone(shapes, target)
         ends = follow(family, shapes.coordinates, np.zeros(len(end)), end, largest_step, watch)
         pressure = shapes.pressure + ends.load * (target - shapes.pressure)
-        there = replace(shapes, coordinates=ends.coordinates, pressure=pressure)
+        there = self.resting(replace(shapes, coordinates=ends.coordinates, pressure=pressure))
         is_alone = (ends.outcome == PathEnd.ARRIVED) & alone.any(axis=0)
         unit = np.where(is_alone, alone.argmax(axis=0), ends.cell)
         start, left = self._past(family, ends, target - shapes.pressure)
@@ -307,13 +366,13 @@ class Pressed:
         And which those are, the first and what is tied with it.
         """
         n = shapes.inverted.shape[1]
-        if self.limits is None or shapes.touching is None:
+        own = self.stretches
+        if own is None or shapes.touching is None or shapes.place is None:
             return np.ones(n), np.zeros_like(shapes.inverted)
-        change = target - shapes.pressure
-        snap, reset = self.limits.snap_pressure, self.limits.reset_pressure
-        limit = np.where(shapes.inverted, reset, snap)
-        is_towards = ~shapes.touching & np.where(shapes.inverted, change < 0.0, change > 0.0)
-        way = np.where(is_towards, change, 1.0)
+        change, stretch = target - shapes.pressure, own.of(shapes.place)
+        limit = np.where(change < 0.0, picked(own.least, stretch), picked(own.most, stretch))
+        is_towards = ~shapes.touching & (change != 0.0) & np.isfinite(limit)
+        way, limit = np.where(is_towards, change, 1.0), np.where(is_towards, limit, 0.0)
         share = np.where(is_towards, np.maximum((limit - shapes.pressure) / way, 0.0), np.inf)
         first = np.minimum(share.min(axis=0), 1.0)
         near = np.abs((share - first) * way) <= TIE * np.abs(limit)

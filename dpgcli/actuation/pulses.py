@@ -202,6 +202,13 @@ def intervals(
     parts.append(Intervals(short, begins, begins, none, none, np.zeros(len(short), bool)))
     found = Intervals.joined(parts)
     found = found.take(np.argsort(found.lane, kind="stable"))
+    is_same = np.append(
+        False,
+        (found.lane[1:] == found.lane[:-1])
+        & (found.at_peak[1:] == found.at_peak[:-1])
+        & (found.after[1:] == found.after[:-1]),
+    )
+    found = found.take(np.flatnonzero(~is_same))
     is_last = np.append(found.lane[1:] != found.lane[:-1], True)
     ends = furthest[found.lane]
     return replace(found, high=np.where(is_last, ends, np.append(found.low[1:], 0.0)))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dpgcli.actuation.domes import PushingDomes
 from dpgcli.actuation.pressed import Pressed, Shapes
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.terms import chain_potential
@@ -36,15 +37,28 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     """
     settled = settle(pressed.units, chain_potential, inverted, DEFAULT_TOLERANCE)
     coordinates = settled.equilibrium.coordinates
-    touching, finger = None if pressed.limits is None else inverted.copy(), pressed.finger
-    if touching is not None and finger.is_loaded:  # a gap may be open further than a dome reaches
-        touching &= pressed.extensions(coordinates) <= finger.law.touching(finger.domes).highest
-    shapes = Shapes(coordinates, np.zeros(inverted.shape), inverted.copy(), touching)
-    if touching is not None:
+    shapes = Shapes(coordinates, np.zeros(inverted.shape), inverted.copy())
+    if pressed.stretches is not None:
+        shapes = _with_places(pressed, shapes)
         is_closed = (settled.status == Status.STABLE) & _closed(pressed, shapes)
         status = np.where(is_closed, Status.GAP_CLOSED, settled.status).astype(np.uint8)
         settled = replace(settled, status=status)
     return shapes, settled
+
+
+def _with_places(pressed: Pressed, shapes: Shapes) -> Shapes:
+    """Shapes without pressure whose inverted domes touch, where gaps are no wider than they reach.
+
+    Loads may open them further. All other domes rest in wells of their own.
+    """
+    finger = pressed.finger
+    extension = pressed.extensions(shapes.coordinates)
+    highest = finger.law.touching(finger.domes).highest
+    touching = shapes.inverted & (extension <= highest) if finger.is_loaded else shapes.inverted
+    begin = np.where(shapes.inverted, np.minimum(extension, highest), -finger.domes.contact)
+    law = pressed.domes(shapes.pressure, begin)
+    assert isinstance(law, PushingDomes), "others have no places"
+    return replace(shapes, touching=touching.copy(), place=law.high)
 
 
 def _closed(pressed: Pressed, shapes: Shapes) -> Flags:

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dpgcli.actuation.cascades import let_go
-from dpgcli.actuation.domes import PushingDomes, kept_places
+from dpgcli.actuation.domes import PushingDomes
 from dpgcli.actuation.folding import folded
 from dpgcli.actuation.pressed import (
+    DISPLACED,
     LARGEST_RESIDUAL,
     TIE,
     TOLERANCE,
@@ -58,7 +59,8 @@ class _Rest(NamedTuple):
 def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     """What becomes of shapes that halted, at their pressures.
 
-    Domes that meet or leave their neighbors change nothing else.
+    Domes that meet or leave their neighbors change nothing else; one that leaves where it cannot
+    rest goes back by itself.
     """
     shapes, n = halted.shapes, len(halted.unit)
     is_first = np.arange(pressed.finger.n_units)[:, None] == halted.unit
@@ -67,16 +69,15 @@ def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     if touching is not None:
         touching = touching ^ (is_first & meets)
     falls = np.flatnonzero((halted.reason == Halt.FOLD) | (halted.reason == Halt.ALONE))
-    moved = replace(
-        shapes,
-        coordinates=shapes.coordinates.copy(),
-        inverted=shapes.inverted.copy(),
-        touching=touching,
-    )
+    moved = replace(shapes.take_lanes(np.arange(n)), touching=touching)
+    if touching is not None:
+        moved = _left(pressed, moved, shapes.touching & ~touching)
     ending, tied = np.full(n, Halt.ARRIVED), halted.tied.copy()
     if len(falls):
         alone = (halted.reason == Halt.ALONE) & (is_first | halted.tied)
-        start = replace(moved, coordinates=halted.start, inverted=shapes.inverted ^ alone)
+        start = replace(moved, coordinates=halted.start)
+        if shapes.place is not None:
+            start = replace(start, place=pressed.lost(shapes, alone))
         own, few = pressed.take_lanes(falls), halted.take_lanes(falls)
         rest, undecided = _decided(own, few, start.take_lanes(falls))
         is_folded = folded(own.coordinates, rest.shapes.coordinates)
@@ -87,6 +88,15 @@ def after(pressed: Pressed, halted: Halted) -> SnapOutcome:
     return SnapOutcome(replace(halted, tied=tied), moved, ending)
 
 
+def _left(pressed: Pressed, shapes: Shapes, leave: Flags) -> Shapes:
+    """Shapes of which some domes leave their neighbors: where these cannot rest they fall back."""
+    assert shapes.place is not None, "given beside touching"
+    extension = pressed.extensions(shapes.coordinates)
+    place = np.where(leave, pressed.fallen_back(extension, shapes.pressure), shapes.place)
+    is_beyond = place > pressed.units.wells.spring_barrier
+    return replace(shapes, inverted=np.where(leave, is_beyond, shapes.inverted), place=place)
+
+
 def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:
     """Minima downhill, and units of which the model does not say if they go along, (unit, batch).
 
@@ -95,17 +105,21 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
     units = np.arange(pressed.finger.n_units)[:, None]
     ahead = replace(start, coordinates=_ahead(halted, start.coordinates))
     rest = _relaxed(pressed, ahead, np.zeros(halted.tied.shape, bool))
-    others = (rest.shapes.inverted ^ halted.shapes.inverted) & ~halted.tied & (units != halted.unit)
+    left = pressed.left(halted.shapes, rest.shapes)
+    others = left & ~halted.tied & (units != halted.unit)
     is_clear = rest.is_there & ~others.any(axis=0) & (rest.curvature >= NEAR_FOLD)
     doubtful, undecided = np.flatnonzero(~is_clear), np.zeros(halted.tied.shape, bool)
     if len(doubtful):
         n, three = len(doubtful), np.tile(doubtful, 3)
         begin = start.take_lanes(three)
         pressure = begin.pressure * (1.0 + TIE * np.array([0.0, 1.0, -1.0]).repeat(n))
-        gone = (units == halted.unit[three]) | (start.inverted ^ halted.shapes.inverted)[:, three]
+        is_alone = halted.reason == Halt.ALONE
+        gone = ((units == halted.unit) | (halted.tied & is_alone))[:, three]
         again = _relaxed(pressed.take_lanes(three), replace(begin, pressure=pressure), gone)
-        here, above, below = again.shapes.inverted.reshape(len(units), 3, n).swapaxes(0, 1)
-        undecided[:, doubtful] = (above ^ here) | (below ^ here)
+        own, here = pressed.take_lanes(doubtful), again.shapes.take_lanes(np.arange(n))
+        for side in (1, 2):
+            others_there = again.shapes.take_lanes(side * n + np.arange(n))
+            undecided[:, doubtful] |= own.left(here, others_there)
         rest.put(doubtful, again, np.arange(n))
     return rest, undecided & (units != halted.unit)
 
@@ -119,35 +133,40 @@ def _ahead(halted: Halted, start: Array) -> Array:
 def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
     """Go downhill from shapes at their pressures to the next minima, units that are `gone` slowly.
 
-    Domes that only push and are pushed out of their places fall back, and the others go on.
+    Domes that only push and are pushed out of their places fall back to the wells before, and the
+    others go on.
     """
-    inverted, coordinates = shapes.inverted, shapes.coordinates
-    if pressed.limits is not None:
-        inverted = kept_places(pressed.limits, shapes.pressure, inverted)
-    slowly, step = gone.any(axis=0), _downhill_step(pressed)
-    for _ in range(pressed.finger.n_units + 1):
-        law = pressed.domes(shapes.pressure, inverted)
-        coordinates = let_go(pressed, law, coordinates, gone)
+    start, slowly, step = pressed.places(shapes), gone.any(axis=0), _downhill_step(pressed)
+    n_wells = 1 if pressed.stretches is None else len(pressed.stretches.begins)
+    law, begin = pressed.domes(shapes.pressure, start), shapes.coordinates
+    for _ in range(pressed.finger.n_units * n_wells + 1):
+        coordinates = let_go(pressed, law, begin, gone)
         there = minimize(pressed.with_domes(law), coordinates, TOLERANCE, largest_step=step)
         coordinates = there.coordinates
-        extension = pressed.extensions(coordinates)
+        extension = place = pressed.extensions(coordinates)
         if not isinstance(law, PushingDomes):
             break
-        fallen = inverted & (extension <= law.low)
-        inverted = inverted & ~fallen
-        gone = fallen & slowly
+        place, fallen = np.minimum(extension, law.high), extension <= law.low
         if not fallen.any():
             break
+        beyond = law.low - DISPLACED * pressed.finger.stroke
+        law = pressed.domes(shapes.pressure, np.where(fallen, beyond, place))
+        assert isinstance(law, PushingDomes), "as before"
+        again = (fallen & (extension <= law.low)).any(axis=0)  # over another top, without a push
+        start = np.where(fallen, beyond, np.where(again, start, place))
+        begin = np.where(again, shapes.coordinates, coordinates)
+        gone = np.where(again, gone | fallen, fallen) & slowly
+        if again.any():
+            law = pressed.domes(shapes.pressure, start)
     is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
-    beyond, touching = extension > pressed.units.wells.spring_barrier, None
+    inverted = np.asarray(place > pressed.units.wells.spring_barrier)
+    found = replace(shapes, coordinates=coordinates, inverted=inverted)
     if isinstance(law, PushingDomes):
-        touching = law.touches(extension)
-        beyond = np.where(touching, beyond, inverted)
-    found = replace(shapes, coordinates=coordinates, inverted=beyond, touching=touching)
+        found = replace(found, touching=law.touches(extension), place=place)
     return _Rest(found, there.curvature, np.asarray(is_there))
 
 
 def _downhill_step(pressed: Pressed) -> float:
     """Of the step cap: shorter where curves bend often, or barriers end where domes let go."""
-    is_plain = pressed.limits is None and pressed.finger.law.curve is None
+    is_plain = pressed.stretches is None and pressed.finger.law.curve is None
     return 1.0 if is_plain else SHORT_STEP

@@ -10,6 +10,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
 
 EVENTS = (Halt.FOLD, Halt.ALONE, Halt.CONTACT, Halt.RELEASE)
+JUMPS = (Halt.FOLD, Halt.ALONE)
 UNKNOWN = (Halt.FAILED, Halt.CONTACT, Halt.RELEASE)  # nobody knows how these ways go on
 MOST_EVENTS = 64  # for each unit, on one way: curves with many bends have many
 
@@ -40,6 +41,14 @@ class Events:
     def flipped(self) -> Flags:
         """Units that the event inverts or resets, (unit, event)."""
         return np.asarray(self.halted.shapes.inverted ^ self.after.inverted)
+
+    @property
+    def are_jumps(self) -> Flags:
+        """Those that take a unit to another well, (event,), where it may flip or not.
+
+        A curve with ripples has wells of one digit side by side.
+        """
+        return np.asarray(np.isin(self.halted.reason, JUMPS) | self.flipped.any(axis=0))
 
 
 @dataclass(frozen=True)
@@ -120,7 +129,7 @@ def released(pressed: Pressed, shapes: Shapes, largest_step: float = LARGEST_STE
 
 @dataclass(frozen=True)
 class Stair:
-    """A step of a staircase: events in which units flip, and what is left after release.
+    """A step of a staircase: events in which units jump, and what is left after release.
 
     `rest` are the shapes without pressure; `is_fine` says where there is one.
     """
@@ -128,6 +137,10 @@ class Stair:
     events: Events
     rest: Shapes
     is_fine: Flags
+
+    def take(self, which: Indices) -> "Stair":
+        """Some of the events."""
+        return Stair(self.events.take(which), self.rest.take_lanes(which), self.is_fine[which])
 
 
 def staircase(
@@ -137,7 +150,7 @@ def staircase(
     n_stairs: int | None = None,
     largest_step: float = LARGEST_STEP,
 ) -> tuple[tuple[Stair, ...], Way]:
-    """Raise pressures to `target`, (unit, batch), and let them go after each flip on the way.
+    """Raise pressures to `target`, (unit, batch), and let them go after each jump on the way.
 
     Each lane stops after `n_stairs` flips, if that is given. The way is that without release.
     """
@@ -151,24 +164,17 @@ def staircase(
             break
         own, events = found
         rounds.append(events)
-        is_flip = events.flipped.any(axis=0) & events.is_fine
-        if is_flip.any():
-            which = np.flatnonzero(is_flip)
+        which = np.flatnonzero(events.are_jumps & events.is_fine)
+        if len(which):
             few = events.take(which)
             way = released(own.take_lanes(which), few.after, largest_step)
             stairs.append(Stair(few, way.shapes, way.reason == Halt.ARRIVED))
-        flips[events.lanes] += is_flip
+        flips[events.lanes] += events.flipped.any(axis=0) & events.is_fine
         if n_stairs is not None:
             journey.go_on(flips[events.lanes[events.is_fine]] < n_stairs)
     return tuple(stairs), Way(journey.ending, journey.reason, tuple(rounds))
 
 
 def _copied(shapes: Shapes) -> Shapes:
-    touching = None if shapes.touching is None else shapes.touching.copy()
-    return replace(
-        shapes,
-        coordinates=shapes.coordinates.copy(),
-        pressure=shapes.pressure + np.zeros(shapes.inverted.shape),
-        inverted=shapes.inverted.copy(),
-        touching=touching,
-    )
+    whole = replace(shapes, pressure=shapes.pressure + np.zeros(shapes.inverted.shape))
+    return whole.take_lanes(np.arange(shapes.inverted.shape[1]))

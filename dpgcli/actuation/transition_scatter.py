@@ -5,15 +5,15 @@ from collections.abc import Iterable
 import numpy as np
 
 from dpgcli.actuation.directions import Directions, on_line
-from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.rest import at_rest
-from dpgcli.actuation.staircase import MOST_EVENTS, UNKNOWN, Journey
+from dpgcli.actuation.pressed import Halt, Pressed
+from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.staircase import MOST_EVENTS, UNKNOWN, Events, Journey, released
 from dpgcli.actuation.transitions import Transitions
-from dpgcli.arrays import Array, Columns, Flags, Indices
+from dpgcli.arrays import Array, Codes, Columns, Flags, Indices
 from dpgcli.design.outputs import Output
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
-from dpgcli.states.patterns import inverted_units
+from dpgcli.states.patterns import codes_of, inverted_units
 from dpgcli.states.settle import lanes_at_once
 
 TAIL = 2.5  # % of draws on each side
@@ -103,8 +103,8 @@ def _flips(
         found = journey.next_events()
         if found is None:
             break
-        events = found[1]
-        is_flip = events.flipped.any(axis=0) & events.is_fine
+        now, events = found
+        is_flip = _leaves(now, events, directions.code[states[events.lanes]]) & events.is_fine
         flips = np.flatnonzero(is_flip)
         which, halted = events.lanes[flips], events.halted.take_lanes(flips)
         pressure[states[which]] = on_line(halted.shapes, line_of, line[which])
@@ -113,3 +113,19 @@ def _flips(
     is_unknown = np.zeros(len(directions), bool)
     is_unknown[states] = np.isin(journey.reason, UNKNOWN) & np.isnan(pressure[states])
     return pressure, unit, is_unknown
+
+
+def _leaves(pressed: Pressed, events: Events, code: Codes) -> Flags:
+    """Whether events take draws out of states, codes (event,), as `transitions` has it.
+
+    `pressed` are those to which they happen. Those that jump and flip no unit are let go.
+    """
+    leaves = np.array(events.flipped.any(axis=0))
+    silent = np.flatnonzero(events.are_jumps & ~leaves & events.is_fine)
+    if len(silent):
+        own = pressed.take_lanes(silent)
+        way = released(own, events.take(silent).after)
+        is_back = codes_of(way.shapes.inverted) == code[silent]
+        is_back &= (way.reason == Halt.ARRIVED) & is_certified(own, way.shapes)
+        leaves[silent] = ~is_back
+    return leaves

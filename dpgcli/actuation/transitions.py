@@ -150,10 +150,18 @@ def _ends(way: Way) -> Indices:
 def _put(
     found: Transitions, own: Pressed, stair: Stair, directions: Directions, line_of: Indices
 ) -> None:
-    """Write what a flip leads to into its rows."""
+    """Write what a jump leads to into its rows, where the state has not been left before.
+
+    One that flips no unit, and from which release leads back, does not leave it.
+    """
+    lanes = stair.events.lanes
+    is_rest = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
+    is_back = is_rest & (codes_of(stair.rest.inverted) == directions.code[lanes])
+    leaves = (found.unit[lanes] < 0) & (stair.events.flipped.any(axis=0) | ~is_back)
+    kept = np.flatnonzero(leaves)
+    stair, is_rest = stair.take(kept), is_rest[kept]
     events = stair.events
     lanes, halted = events.lanes, events.halted
-    is_rest = stair.is_fine & is_certified(own.take_lanes(lanes), stair.rest)
     found.pressure[lanes] = on_line(halted.shapes, line_of, directions.line[lanes])
     found.outcome[lanes] = np.where(is_rest, Departure.LEAVES, Departure.ASTRAY)
     units = np.arange(own.finger.n_units)[:, None]

@@ -32,9 +32,9 @@ MEETINGS = {Halt.CONTACT: EventKind.CONTACT, Halt.RELEASE: EventKind.RELEASE}
 class Event:
     """Something that happened to a finger, at once.
 
-    `units` (from 0) are those that flip, the one that gives rise to it first; `tied` are others
-    whose threshold is the same as its. `before` and `after` are places among the points of the
-    way; `released` is the energy (mJ) that is lost.
+    `units` (from 0) are those that go to another well, the one that gives rise to it first; `tied`
+    are others whose threshold is the same as its. `before` and `after` are places among the points
+    of the way; `released` is the energy (mJ) that is lost.
     """
 
     kind: EventKind
@@ -128,7 +128,10 @@ def travel(
 
 
 def _bits(shapes: Shapes) -> bytes:
-    parts = shapes.coordinates, shapes.pressure, shapes.inverted, shapes.touching
+    parts = (
+        *(shapes.coordinates, shapes.pressure, shapes.inverted),
+        *(shapes.touching, shapes.place),
+    )
     return b"".join(part.tobytes() for part in parts if part is not None)
 
 
@@ -207,6 +210,7 @@ class _Traveler:
             coordinates=np.concatenate([start.coordinates[:, :0], *(passed[i] for i in inner)], 1),
             pressure=start.pressure + share * (target - start.pressure),
         )
+        way = self.pressed.resting(way)
         done = self.share
         self.reason, self.pressure = Halt(halted.reason[0]), halted.shapes.pressure[:, 0]
         if self._pass(way, done + share * (1.0 - done)):
@@ -230,7 +234,7 @@ class _Traveler:
         """What happened, its points aside. Of tied units none is the first but by its number."""
         pressed, before = self.pressed, halted.shapes
         first, reason = int(halted.unit[0]), Halt(halted.reason[0])
-        flipped = (before.inverted ^ after.inverted)[:, 0]
+        flipped = pressed.left(before, after)[:, 0]
         alike = sorted({first, *np.flatnonzero(halted.tied[:, 0]).tolist()})
         order = [*alike, *(unit for unit in range(len(flipped)) if unit not in alike)]
         units = tuple(unit for unit in order if flipped[unit]) or (alike[0],)
@@ -276,11 +280,13 @@ class _Traveler:
 def joined(parts: Sequence[PathPoints]) -> PathPoints:
     """Points one after the other."""
     touching = [part.shapes.touching for part in parts if part.shapes.touching is not None]
+    place = [part.shapes.place for part in parts if part.shapes.place is not None]
     shapes = Shapes(
         np.concatenate([part.shapes.coordinates for part in parts], axis=1),
         np.concatenate([part.shapes.pressure for part in parts], axis=1),
         np.concatenate([part.shapes.inverted for part in parts], axis=1),
         np.concatenate(touching, axis=1) if touching else None,
+        np.concatenate(place, axis=1) if place else None,
     )
     return PathPoints(
         shapes,

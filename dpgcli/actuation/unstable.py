@@ -63,6 +63,7 @@ def _branch(pressed: Pressed, points: PathPoints, event: Event) -> PathPoints | 
     pressure = pressure + branch.load * (fold.shapes.pressure - pressure)
     along = points.take(np.repeat(start, len(branch.load)))
     shapes = replace(along.shapes, coordinates=branch.coordinates, pressure=pressure)
+    shapes = pressed.resting(shapes)
     share = before.share + branch.load * (fold.share - before.share)
     return replace(along, shapes=shapes, share=share)
 

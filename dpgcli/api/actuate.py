@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dpgcli.actuation.alone import REACH, thresholds_alone
 from dpgcli.actuation.certificate import Certificate, certificate
 from dpgcli.actuation.pressed import Halt, Shapes
 from dpgcli.actuation.readings import Drift, Readings, drift
@@ -40,7 +41,7 @@ from dpgcli.text import counted, enumerated
 MOST_CYCLES = 100_000
 MOST_PRESSURES = 1_000_000  # by step and unit: 1 to 5 GB, or more far beyond thresholds
 LARGEST_STEP = 0.05  # of a stroke: points near enough for a figure
-LARGE = 10.0  # MPa: what is larger may be kPa
+FAR = 100.0  # times the largest threshold of a unit by itself: what is further may be kPa
 WHY = {
     Halt.FOLDED: "the finger folds onto itself",
     Halt.FAILED: "no equilibrium is found",
@@ -149,6 +150,11 @@ class ActuateResult:
             if trust.output is Output.PRESSURES:
                 yield f"pressures: {trust.basis_text}, {trust.source}; error {trust.known_error}"
         yield from (f"warning: {warning}" for warning in scene.warnings)
+        if times := self.times_beyond:
+            yield (
+                f"warning: pressures go to {times:,.0f} times the largest threshold of any unit "
+                "alone: are they in kPa? They are taken in MPa, of which 150 kPa are 0.15"
+            )
 
     def _repeated(self, n_cycles: int) -> Iterator[str]:
         found = self.drift
@@ -169,6 +175,16 @@ class ActuateResult:
             return f"{values[0]} MPa"
         named = zip(pressure.lines, values, strict=True)
         return ", ".join(f"{line} {value}" for line, value in named) + " MPa"
+
+    @cached_property
+    def times_beyond(self) -> float:
+        """How many times beyond all thresholds the pressures go, where that is too far; else 0.
+
+        The largest threshold is that of any unit by itself; hundreds of times it are hardly meant.
+        """
+        largest = thresholds_alone(self.given.pressed).reach[0] / REACH
+        times = float(np.abs(self.history.history.pressure).max() / largest)
+        return times if times > FAR else 0.0
 
     @property
     def problem(self) -> str:
@@ -264,8 +280,7 @@ def followed(
     way = travel(given.pressed, _start(given, start), by_unit, cycles, LARGEST_STEP)
     result = ActuateResult(given, history, way, start, cycles)
     if result.problem:
-        is_large = np.abs(by_unit).max() > LARGE
-        hint = "; pressures are in MPa, of which 150 kPa are 0.15" if is_large else ""
+        hint = "; pressures are in MPa, of which 150 kPa are 0.15" if result.times_beyond else ""
         raise ActuationError(result, result.problem, hint)
     return replace(result, branches=branches(given.pressed, way)) if unstable else result
 

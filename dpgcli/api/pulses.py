@@ -56,7 +56,12 @@ SCATTER_COLUMNS = (
     Column(
         "window_from_MPa", "MPa", "peaks of which 95 % of draws do this pulse", outputs=PRESSURES
     ),
-    Column("window_to_MPa", "MPa", "up to here; infinite where nothing ends it", outputs=PRESSURES),
+    Column(
+        "window_to_MPa",
+        "MPa",
+        "up to here; infinite, by its sign, where nothing ends it",
+        outputs=PRESSURES,
+    ),
 )
 
 

@@ -102,9 +102,9 @@ class TransitionsResult:
             f"{-graph.reach:.4g} to {graph.reach:.4g} MPa: {REACH:g} times the largest threshold "
             "of any unit alone"
         )
-        for kind, what in _COUNTED.items():
+        for kind, (of_one, of_more) in _COUNTED.items():
             if n := int((outcome == kind).sum()):
-                yield f"{counted(n, 'direction')} {what}"
+                yield f"{counted(n, 'direction')} {of_one if n == 1 else of_more}"
         if n_left_out:
             left_out = counted(n_left_out, "pattern")
             yield f"{left_out} without a certified stable state left out: dpg predict says why"
@@ -114,7 +114,7 @@ class TransitionsResult:
             tied = counted(n_tied, "transition")
             yield f"ties in {tied}: the model does not say which of these units goes first"
         yield f"reachable from rest: {_listed(self.reachable)}"
-        if graph.n_unknown:
+        if graph.n_unknown and self.unreachable:
             yield (
                 f"not found to be reachable from rest: {_listed(self.unreachable)}; "
                 f"{failed_searches(graph.n_unknown)}, which may lead there"
@@ -174,7 +174,7 @@ class TransitionsResult:
     def _n_closed(self) -> int:
         """How many states are left out that are stable until pressure comes."""
         pressed = self.given.pressed
-        if pressed.limits is None:
+        if pressed.stretches is None:
             return 0
         codes = np.flatnonzero(~self.graph.is_stable).astype(np.uint64)
         _, settled = at_rest(pressed, inverted_units(codes, pressed.finger.n_units))
@@ -197,11 +197,11 @@ def failed_searches(n_directions: int) -> str:
 
 
 _COUNTED = {
-    Departure.LEAVES: "lead to another state or back",
-    Departure.STAYS: "in which no unit leaves",
-    Departure.FOLDS: "in which the finger folds onto itself",
-    Departure.LOST: "in which no equilibrium is found",
-    Departure.ASTRAY: "that end in no certified state",
+    Departure.LEAVES: ("leads to another state or back", "lead to another state or back"),
+    Departure.STAYS: ("in which no unit leaves",) * 2,
+    Departure.FOLDS: ("in which the finger folds onto itself",) * 2,
+    Departure.LOST: ("in which no equilibrium is found",) * 2,
+    Departure.ASTRAY: ("that ends in no certified state", "that end in no certified state"),
 }
 
 

@@ -36,7 +36,7 @@ class Joined(Generic[System]):
 
     def _interleaved(self, values: list[Array]) -> Array:
         stacked = np.stack(np.broadcast_arrays(*values), axis=1)
-        return stacked.reshape(-1, *stacked.shape[2:])
+        return stacked.reshape(len(stacked) * len(values), *stacked.shape[2:])
 
     @cached_property
     def force_unit(self) -> Array:

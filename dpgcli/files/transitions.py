@@ -44,15 +44,17 @@ def graph_of(states: ColumnsAndRows, transitions: ColumnsAndRows) -> "nx.MultiDi
     """The graph of states, a node each, and of transitions, an edge for each that ends in a state.
 
     Both are columns and rows; `pattern` names the nodes, and what else they have are attributes.
+    Keys of edges count on through the graph: GraphML writes them as ids, of which readers may take
+    no more than one edge each.
     """
     import networkx as nx
 
     graph: nx.MultiDiGraph[str] = nx.MultiDiGraph()
     graph.add_nodes_from((node["pattern"], node) for node in _records(*states))
-    for edge in _records(*transitions):
-        if edge["pattern_after"]:
-            attributes = {name: edge[name] for name in EDGE}
-            graph.add_edge(edge["pattern"], edge["pattern_after"], **attributes)
+    leading = (edge for edge in _records(*transitions) if edge["pattern_after"])
+    for number, edge in enumerate(leading):
+        attributes = {name: edge[name] for name in EDGE}
+        graph.add_edge(edge["pattern"], edge["pattern_after"], key=number, **attributes)
     return graph
 
 

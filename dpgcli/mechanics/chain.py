@@ -72,7 +72,7 @@ class Chain:
         names = (angle, angle) if self.finger.is_rigid else (length, angle, angle, length)
         stacked = np.stack(np.broadcast_arrays(*names), axis=1)
         stacked = np.broadcast_to(stacked, (self.finger.n_units, *stacked.shape[1:]))
-        return stacked.reshape(-1, stacked.shape[2])
+        return stacked.reshape(self.size, stacked.shape[2])
 
     @cached_property
     def force_unit(self) -> Array:

@@ -166,7 +166,7 @@ class Lattice:
         chain = Chain(self.finger)
         stations = chain.stations(chain.of_shape(shape))
         nodes = np.stack(np.broadcast_arrays(*stations), axis=1)
-        return nodes.reshape(-1, nodes.shape[2])
+        return nodes.reshape(self.size, nodes.shape[2])
 
     def without_walls(self, values: Array) -> Array:
         """All rows: walls are rigid."""
@@ -186,8 +186,9 @@ class Lattice:
 
     def corner_moments(self, coordinates: Array, gradient: Array) -> Array:
         """Moments of the forces on all nodes that a corner turns (our derivation)."""
-        base, top = coordinates.reshape(-1, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)
-        on_base, on_top = gradient.reshape(-1, 2, 2, gradient.shape[1]).transpose(1, 2, 0, 3)
+        n = self.finger.n_units
+        base, top = coordinates.reshape(n, 2, 2, coordinates.shape[1]).transpose(1, 2, 0, 3)
+        on_base, on_top = gradient.reshape(n, 2, 2, gradient.shape[1]).transpose(1, 2, 0, 3)
         own = cross(top - base, on_top)  # of each station's strut, about the station
         beyond = np.cumsum((on_base + on_top)[:, ::-1], axis=1)[:, ::-1]
         # about the station before: beyond it all forces act at the next station, as it were

@@ -113,7 +113,7 @@ class Corner:
             if (first, p) <= (second, q)
         }
         near, far = corners(cell)
-        gradient = tuple(slopes.reshape(-1, *slopes.shape[2:]))
+        gradient = tuple(slopes.reshape(2 * len(slopes), *slopes.shape[2:]))
         return Measured(near if self.is_near else far, gradient, None, entries)
 
     def _turns(self, cell: Vectors) -> tuple[tuple[str, float, Array], ...]:

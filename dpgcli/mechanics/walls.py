@@ -109,8 +109,9 @@ def without_walls(values: Array, width: int) -> Array:
     >>> without_walls(np.array([[9.0], [1.0], [2.0], [9.0], [3.0], [4.0]]), 2).ravel()
     array([1., 2., 3., 4.])
     """
-    by_unit = values.reshape(-1, width + 1, *values.shape[1:])
-    return by_unit[:, 1:].reshape(-1, *values.shape[1:])
+    n_units = len(values) // (width + 1)  # told, as the batch may be empty
+    by_unit = values.reshape(n_units, width + 1, *values.shape[1:])
+    return by_unit[:, 1:].reshape(n_units * width, *values.shape[1:])
 
 
 def with_walls(walls: Array, others: Array, width: int) -> Array:
@@ -120,9 +121,11 @@ def with_walls(walls: Array, others: Array, width: int) -> Array:
     >>> with_walls(np.zeros((2, 1)), others, 2).ravel()
     array([0., 1., 2., 0., 3., 4.])
     """
-    by_unit = others.reshape(-1, width, *others.shape[1:])
+    n_units = len(others) // width  # told, as the batch may be empty
+    by_unit = others.reshape(n_units, width, *others.shape[1:])
     walls = np.broadcast_to(walls, by_unit[:, 0].shape)[:, None]
-    return np.concatenate((walls, by_unit), axis=1).reshape(-1, *others.shape[1:])
+    rows = np.concatenate((walls, by_unit), axis=1)
+    return rows.reshape(n_units * (width + 1), *others.shape[1:])
 
 
 @dataclass(frozen=True)

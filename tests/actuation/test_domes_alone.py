@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
+from dpgcli.actuation.domes import limits
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.staircase import Events, driven
@@ -167,7 +168,7 @@ def test_a_ground_dome_meets_its_neighbor_where_it_has_crossed_the_gap(
     assert float(pressed.finger.domes.contact[0, 0]) == pytest.approx(gap, rel=1e-9)
     meets = unit.dome(0.0)
     assert 0.0 < meets < 0.1495
-    peak = float(pressed.limits.peak[0, 0])  # type: ignore[union-attr]
+    peak = float(limits(pressed.finger, pressed.volumes).peak[0, 0])
     there, back, again, snap, *_ = events_of(pressed, 0.5 * (meets + 0.149), 0.0, 0.4)
     assert [there[0], back[0], again[0], snap[0]] == ["CONTACT", "RELEASE", "CONTACT", "FOLD"]
     for event in (there, back, again):

@@ -74,6 +74,13 @@ def test_nothing_leads_between_equal_units_and_no_pulse_to_where_one_is(
     assert there.holds
 
 
+def test_no_pulse_leads_to_where_a_finger_with_walls_is(study: Study, pressed: Made) -> None:
+    own = pressed(study(3).changed(wall_compliance=np.array([[0.3]])))
+    there = pulse_sequence(own, np.zeros(3, np.int64), 0, 0)
+    assert there.pulses == ()
+    assert there.holds
+
+
 @pytest.mark.parametrize("lines", [ONE, TWO])
 def test_sequences_between_rigid_bars_are_as_short_as_those_of_hysterons(
     study: Study, pressed: Made, hysterons: Any, lines: np.ndarray[Any, Any]

@@ -144,7 +144,7 @@ def test_snaps_end_where_the_gradient_leads(study: Study, linear_stiffness: floa
     pressed = Pressed(UnitSolutions.of(finger), DomeVolumes(area))
     rest, _ = at_rest(pressed, np.zeros((3, 1), bool))
     halted = pressed.followed(rest, np.full((3, 1), 0.6))
-    there = pressed.with_domes(pressed.domes(halted.shapes.pressure, rest.inverted))
+    there = pressed.with_domes(pressed.domes(halted.shapes.pressure))
     scale = pressed.coordinates.stiffness_scale[:, 0]
 
     def motion(_: float, coordinates: Array) -> Array:

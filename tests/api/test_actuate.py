@@ -42,6 +42,18 @@ def test_the_graded_finger_goes_through_its_intermediate_state(graded: ActuateRe
     assert graded.pattern == "00000"
 
 
+@pytest.mark.parametrize(("factor", "is_told"), [(99.0, False), (101.0, True), (-101.0, True)])
+def test_pressures_hundreds_of_times_beyond_thresholds_may_be_kilopascals(
+    factor: float, *, is_told: bool
+) -> None:
+    """Of the largest threshold of any unit by itself, here the snap pressure: 0.1495 MPa."""
+    found = dpg.actuate(CONFIGS / "three_unit.yaml", pressure=[0.0, 0.1495 * factor, 0.0])
+    said = [line for line in found.summary if "kPa" in line]
+    assert len(said) == is_told
+    if is_told:
+        assert said[0].startswith("warning: pressures go to 101 times the largest threshold")
+
+
 def test_a_hold_between_the_two_is_the_study_s_state(graded: ActuateResult) -> None:
     """Held at 0.16 MPa the finger has three inverted units, and keeps them without pressure."""
     found = dpg.actuate(GRADED, pressure="0:0.16:0")

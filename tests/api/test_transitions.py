@@ -1,5 +1,7 @@
 """`transitions`: the study's graded finger, its graph as values and files, what is refused."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import networkx as nx
@@ -111,6 +113,8 @@ def test_the_graph_has_what_is_known_of_states_and_edges(
         assert node["reachable"] is (pattern in two_lines.reachable)
     leads = two_lines.to_pandas().query("pattern_after != ''")
     assert graph.number_of_edges() == len(leads) == 20
+    names = re.findall(r'<edge [^>]*id="(\d+)"', (tmp_path / "a.graphml").read_text("utf-8"))
+    assert names == [str(number) for number in range(20)], "other readers keep one edge an id"
     edge = next(data for data in graph["000"]["110"].values())
     assert (edge["line"], edge["direction"], edge["unit"]) == ("A", "+", "1,2")
     assert edge["pressure_MPa"] == row(two_lines, "000", "A", "+")["pressure_MPa"]
@@ -244,3 +248,16 @@ def test_too_many_scattered_thresholds_are_refused() -> None:
         dpg.transitions(GRADED, scatter="stroke_mm=1%", draws=100_000)
     with pytest.raises(UsageError, match="draws goes with scatter"):
         dpg.transitions(GRADED, draws=5)
+
+
+def test_a_single_direction_is_told_of_as_one() -> None:
+    """A unit alone: up it leaves, down nothing happens; inverted the other way round."""
+    found = dpg.transitions(CONFIGS / "three_unit.yaml", settings={"finger.units": 1})
+    counts = [line for line in found.summary if " direction" in line]
+    assert counts == [
+        "2 directions lead to another state or back",
+        "2 directions in which no unit leaves",
+    ]
+    one = found.graph.transitions.take(np.array([0]))
+    alone = replace(found, graph=replace(found.graph, transitions=one))
+    assert "1 direction leads to another state or back" in alone.summary
