@@ -40,6 +40,7 @@ from dpgcli.mechanics.sticking import Sticking
 from dpgcli.mechanics.terms import DeadLoad, Formulate
 from dpgcli.states.units import UnitSolutions
 
+ROUNDING = 1e-13  # of the forces in play: a smaller push is none
 STIFFER = 20.0  # than the softest unit: what a contact is sought with; more has rounding in it
 
 Constrained = Extended[Coordinates]
@@ -334,6 +335,11 @@ class Obstructed:
     def pushes(self, active: Flags, multipliers: Array) -> Array:
         """The pushes of contacts, (cell, batch), that have these multipliers, N."""
         return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
+
+    def without_rounding(self, push: Array) -> Array:
+        """Pushes, (cell, batch), N, but for those that are rounding only: zero."""
+        least = ROUNDING * self.units.finger.force_scale.min(axis=0)
+        return np.where(push > least, push, 0.0)
 
     def are_slipping(self, coordinates: Array, load: Array) -> Flags:
         """Whether the end of a finger slips over the body, (batch,)."""

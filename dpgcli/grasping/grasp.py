@@ -32,7 +32,6 @@ from dpgcli.states.tip import tip
 from dpgcli.states.units import UnitSolutions
 
 MARGIN_TO = 2.0  # of the load: margins are looked for so far
-TOUCHES = 1e-12  # N: a smaller push is rounding
 BLOCK = 2**28  # bytes
 LANE = 800  # bytes of a lane, times the square of its units: measured from 10 to 26 of them
 
@@ -250,7 +249,7 @@ def described(
         bare = FaceGaps(face, body)
         touches = bare.touches(shapes.coordinates)
         cells = slice(n_before, n_before + bare.n_cells)
-        push, n_before = shapes.push[cells], cells.stop
+        push, n_before = own.without_rounding(shapes.push[cells]), cells.stop
         rows = slice(finger, own.n_own, own.n_fingers)
         mine = own.of_finger(shapes.coordinates, finger)
         found.append(

@@ -18,7 +18,7 @@ from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.closing import Closing, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import TOUCHES, Placed
+from dpgcli.grasping.grasp import Placed
 from dpgcli.grasping.payload import Contacts, payloads
 from dpgcli.grasping.release import LANES, WAYS, motion_of, opened_by, released, together
 from dpgcli.grasping.shapes import ContactShapes
@@ -73,7 +73,7 @@ class Pulled:
         """
         contacts = self._contacts(own, shapes)
         slip = payloads(Contacts.joined(contacts), self.friction.coefficient, self.gravity)
-        is_touched = np.all([(part.push > TOUCHES).any(axis=0) for part in contacts], axis=0)
+        is_touched = np.all([(part.push > 0.0).any(axis=0) for part in contacts], axis=0)
         slip = np.where(is_touched, slip, 0.0)  # one finger of two lets the body go
         share, is_reset = np.full(len(slip), np.inf), np.zeros(len(slip), bool)
         lanes = np.flatnonzero(slip > 0.0)
@@ -90,7 +90,7 @@ class Pulled:
         here, middle = own.relabeled(shapes), self.body.middle.reshape(2, -1)
         motions, n = shapes.coordinates[own.n_own :], shapes.coordinates.shape[1]
         opened = opened_by(self.body, motions) if len(motions) else np.zeros(n)
-        pairs = zip(self.frames, own.each(here.push), strict=True)
+        pairs = zip(self.frames, own.each(own.without_rounding(here.push)), strict=True)
         return [
             Contacts.of(push, gaps.touches(here.coordinates)).about(frame, middle, opened)
             for frame, (gaps, push) in pairs
@@ -176,7 +176,7 @@ def _stuck(
 ) -> tuple[Obstructed, ContactShapes]:
     """Fingers that stick to their body, and their shapes."""
     here, places = own.relabeled(shapes), []
-    for gaps, push in own.each(here.push):
+    for gaps, push in own.each(own.without_rounding(here.push)):
         places.append(Sticking.of(gaps, here.coordinates, push, friction[None]))
     nothing = np.zeros((len(places), here.push.shape[1]))
     active = np.concatenate((here.active, nothing == 0.0))

@@ -18,7 +18,7 @@ from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.closing import Closing, closed, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described
+from dpgcli.grasping.grasp import Grasped, Placed, described
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.terms import Quadratic
 from dpgcli.states.certify import Status
@@ -104,7 +104,7 @@ def _let_go(
     status = np.max(before, axis=0)
     is_there, lost = gone.shapes.is_there, Status.NOT_CONVERGED
     if held is not Held.FIXED:
-        is_there, lost = _is_held(gone.shapes), Status.NOT_HELD
+        is_there, lost = _is_held(own, gone.shapes), Status.NOT_HELD
     is_lost = (status == Status.STABLE) & ~is_there
     status = np.where(is_lost, np.uint8(lost), status)
     fingers = described(own, codes, gone, status, with_margins=with_margins)
@@ -142,9 +142,9 @@ def _closed_on_jaws(
     return own, replace(gone, resets=(*came.resets, *gone.resets))
 
 
-def _is_held(shapes: ContactShapes) -> NDArray[np.bool_]:
+def _is_held(own: Obstructed, shapes: ContactShapes) -> NDArray[np.bool_]:
     """Which bodies are at rest, and touched at all."""
-    return np.asarray(shapes.is_there & (shapes.push > TOUCHES).any(axis=0))
+    return np.asarray(shapes.is_there & (own.without_rounding(shapes.push) > 0.0).any(axis=0))
 
 
 def together(

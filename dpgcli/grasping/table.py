@@ -14,7 +14,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing, event_text
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, blocks, placed, told
+from dpgcli.grasping.grasp import Grasped, Placed, blocks, placed, told
 from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
@@ -26,6 +26,7 @@ from dpgcli.states.patterns import inverted_units, texts
 
 FORCES, SHAPES = (Output.FORCES,), (Output.SHAPES,)
 
+ROUNDING = 1e-12  # of the scale of values
 COLUMNS = (
     Column("pattern", "", "state before the body was there; upper/lower of a pair", kind=Kind.TEXT),
     Column("status", "", "result of certification, with the body there", kind=Kind.STATUS),
@@ -191,7 +192,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
     forces = [
         frame.outside(own["force"]) for frame, own in zip(found.frames, of_fingers, strict=True)
     ]
-    touches = [own["push"] > TOUCHES for own in of_fingers]
+    touches = [own["push"] > 0.0 for own in of_fingers]
 
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
@@ -229,7 +230,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
 
 def _rounded(values: Array, scale: Array | float) -> Array:
     """Values without those that are nothing but rounding."""
-    return np.where(np.abs(values) > TOUCHES * scale, values, 0.0)
+    return np.where(np.abs(values) > ROUNDING * scale, values, 0.0)
 
 
 def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:

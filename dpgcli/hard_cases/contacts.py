@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.design.bodies import Disc
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
+from dpgcli.grasping.grasp import Grasped, Placed, described, met
 from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Touch, Verdict
 from dpgcli.mechanics.terms import chain_potential
@@ -73,7 +73,7 @@ def _answer(placed: Placed, found: Grasped) -> Answer:
         residual_floor=np.nan,
         condition=np.nan,
         iterations=0,
-        touch=Touch(push[push > TOUCHES], walls[:, 0]),
+        touch=Touch(push[push > 0.0], walls[:, 0]),
     )
 
 

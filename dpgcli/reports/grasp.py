@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.bodies import Body, Disc, Jaws
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import TOUCHES, Grasped
+from dpgcli.grasping.grasp import Grasped
 from dpgcli.grasping.table import Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
@@ -52,7 +52,7 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             for finger in fingers:
                 draw_finger(axes, finger, POINTS / scale)
             if fingers:
-                _draw_forces(axes, found, row, LONGEST * max(window.size) / max(largest, TOUCHES))
+                _draw_forces(axes, found, row, LONGEST * max(window.size) / (largest or 1.0))
             else:
                 word = Status(rows["status"][row]).text.replace("_", "\n", 1)
                 middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
@@ -121,7 +121,7 @@ def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
     """Arrows from the places of contact into the body; `scale` in mm per N."""
     for place, frame in enumerate(found.frames):
         own, lane = found.take(place, row)
-        for cell in np.flatnonzero(own.push[:, lane] > TOUCHES):
+        for cell in np.flatnonzero(own.push[:, lane] > 0.0):
             way = frame.outside(own.touches.directions[:, cell, lane])
             start = frame.placed(own.touches.places[:, cell, lane]) + _moved(found, row)
             end = start + scale * own.push[cell, lane] * way
@@ -143,7 +143,7 @@ def _handles() -> list[Any]:
 
 
 def _said(largest: float) -> str:
-    if largest <= TOUCHES:
+    if largest == 0.0:
         return "no finger touches the body"
     return f"arrows are to scale: the longest is {largest:.3g} N"
 

@@ -13,7 +13,7 @@ from dpgcli.design.loads import DOWN
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import TOUCHES, Grasped, Placed, described, met
+from dpgcli.grasping.grasp import Grasped, Placed, described, met
 from dpgcli.grasping.release import let_go, motion_of, moved_by
 from dpgcli.grasping.table import COLUMNS, OF_FRICTION, OF_PAIRS
 from dpgcli.mechanics.terms import chain_potential
@@ -105,7 +105,7 @@ class _Finger(NamedTuple):
 
     @classmethod
     def of(cls, told: Grasped) -> "_Finger":
-        n_contacts = np.asarray((told.push > TOUCHES).sum(axis=0))
+        n_contacts = np.asarray((told.push > 0.0).sum(axis=0))
         return cls(told.status, told.after, n_contacts, told.force, told.push.max(axis=0), told.gap)
 
     def with_lanes(self, index: Indices, others: "_Finger") -> "_Finger":

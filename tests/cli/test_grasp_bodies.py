@@ -163,3 +163,16 @@ def test_a_stiffness_has_its_unit(call: Any, folder: Path) -> None:
     own = "object.compliance.stiffness_N_per_mm=-0.05"
     result = call("grasp", str(CONFIGS / "gripper.yaml"), "--set", own)
     assert "a stiffness > 0 in N/mm, found -0.05" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("parts", "is_whole"), [("at_x_mm: 25\n  at_y_mm: 0", True), ("at_x_mm: 25", False)]
+)
+def test_both_parts_of_a_place_stand_for_it(
+    call: Any, folder: Path, gripper: str, parts: str, is_whole: bool
+) -> None:
+    spec = with_object(folder, gripper, f"  disc: {{diameter_mm: 9}}\n  {parts}")
+    result = call("validate", spec)
+    assert result.exit_code == (ExitCode.DONE if is_whole else ExitCode.USAGE)
+    said = "object.at_mm: expected two numbers in mm, such as [40, 0], found nothing"
+    assert (said in result.stdout + result.stderr) is not is_whole

@@ -1,8 +1,8 @@
 """What the tests of grasping share: bodies that grow, and a finger and its gaps of their own.
 
-`Own` is written from the definitions in MODEL.md, in plain coordinates of nodes that take complex
-numbers, so that its gradients are exact (complex steps). It shares with the package the order of
-the coordinates and nothing else.
+`Own` is written from the definitions on the page "laws" of the manual, in plain coordinates of
+nodes that take complex numbers, so that its gradients are exact (complex steps). It shares with
+the package the order of the coordinates and nothing else.
 """
 
 from collections.abc import Callable

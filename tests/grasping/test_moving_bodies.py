@@ -299,3 +299,18 @@ def test_resets_before_letting_go_are_told(reference_finger: Fingers) -> None:
         "",
         "2 at 0.5; 2 at 0.5 of letting go/–",
     ]
+
+
+@pytest.mark.parametrize("held", [Held.FIXED, Held.GUIDED])
+def test_soft_fingers_touch_as_stiff_ones_do(held: Held, reference_finger: Fingers) -> None:
+    """What is rounding is so beside the forces in play: all of them are 1e-12 times as large."""
+    finger = reference_finger(5)
+    soft = finger.changed(
+        bistable_stiffness=1e-12 * finger.bistable_stiffness,
+        hinge_stiffness=1e-12 * finger.hinge_stiffness,
+    )
+    stiff, other = (
+        grasp_rows(grasped(gripper_of(own), CAN, held, "00001/00001")) for own in (finger, soft)
+    )
+    assert stiff["n_contacts"].tolist() == other["n_contacts"].tolist() != [0]
+    assert other["squeeze_N"] == pytest.approx(1e-12 * stiff["squeeze_N"], rel=1e-9)

@@ -71,9 +71,10 @@ class ObjectSpec(Section):
             "mm from at_mm.",
         )
     )
-    at_mm: TwoNumbers = Field(
+    at_mm: TwoNumbers | None = Field(
+        default=None,
         description="Where its center is in the gripper's frame, in mm: between the bases, x along "
-        "the fingers; of a finger alone in its own frame."
+        "the fingers; of a finger alone in its own frame.",
     )
     at_x_mm: Bounded | None = Field(
         default=None, description="Its part along x, in mm, instead of that in at_mm."
@@ -104,11 +105,16 @@ class ObjectSpec(Section):
         return None if self.friction is None else Friction(self.friction, self.mass_g)
 
     @property
+    def _place(self) -> list[float | None]:
+        """Its place, x and y: None where it is not said."""
+        both: list[float] | list[None] = self.at_mm or [None, None]
+        own = (self.at_x_mm, self.at_y_mm)
+        return [said if part is None else part for said, part in zip(both, own, strict=True)]
+
+    @property
     def known(self) -> Body:
         """The value that it stands for."""
-        own = (self.at_x_mm, self.at_y_mm)
-        at = [said if part is None else part for said, part in zip(self.at_mm, own, strict=True)]
-        center = np.array(at, float)
+        center = np.array(self._place, float)
         if self.jaws is not None:
             k = None if self.compliance is None else self.compliance.stiffness_N_per_mm
             return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm, k)
@@ -128,6 +134,8 @@ class ObjectSpec(Section):
             return [Issue(("compliance",), "jaws, which only give way", said[0])]
         if self.mass_g is not None and self.friction is None:
             return [NO_FRICTION]
+        if None in self._place:
+            return [Issue((PLACE,), EXPECTED[PLACE], "nothing")]
         return list(_wrong_sides(self.polygon or []))
 
 
