@@ -93,8 +93,21 @@ def _left(pressed: Pressed, shapes: Shapes, leave: Flags) -> Shapes:
     assert shapes.place is not None, "given beside touching"
     extension = pressed.extensions(shapes.coordinates)
     place = np.where(leave, pressed.fallen_back(extension, shapes.pressure), shapes.place)
-    is_beyond = place > pressed.units.wells.spring_barrier
-    return replace(shapes, inverted=np.where(leave, is_beyond, shapes.inverted), place=place)
+    held = replace(shapes, place=np.where(leave, extension, place))
+    inverted = _inverted(pressed, held, place, shapes.touching)
+    return replace(shapes, inverted=np.where(leave, inverted, shapes.inverted), place=place)
+
+
+def _inverted(pressed: Pressed, before: Shapes, place: Array, touching: Flags | None) -> Flags:
+    """Which domes are inverted that went from shapes to places, mm, (unit, batch).
+
+    One that has left its neighbor and kept its stretch is what it was, however far it withdraws.
+    """
+    is_beyond, own = place > pressed.units.wells.spring_barrier, pressed.stretches
+    if own is None or touching is None:
+        return np.asarray(is_beyond)
+    keeps = ~touching & (own.of(pressed.places(before)) == own.of(place))
+    return np.asarray(is_beyond | (keeps & before.inverted))
 
 
 def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Flags]:
@@ -104,7 +117,7 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
     """
     units = np.arange(pressed.finger.n_units)[:, None]
     ahead = replace(start, coordinates=_ahead(halted, start.coordinates))
-    rest = _relaxed(pressed, ahead, np.zeros(halted.tied.shape, bool))
+    rest = _relaxed(pressed, halted.shapes, ahead, np.zeros(halted.tied.shape, bool))
     left = pressed.left(halted.shapes, rest.shapes)
     others = left & ~halted.tied & (units != halted.unit)
     is_clear = rest.is_there & ~others.any(axis=0) & (rest.curvature >= NEAR_FOLD)
@@ -115,7 +128,8 @@ def _decided(pressed: Pressed, halted: Halted, start: Shapes) -> tuple[_Rest, Fl
         pressure = begin.pressure * (1.0 + TIE * np.array([0.0, 1.0, -1.0]).repeat(n))
         is_alone = halted.reason == Halt.ALONE
         gone = ((units == halted.unit) | (halted.tied & is_alone))[:, three]
-        again = _relaxed(pressed.take_lanes(three), replace(begin, pressure=pressure), gone)
+        own, before = pressed.take_lanes(three), halted.shapes.take_lanes(three)
+        again = _relaxed(own, before, replace(begin, pressure=pressure), gone)
         own, here = pressed.take_lanes(doubtful), again.shapes.take_lanes(np.arange(n))
         for side in (1, 2):
             others_there = again.shapes.take_lanes(side * n + np.arange(n))
@@ -130,11 +144,11 @@ def _ahead(halted: Halted, start: Array) -> Array:
     return np.asarray(start + (AHEAD - 1.0) * from_fold)
 
 
-def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
+def _relaxed(pressed: Pressed, before: Shapes, shapes: Shapes, gone: Flags) -> _Rest:
     """Go downhill from shapes at their pressures to the next minima, units that are `gone` slowly.
 
-    Domes that only push and are pushed out of their places fall back to the wells before, and the
-    others go on.
+    What is inverted is told by the shapes `before`. Domes that only push and are pushed out of
+    their places fall back to the wells before, and the others go on.
     """
     start, slowly, step = pressed.places(shapes), gone.any(axis=0), _downhill_step(pressed)
     n_wells = 1 if pressed.stretches is None else len(pressed.stretches.begins)
@@ -159,10 +173,11 @@ def _relaxed(pressed: Pressed, shapes: Shapes, gone: Flags) -> _Rest:
         if again.any():
             law = pressed.domes(shapes.pressure, start)
     is_there = (there.relative_residual <= LARGEST_RESIDUAL) & (there.curvature > 0.0)
-    inverted = np.asarray(place > pressed.units.wells.spring_barrier)
-    found = replace(shapes, coordinates=coordinates, inverted=inverted)
-    if isinstance(law, PushingDomes):
-        found = replace(found, touching=law.touches(extension), place=place)
+    touching = law.touches(extension) if isinstance(law, PushingDomes) else None
+    inverted = _inverted(pressed, before, place, touching)
+    found = replace(shapes, coordinates=coordinates, inverted=inverted, touching=touching)
+    if touching is not None:
+        found = replace(found, place=place)
     return _Rest(found, there.curvature, np.asarray(is_there))
 
 

@@ -203,3 +203,17 @@ def test_a_free_dome_goes_from_well_to_well() -> None:
     kinds = {event.kind for event in way.events[: len(rising)]}
     assert kinds == {EventKind.SNAP}
     assert way.final.inverted.all()
+
+
+def test_a_dome_that_leaves_its_neighbor_at_rest_is_as_inverted_as_before() -> None:
+    """The unit is straight then; it flips where the dome loses its place, at its own bottom."""
+    own, peer = rippled([60.0], contact=10.0), Peer(10.0)
+    start, _ = at_rest(own, np.ones((1, 1), bool))
+    bottoms = peer.dome(np.array(peer.extremes("dome", -6.0, TRAVEL - 10.0, -1.0)))
+    way = travel(own, start, np.array([[1.05 * float(bottoms.min()) / 60.0]]))
+    digits = way.points.shapes.inverted[0]
+    found = [(event.kind, bool(digits[event.after])) for event in way.events]
+    kinds = [(EventKind.RESET, True), (EventKind.RELEASE, True), (EventKind.RESET, False)]
+    assert found == kinds
+    release = way.points.shapes.pressure[0, way.events[1].before]
+    assert release == pytest.approx(float(peer.dome(np.zeros(()))) / 60.0, rel=1e-6)
