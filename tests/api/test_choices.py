@@ -86,7 +86,7 @@ NONE: tuple[Any, ...] = (
 )  # fmt: skip
 SLOW = pytest.mark.slow
 CHOICES = [
-    pytest.param(name, argument, marks=SLOW if name == "sweep" else ())
+    pytest.param(name, argument, marks=SLOW if name in ("sweep", "jaws") else ())
     for name, given in FACE.items()
     for argument in (
         inspect.signature(getattr(dpg, name)).parameters if name != "validate" else ("settings",)

@@ -102,7 +102,8 @@ def test_units_that_reset_before_a_body_slips() -> None:
     assert row["fails_first"] == "reset" and row["payload_N"] == pytest.approx(4.791, abs=1e-3)
 
 
-@pytest.mark.parametrize("held", ["guided", pytest.param("free", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("held", ["guided", "free"])
 def test_bodies_that_rest_without_friction_bear_more_with_it(held: str) -> None:
     few: dict[str, Any] = {"patterns": ["000", "001"] if held == "free" else ["001"]}
     rows = dpg.grasp(with_object(WIDE, held=held), **few).rows

@@ -79,6 +79,7 @@ def test_errors_are_those_of_noise_seen_again_and_again(reference_finger: Finger
     assert stated == pytest.approx(values.std(), rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_fit_that_stops_where_states_end_says_so(reference_finger: Fingers) -> None:
     """Tips that curl less than any state of this finger does: alpha runs to the fold."""
     start = reference_finger(3, 1e4)

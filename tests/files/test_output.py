@@ -187,6 +187,7 @@ KNOWN = {
     ],
     Mark.CALIBRATION: [b"calibration_version: 1\nmade_by: dpg 0.1.0, numpy 2" + LONG],
     Mark.DEPFILE: [b"# dpg sweep: what\na/states.parquet a/designs.parquet: b.yaml\n"],
+    Mark.SPEC: [b"# Written by dpg: design 3 of the sweep around a.yaml\nfinger:\n" + LONG],
     Mark.DECK: [b"** dpg fe hinge" + LONG],
     Mark.CURVE: [b"# dpg fe hinge: a simulation"],
     Mark.LOG: [b"# dpg fe, hinge.inp: words of ccx\n"],

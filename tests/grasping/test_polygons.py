@@ -187,6 +187,7 @@ def test_slsqp_finds_the_same_minima(seed: int, own: Callable[..., Any]) -> None
     assert best.fun == pytest.approx(energy(found.q * found.unit), rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_all_of_them_touch(own: Callable[..., Any]) -> None:
     touched = [len(Found(seed, own).contacts) for seed in QUICK]
     assert min(touched) > 0

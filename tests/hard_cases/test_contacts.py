@@ -93,6 +93,7 @@ def test_a_state_that_is_refused_is_missed(held: Case, answer: Answer, status: S
     assert (outcome.verdict, outcome.is_failure) == (Verdict.MISSED, True)
 
 
+@pytest.mark.slow
 def test_a_unit_that_resets_is_recognized_and_its_new_state_is_judged(
     built_in: dict[str, Case],
 ) -> None:

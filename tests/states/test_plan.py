@@ -97,7 +97,7 @@ def test_hingeless_fingers_plan_no_hinges(reference_finger: Fingers) -> None:
 
 
 @pytest.mark.parametrize("columns", [("default",), ("all",), ("tip_x_mm",), ("nodes", "energies")])
-@pytest.mark.parametrize("n_units", [2, 13])
+@pytest.mark.parametrize("n_units", [2, pytest.param(13, marks=pytest.mark.slow)])
 def test_columns_are_those_of_the_plan(
     reference_finger: Fingers, columns: tuple[str, ...], n_units: int
 ) -> None:

@@ -37,7 +37,7 @@ CODES = np.arange(8, dtype=np.uint64)
         (Jaws(CENTER, 18.0, 12.0), GAP, [14.0, 18.0, 22.0]),
         pytest.param(Jaws(CENTER, 20.0, 12.0), HEIGHT, [8.0, 16.0], marks=pytest.mark.slow),
         (Jaws(CENTER, 20.0, 12.0), PLACES[1], [0.0, 1.0]),
-        (Polygon(CENTER, WEDGE), PLACES[0], [28.0, 33.0]),
+        pytest.param(Polygon(CENTER, WEDGE), PLACES[0], [28.0, 33.0], marks=pytest.mark.slow),
         pytest.param(Polygon(CENTER, WEDGE), PLACES[1], [0.0, -1.5], marks=pytest.mark.slow),
         (Disc(CENTER, 10.0), PLACES[1], [0.0, -1.5]),
     ],
