@@ -77,6 +77,7 @@ def test_tables_and_specs_in_a_folder(goal: Callable[..., Goal], tmp_path: Path)
     assert states.table["tip_x_mm"][0] == pytest.approx(best["target_1_tip_x_mm"][0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_goal_gives_the_same_bytes(goal: Callable[..., Goal], tmp_path: Path) -> None:
     found = dpg.inverse_design(goal(vary={STROKE: {"from": 3, "to": 4}}), tmp_path / "one")
     dpg.inverse_design(goal(vary={STROKE: {"from": 3, "to": 4}})).save(tmp_path / "other")

@@ -83,6 +83,7 @@ def test_bodies_off_the_axis_are_mirrored() -> None:
     assert own[0] == pytest.approx(own[1], rel=1e-8, abs=1e-9) and own[0].min() > 0.1
 
 
+@pytest.mark.slow
 def test_a_little_beside_the_axis_is_a_little_less() -> None:
     """The forces of a body that is kept beside it do not balance: what gives way makes them."""
     own = []
@@ -159,6 +160,7 @@ def test_a_finger_alone_holds_nothing() -> None:
     ],
 )
 @pytest.mark.parametrize("held", ["fixed", pytest.param("free", marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_sweeps_have_what_each_design_has_by_itself(
     base: dict[str, Any], axes: dict[str, list[float]], held: str
 ) -> None:
@@ -224,6 +226,7 @@ def test_what_is_no_friction_and_no_mass(keys: dict[str, Any], words: str) -> No
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_friction_of_a_file_of_a_body(tmp_path: Path) -> None:
     body = tmp_path / "can.yaml"
     body.write_text("disc: {diameter_mm: 20}\nfriction: 0.4\n", encoding="utf-8")

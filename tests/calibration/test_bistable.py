@@ -170,6 +170,7 @@ def test_a_law_without_second_well_is_said(linearity: float, said: str) -> None:
 
 @pytest.mark.parametrize("loss", [Loss.LINEAR, Loss.HUBER])
 @pytest.mark.parametrize("by", ["force", "pressure"])
+@pytest.mark.slow
 def test_standard_errors_of_a_work_are_those_of_its_errors_added_up(by: str, loss: Loss) -> None:
     """Drawn at random: forces, or pressures, have independent errors, and work has their sums."""
     random, area = np.random.default_rng(1), 30.0

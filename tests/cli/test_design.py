@@ -82,6 +82,7 @@ def test_a_folder_that_cannot_be_is_refused_before_the_work(
     assert (folder / "best.parquet").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_other_seeds_and_limits(run: Run, goal: Callable[[str], str]) -> None:
     name = goal("[36, -16]")
     assert run("design", name, "--seed", "2", "--evaluations", "300").returncode == 0

@@ -13,6 +13,7 @@ GRIPPER = str(CONFIGS / "gripper.yaml")
 JAWS = ("--jaws", "30:40", "--at", "45,0", "--pattern", "10000", "--pattern", "01000")
 
 
+@pytest.mark.slow
 def test_rows_files_and_a_summary(call: Any, folder: Path) -> None:
     result = call("grasp", GRIPPER, *JAWS, "-o", "j.parquet", "--plot", "j.svg")
     assert result.exit_code == ExitCode.DONE

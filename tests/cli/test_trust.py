@@ -384,6 +384,7 @@ def test_tables_of_designs_do_so_too(call: Call, domes: Path) -> None:
         "reason",
         "n_units",
         "n_states",
+        "n_unknown_states",
         "max_residual_N",
         "max_numerical_error_mm",
     }

@@ -64,6 +64,8 @@ def test_every_number_of_the_model_shows_an_output() -> None:
         "numerical_error_mm",
         "n_units",
         "n_states",
+        "n_unknown_states",
+        "n_unknown_grasps",
         "max_residual_N",
         "max_numerical_error_mm",
     }

@@ -134,11 +134,8 @@ class Drawn:
         self.pressures = [*np.linspace(0.0, 0.25, 8), *np.linspace(0.25, 0.0, 5)[1:]]
 
 
-QUICK = (0,)
-SEEDS = [pytest.param(s, marks=[] if s in QUICK else pytest.mark.slow) for s in range(16)]
-
-
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(16))
 def test_slsqp_finds_each_point_from_the_one_before(seed: int, own: Callable[..., Any]) -> None:
     """Wherever no unit snaps between them; and the balance is that of definitions."""
     drawn = Drawn(seed)

@@ -25,8 +25,8 @@ from dpgcli.states.patterns import codes_of
 Fingers = Callable[..., Finger]
 ALONE = frames(None)[0]
 BARS = (1e3, 1e4, np.inf)
-QUICK = (4, 9, 16)
-PRESSED = (*QUICK, 0, 3, 6, 10, 15, 18, 19, 24, 26, 28, 31, 35, 37)
+QUICK = (4, 9)
+PRESSED = (*QUICK, 16, 0, 3, 6, 10, 15, 18, 19, 24, 26, 28, 31, 35, 37)
 SEEDS = [pytest.param(s, marks=[] if s in QUICK else pytest.mark.slow) for s in PRESSED]
 ROUNDING = 1e-9  # mm
 

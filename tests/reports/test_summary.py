@@ -353,6 +353,7 @@ def with_bars(stiffest: Any, **more: Any) -> pd.DataFrame:
     ("given", "alone"),
     [(None, 2500.0), (4000.0, 1000.0), (".inf", None), ("dome.yaml", 100.0)],
 )
+@pytest.mark.slow
 def test_a_stiffness_that_only_shows_the_bars_is_not_ranked(given: Any, alone: Any) -> None:
     """k_L/n of 4 units: assumed, given, or from a calibration; of rigid bars there is none."""
     finger: dict[str, Any] = {"units": 4, "calibration": "published"}

@@ -137,6 +137,7 @@ def test_a_constraint_is_active_at_the_optimum_and_holds(goal: Make) -> None:
     assert made.values({}, found.points)[HEIGHT][0] == pytest.approx(high, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_with_targets_objectives_use_their_tolerance(goal: Make) -> None:
     target = "targets: [{pattern: '11100', quantity: tip, value: [52, -38], tolerance_mm: 0.5}]\n"
     met = search(goal(TWO + target)).best

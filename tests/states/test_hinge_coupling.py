@@ -53,6 +53,7 @@ def turns(found: Settled) -> Array:
 @pytest.mark.parametrize(("formulate", "bars"), FORMULATIONS)
 @pytest.mark.parametrize("walls", [0.0, 0.7])
 @pytest.mark.parametrize("coupling", [1.2, -1.2, 0.499 * HINGE])
+@pytest.mark.slow
 def test_states_are_those_of_extended_precision(
     formulate: Formulate, bars: float, walls: float, coupling: float, all_patterns: Patterns
 ) -> None:

@@ -264,6 +264,7 @@ def test_lanes_do_not_touch_each_other(reference_finger: Fingers, units_of: Unit
         assert alone.equilibrium.coordinates[:, 0].tobytes() == mine
 
 
+@pytest.mark.slow
 def test_every_unit_that_is_pushed_back_falls_by_itself(
     graded_finger: Fingers, units_of: UnitsOf
 ) -> None:
