@@ -29,9 +29,10 @@ from dpgcli.states.columns import Column
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
-from dpgcli.text import counted
+from dpgcli.text import counted, enumerated
 
 AGREEMENT = 1e-9  # of a number: a design's, and that of predict from its spec
+OVERLAP, MOST_NAMED = "fingers_overlap", 3
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,17 @@ class InverseDesignResult:
     def warnings(self) -> tuple[str, ...]:
         """Of the calibrations in use, and of what no design should be chosen by."""
         scene = scene_of(self.specs[0])
-        return (*scene.warnings, *(f"goal: {why}" for why in _doubts(self._tables, scene)))
+        doubts = (f"goal: {why}" for why in _doubts(self._tables, scene))
+        return (*scene.warnings, *doubts, *self._overlaps())
+
+    def _overlaps(self) -> Iterator[str]:
+        """In which states fingers overlap: contact of fingers is not in the model."""
+        pairs = enumerate((each.overlapping for each in self.reached), start=1)
+        found = [f"design {number} in {enumerated(own)}" for number, own in pairs if own]
+        if found:
+            more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+            said = ", ".join(found[:MOST_NAMED])
+            yield f"fingers overlap, since nothing keeps them apart in the model: {said}{more}"
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -89,7 +100,7 @@ class InverseDesignResult:
         meets = "meets" if n_met < 2 else "meet"
         front = "; they are a front" if len(goal.objectives) > 1 and n_met > 1 else ""
         yield f"{met} {meets} all that is asked{front}; each is certified anew from its spec"
-        yield from self._tables.standing(found.best, 0).lines()
+        yield from self._tables.standing(found.best, 0).lines(is_stopped=found.is_stopped)
         tried = (
             f"{counted(found.n_starts, 'start')}, {counted(found.n_evaluated, 'design')} evaluated"
         )
@@ -135,7 +146,7 @@ def inverse_design(
 
     In data the `base` may be a spec's data, too; `settings` change it. The search descends from
     random starts, 32 for each combination of listed values, by `seed`. With `evaluations`, a number
-    of designs, or a `budget` in seconds it goes on with further starts until that is used up.
+    of designs, or a `budget` in seconds it ends there: earlier, or after further starts.
     Tables and specs go into the folder `output`, if there is one.
     Raises SpecError for a wrong goal, UsageError for wrong choices, and where it is `strict` for a
     goal about what no design of the base should be chosen by, OutputError, and
@@ -231,14 +242,18 @@ def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Rea
     patterns = tuple(texts(inverted_units(codes, spec.finger.units)).astype(str).tolist())
     names = TargetEvaluation(goal).names
     values: tuple[tuple[float, ...], ...] = ()
+    overlapping: tuple[str, ...] = ()
     if goal.targets:
-        request = Request(tuple(dict.fromkeys(patterns)), ("status", *names))
+        of_pair = (OVERLAP,) if spec.gripper is not None else ()
+        request = Request(tuple(dict.fromkeys(patterns)), ("status", *of_pair, *names))
         rows = predict(scene_of(spec), request).arrays()
         index = {pattern: row for row, pattern in enumerate(rows["pattern"].tolist())}
         values = tuple(
             tuple(float(rows[name][index[pattern]]) for name in target.columns)
             for target, pattern in zip(goal.targets, patterns, strict=True)
         )
+        if of_pair:
+            overlapping = tuple(own for own, row in index.items() if rows[OVERLAP][row])
         told = np.concatenate(values)
         tolerances = np.repeat([t.tolerance for t in goal.targets], [len(v) for v in values])
         asked = np.concatenate([target.values for target in goal.targets])
@@ -247,7 +262,8 @@ def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Rea
     columns = map_columns(spec.design, [*best.columns], units) if best.columns else {}
     for name, column in columns.items():
         _check_agreement(column, best.columns[name][[place]])
-    return Reached(patterns, values, {name: column[0].item() for name, column in columns.items()})
+    single = {name: column[0].item() for name, column in columns.items()}
+    return Reached(patterns, values, single, overlapping)
 
 
 def _check_agreement(told: Array, searched: Array) -> None:

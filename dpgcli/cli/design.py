@@ -23,10 +23,13 @@ Output = Annotated[
 ]
 Evaluations = Annotated[
     int | None,
-    typer.Option("--evaluations", metavar="N", min=1, help="Go on until so many are evaluated"),
+    typer.Option(
+        "--evaluations", metavar="N", min=1, help="End after so many, with more starts or fewer"
+    ),
 ]
 Budget = Annotated[
-    str | None, typer.Option("--budget", metavar="TIME", help="Go on for so long: 60s, 5m")
+    str | None,
+    typer.Option("--budget", metavar="TIME", help="End after so long, likewise: 60s, 5m"),
 ]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the starts")]
 

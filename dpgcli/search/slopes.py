@@ -20,11 +20,19 @@ from dpgcli.states.sensitivities import Sensitivities, sensitivities
 from dpgcli.states.tip import tip
 from dpgcli.states.uncertainty import aperture_slopes, aperture_steps
 
+AFTERWARDS = ("object.", "pressure.")  # keys that no free state depends on
+
 
 def key_steps(design: Design, values: Sizes, keys: Sequence[str], designs: Indices) -> list[Step]:
     """What a unit of each key changes in some of the designs, which have these values by key."""
     rules = replace(design, pressure=None, body=None, tolerances={}, model_error=None)
-    return [_step(rules, key, values[key], designs) for key in keys]
+    nothing = np.zeros(1)
+    return [
+        Step(key, {}, nothing, nothing, nothing)
+        if key.startswith(AFTERWARDS)
+        else _step(rules, key, values[key], designs)
+        for key in keys
+    ]
 
 
 def _step(design: Design, key: str, value: Array, designs: Indices) -> Step:

@@ -30,11 +30,15 @@ PLACE = (
 
 @dataclass(frozen=True)
 class Reached:
-    """What a design comes to: for each target the nearest state and its quantities; columns."""
+    """What a design comes to: for each target the nearest state and its quantities; columns.
+
+    Those in `overlapping` are the states of targets in which the fingers of a gripper overlap.
+    """
 
     patterns: tuple[str, ...]
     values: tuple[tuple[float, ...], ...]
     columns: Mapping[str, float]
+    overlapping: tuple[str, ...] = ()
 
     def misses(self, targets: Sequence[Target]) -> Array:
         """By how much each target is missed, in its quantity's unit."""

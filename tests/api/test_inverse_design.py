@@ -124,6 +124,40 @@ def test_what_is_not_met_is_said(goal: Callable[..., Goal]) -> None:
     assert found.table["active"][0].startswith("stroke_mm <= 4.5")
 
 
+def test_a_search_that_was_stopped_does_not_say_that_there_is_nothing_better(
+    goal: Callable[..., Goal],
+) -> None:
+    found = dpg.inverse_design(goal(), evaluations=1)
+    assert not found.is_met and "stopped by the limit" in found.summary[-1]
+    assert any("the limit ended the search, and further starts may" in s for s in found.summary)
+
+
+def test_a_body_varies_and_no_free_state_depends_on_it(
+    goal: Callable[..., Goal], study: dict[str, Any]
+) -> None:
+    thick = {**study["finger"], "geometry": {"limiting_layer_thickness_mm": 1.5}}
+    body = {"disc": {"diameter_mm": 10.0}, "at_mm": [25.0, -14.0]}
+    vary = {STROKE: {"from": 2.5, "to": 4.5}, "object.at_x_mm": {"from": 20.0, "to": 30.0}}
+    one = {"pattern": "110", "quantity": "tip_x_mm", "value": 37.0, "tolerance_mm": 0.1}
+    found = dpg.inverse_design(
+        {"base": {"finger": thick, "object": body}, "vary": vary, "targets": [one]}
+    )
+    assert found.is_met and np.ptp(found.table["stroke_mm"]) < 1e-6
+
+
+def test_fingers_that_overlap_are_warned_of(
+    goal: Callable[..., Goal], study: dict[str, Any]
+) -> None:
+    thick = {**study["finger"], "geometry": {"limiting_layer_thickness_mm": 1.5}}
+    warned = []
+    for spacing in (10.0, 200.0):
+        base = {"finger": thick, "gripper": {"base_spacing_mm": spacing, "mounting_angle_deg": 0}}
+        warned.append(dpg.inverse_design({**goal(), "base": base}).warnings)
+    said = "fingers overlap, since nothing keeps them apart in the model: design 1 in 11"
+    assert any(line.startswith(said) for line in warned[0])
+    assert not any("overlap" in line for line in warned[1])
+
+
 def test_warnings_name_what_no_design_should_be_chosen_by(goal: Callable[..., Goal]) -> None:
     """And it is strict about them before any work; tips may be chosen by."""
     data = read_document(CONFIGS / "three_unit.yaml").data

@@ -71,10 +71,13 @@ const showFilters = () => {
     const filter = filters.get(column);
     column.fields.forEach((field, end) => {
       if (field === document.activeElement) return;
-      if (column.texts) field.value = filter ? String(filter[0]) : "";
-      else
-        field.value =
-          filter && Number.isFinite(filter[end]) ? String(Number(filter[end].toPrecision(6))) : "";
+      if (column.texts) {
+        field.value = filter ? String(filter[0]) : "";
+        return;
+      }
+      field.value =
+        filter && Number.isFinite(filter[end]) ? String(Number(filter[end].toPrecision(6))) : "";
+      judgeField(field, true);
     });
   }
 };
@@ -85,6 +88,11 @@ const filterBy = (column, range) => {
   if (range) filters.set(column, range);
   else filters.delete(column);
   redraw();
+};
+
+const judgeField = (field, isNumber) => {
+  field.setCustomValidity(isNumber ? "" : "a plain number such as -3.5");
+  field.setAttribute("aria-invalid", String(!isNumber));
 };
 
 const filterRow = (column) => {
@@ -108,14 +116,18 @@ const filterRow = (column) => {
     return [cell(), cell(choice), cell()];
   }
   column.fields = ["lowest", "highest"].map((what) =>
-    named(made("input", { type: "number", step: "any" }), what),
+    named(made("input", { type: "text", inputMode: "decimal" }), what),
   );
   column.fields[0].placeholder = shown(column.low);
   column.fields[1].placeholder = shown(column.high);
   const range = () => {
-    const ends = column.fields.map(({ value }, end) =>
-      value === "" ? [-Infinity, Infinity][end] : Number(value),
-    );
+    const ends = column.fields.map((field, end) => {
+      const text = field.value.trim().replace("\u2212", "-"); // the page's own minus sign
+      const number = Number(text);
+      const isNumber = text === "" || Number.isFinite(number);
+      judgeField(field, isNumber);
+      return text === "" || !isNumber ? [-Infinity, Infinity][end] : number;
+    });
     filterBy(column, ends.some(Number.isFinite) ? ends : null);
   };
   for (const field of column.fields) field.addEventListener("input", range);

@@ -115,6 +115,14 @@ def test_filters_are_fields(page: Any) -> None:
     assert page.find_element("css selector", '[aria-label="dome_height_mm, lowest"]').text == ""
 
 
+def test_what_is_no_number_is_marked_and_filters_nothing(page: Any) -> None:
+    fill(page, "dome_height_mm, lowest", "6,5")
+    field = page.find_element("css selector", '[aria-label="dome_height_mm, lowest"]')
+    assert (passing(page), field.get_attribute("aria-invalid")) == (N_DESIGNS, "true")
+    fill(page, "dome_height_mm, highest", "\N{MINUS SIGN}3.5")  # as the page writes numbers
+    assert passing(page) == 0
+
+
 def test_a_brush_over_an_axis_or_the_scatter_filters(page: Any) -> None:
     page.execute_script(MOUSE, "explorer-parallel", [[0.055, 0.1], [0.055, 0.5]])
     assert passing(page) == 12  # the upper half of the heights
