@@ -25,7 +25,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 CONFIGS = Path(__file__).parents[2] / "configs"
 PROGRAM = "from dpgcli.__main__ import main; main()"
 SCRIPT = f"#!{sys.executable}\nif __name__ == '__main__':\n    {PROGRAM}\n"
-PREPARED = {"check": "sweep", "report": "sweep", "merge": "sweep"}
+PREPARED = {"check": "sweep", "report": "sweep", "merge": "sweep", "pick": "sweep"}
 SLOW = (
     "bench",
     "check",
@@ -117,6 +117,11 @@ def carry_out(folder: Path, name: str) -> None:
     (folder / "sweep.yaml").write_text(
         "base: finger.yaml\n"
         "space: [{key: finger.geometry.unit_separation_mm, values: [2.5, 3.0]}]\n"
+    )
+    (folder / "goal.yaml").write_text(
+        "base: finger.yaml\n"
+        "vary: {finger.geometry.unit_separation_mm: {from: 2.5, to: 3.0}}\n"
+        "maximize: [workspace_area_mm2]\n"
     )
     lines = [*EXAMPLES.get(PREPARED.get(name, ""), ()), *EXAMPLES[name]]
     if name == "init":
