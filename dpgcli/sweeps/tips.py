@@ -9,7 +9,8 @@ import numpy as np
 from dpgcli.arrays import Array, Indices, distinct
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
-CELL_BITS = 25  # for each coordinate of the grid: 1,600 lengths either way
+CELL_BITS = 21  # for each coordinate of the grid: 100 lengths either way
+MOST_OWNERS = 2 ** (63 - 2 * CELL_BITS)  # designs that have room beside both
 CELLS_AT_ONCE = 2**20  # gathered before what repeats is dropped
 
 
@@ -23,7 +24,8 @@ class DistinctTips:
         self.waiting: list[Indices] = []
 
     def add(self, owner: Indices, tips: Array) -> None:
-        """Tips (tip, 2) in steps of the grid, and the design of each."""
+        """Tips (tip, 2) in steps of the grid, and the design of each, below MOST_OWNERS."""
+        assert owner.max(initial=0) < MOST_OWNERS, "blocks have fewer designs"
         most = 2.0 ** (CELL_BITS - 1) - 1
         x, y = np.clip(np.rint(tips.T), -most, most).astype(np.int64) + int(most)
         self.waiting.append(distinct((((owner << CELL_BITS) | x) << CELL_BITS) | y))

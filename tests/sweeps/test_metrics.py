@@ -15,7 +15,7 @@ from dpgcli.states.quantities import declared
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import Block, design_states
 from dpgcli.sweeps.metrics import Metrics
-from dpgcli.sweeps.tips import CELL_BITS, TIPS_PER_LENGTH
+from dpgcli.sweeps.tips import CELL_BITS, MOST_OWNERS, TIPS_PER_LENGTH, DistinctTips
 
 Fingers = Callable[..., Finger]
 QUANTITIES = tuple(q for q in declared(1, (), False) if q.group in {Group.STATES, Group.STIFFNESS})
@@ -166,3 +166,15 @@ def test_designs_of_one_batch_do_not_mix(graded_finger: Fingers) -> None:
             assert together.metrics[name][place] == values[0], name
         areas.append(alone.metrics["workspace_area_mm2"])
     assert len(np.unique(areas)) == 7
+
+
+def test_tips_of_many_designs_are_counted_apart() -> None:
+    """Two for each, whatever its number: blocks of short fingers have tens of thousands."""
+    n_designs = 100_000
+    owner = np.repeat(np.arange(n_designs), 3)
+    tips = np.tile([[5000.0, -3.0], [5000.0, -3.0], [-2.0, 4.0]], (n_designs, 1))
+    distinct_tips = DistinctTips()
+    distinct_tips.add(owner, tips)
+    assert (distinct_tips.counts(n_designs) == 2).all()
+    with pytest.raises(AssertionError, match="fewer designs"):
+        distinct_tips.add(np.array([MOST_OWNERS]), tips[:1])
