@@ -42,7 +42,7 @@ def design_input(spec: SpecInput, design: int, settings: Settings = ()) -> Scene
 
     Raises UsageError for a design that is not there, or whose table does not say its base.
     """
-    path = table_of(path_of("spec", spec))  # type: ignore[arg-type]
+    path = table_of(path_of("spec", spec))  # type: ignore[arg-type]  # refuses what is no path
     with opened_rows(path, has_states=False) as rows:
         numbers = rows.columns(["design"])["design"]
         places = np.flatnonzero(numbers == design)
