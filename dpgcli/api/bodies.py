@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from dpgcli.api.inputs import SceneInput, check_texts, path_of, point
+from dpgcli.api.inputs import SceneInput, check_texts, files_of, path_of, point
 from dpgcli.arrays import Array
-from dpgcli.design.bodies import PLACES, Body, Disc, Jaws
+from dpgcli.design.bodies import PLACES, Body, Disc, Jaws, gives_way
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
-from dpgcli.files.scene_file.objects import ObjectSpec
+from dpgcli.files.scene_file.forces import with_forces
+from dpgcli.files.scene_file.objects import TABLE, ObjectSpec
 from dpgcli.files.scene_file.problems import checked_object
 from dpgcli.files.yaml_file import read_document
 from dpgcli.grasping.frames import begins_in_base
@@ -47,32 +48,33 @@ def with_body(given: SceneInput, said: str | None, at: Sequence[float] | None) -
         place = known.center
     said = str(said)
     if said.lower().endswith(SUFFIXES):
-        spec, path = _of_file(said, place), Path(said)
+        spec, files = _of_file(said, place)
         body = spec.known if at is None else replace(spec.known, center=_known(place))
         body = _giving_way(body, known)
         held = Held(spec.held) if "held" in spec.model_fields_set else scene.held
         friction = spec.known_friction or scene.friction
         scene = replace(scene, body=body, held=held, friction=friction)
-        return replace(given, scene=scene, files=(*given.files, path.absolute()))
+        return replace(given, scene=scene, files=(*given.files, *files))
     body = _giving_way(_of_text(said, place), known)
     return replace(given, scene=replace(scene, body=body))
 
 
 def _giving_way(body: Body, known: Body | None) -> Body:
-    """Jaws as stiff as those of the spec, unless they have a stiffness of their own."""
-    if isinstance(body, Jaws) and isinstance(known, Jaws) and body.stiffness is None:
-        return replace(body, stiffness=known.stiffness)
+    """Jaws that give way as those of the spec do, unless they do so by themselves."""
+    if isinstance(body, Jaws) and isinstance(known, Jaws) and not gives_way(body):
+        return replace(body, stiffness=known.stiffness, curve=known.curve)
     return body
 
 
-def _of_file(name: str, place: Array | None) -> ObjectSpec:
-    """The keys in a file, which may leave its place to others."""
-    document = read_document(path_of("object", name))
+def _of_file(name: str, place: Array | None) -> tuple[ObjectSpec, tuple[Path, ...]]:
+    """The keys in a file, which may leave its place to others, and the files that were read."""
+    path = path_of("object", name)
+    document = with_forces(read_document(path), path.parent, TABLE)
     if "at_mm" not in document.data:
         parts = [document.data.get(key) for key in PLACES]
         at = parts if place is None and None not in parts else _known(place).tolist()
         document = replace(document, data={**document.data, "at_mm": at})
-    return checked_object(document)
+    return checked_object(document), files_of(path, *document.files)
 
 
 def _known(place: Array | None) -> Array:
@@ -105,6 +107,17 @@ def check_body(scene: Scene, body: Body) -> None:
             Field("at"),
             f" {body.center[0]:g},{body.center[1]:g}: {body.name} there begins in the base of a "
             "finger: move it along x, or take a smaller one",
+        )
+
+
+def body_lines(scene: Scene) -> Iterator[str]:
+    """What is to be said of forces of jaws that do not fall as these open."""
+    curve = scene.body.curve if isinstance(scene.body, Jaws) else None
+    if curve is not None and (ranges := curve.not_falling):
+        told = ", ".join(f"{first:g} to {last:g}" for first, last in ranges)
+        yield (
+            f"warning: the forces of the jaws do not fall from {told} mm: one force has several "
+            "apertures there, and where the jaws rest depends on where they come from"
         )
 
 

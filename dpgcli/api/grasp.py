@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import check_body, force_lines, pressure_lines, with_body
+from dpgcli.api.bodies import body_lines, check_body, force_lines, pressure_lines, with_body
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -102,6 +102,7 @@ class GraspResult:
             )
         if self.grasps.closing is not None:
             yield from pressure_lines(self.given.scene)
+        yield from body_lines(self.grasps.scene)
         yield from force_lines(self.given.scene)
         if self.grasps.scene.friction is not None:
             yield from self._payload_lines(self.grasps.scene.friction)

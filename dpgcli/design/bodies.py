@@ -5,11 +5,13 @@ Of a batch of designs centers are (2, design), sizes (design,) and corners (2, c
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.loads import GRAVITY
+from dpgcli.mechanics.aperture import ForceCurve
 
 DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
 COMPLIANCE = "compliance.stiffness_N_per_mm"
@@ -133,7 +135,8 @@ class Jaws:
     """Two flat plates along x with a gap between them, about a center (2,); mm.
 
     Fingers meet them from outside, as the sides of a block. With a `stiffness` k (N/mm) they move
-    against a force k (a_0 − a) that keeps their aperture a at the gap a_0; without they are rigid.
+    against a force k (a_0 − a) that keeps their aperture a at the gap a_0, with a `curve` against
+    its force, which need not be none at a_0; without they are rigid.
 
     >>> Jaws(np.array([40.0, 0.0]), gap=30.0, height=40.0).corners.tolist()
     [[20.0, 60.0, 60.0, 20.0], [-15.0, -15.0, 15.0, 15.0]]
@@ -143,19 +146,21 @@ class Jaws:
     gap: float | Array
     height: float | Array
     stiffness: float | Array | None = None
+    curve: ForceCurve | None = None
 
     def with_value(self, key: str, column: Array) -> "Jaws":
         """With values of designs, (design,), at a key of a spec's object."""
         sizes = {GAP: "gap", HEIGHT: "height", COMPLIANCE: "stiffness"}
         if key in sizes:
-            return replace(self, **{sizes[key]: column})
+            own: dict[str, Any] = {sizes[key]: column}
+            return replace(self, **own)
         return replace(self, center=_moved(self.center, key, column))
 
     def take_lanes(self, index: Indices) -> "Jaws":
         """Those of some designs of a batch; one that is alike in all is repeated."""
         gap, height = _sizes(self.gap, index), _sizes(self.height, index)
         stiffness = None if self.stiffness is None else _sizes(self.stiffness, index)
-        return Jaws(_centers(self.center, index), gap, height, stiffness)
+        return Jaws(_centers(self.center, index), gap, height, stiffness, self.curve)
 
     @property
     def name(self) -> str:
@@ -193,6 +198,11 @@ class Jaws:
 
 
 Body = Disc | Jaws | Polygon
+
+
+def gives_way(body: Body | None) -> bool:
+    """Whether a body is jaws that move when they are pushed."""
+    return isinstance(body, Jaws) and (body.stiffness is not None or body.curve is not None)
 
 
 @dataclass(frozen=True)

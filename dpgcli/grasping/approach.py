@@ -151,6 +151,7 @@ def _reset(
     """What happened at the ends of paths, with the pushes there, to the `lanes` that flipped."""
     which = np.flatnonzero(flipped.any(axis=0))
     load, cell, flipped = ends.load[which], ends.cell[which], flipped[:, which]
+    cell = np.where(cell < len(flipped), cell, -1)  # jaws, not a unit
     snapped, are_tied = flipped & own.is_open(after)[:, which], np.zeros(flipped.shape, bool)
     if own.ramp is not None:
         coordinates = ends.coordinates[: len(before.coordinates)]

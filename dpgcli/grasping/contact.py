@@ -154,6 +154,11 @@ class Obstructed:
         return OwnCoordinate(Row(1, self.n_own), self._n_motions)
 
     @property
+    def _opening(self) -> OwnCoordinate:
+        """The last of the motions, which a body may resist."""
+        return OwnCoordinate(Row(1, self.n_own + self._n_motions - 1), 1)
+
+    @property
     def _prescribed(self) -> tuple[OwnCoordinate | Sticking, ...]:
         is_told = self.motion is not None and self.motion.travel is not None
         return (*((self._motions,) if is_told else ()), *self.sticking)
@@ -230,8 +235,7 @@ class Obstructed:
         n, size = len(own), self.n_own
         terms = [terms_of_part(alone.terms, finger, n, size) for finger, alone in enumerate(own)]
         resistance = None if self.motion is None else self.motion.resistance
-        last = OwnCoordinate(Row(1, size + self._n_motions - 1), 1)
-        resisting = () if resistance is None else (Term("body", last, resistance),)
+        resisting = () if resistance is None else (Term("body", self._opening, resistance),)
         hold = None if self.motion is None else self.motion.hold
         holding = () if hold is None else (Term("hold", self._motions, DeadLoad(hold)),)
         pressing = () if self.ramp is None else self._pressing(own, self.ramp.begin)
@@ -272,7 +276,6 @@ class Obstructed:
     ) -> LoadedPotential[Constrained, ActiveConstraints]:
         """The Lagrangians of active contacts, (cell, batch), by the load."""
         own = self.potentials(inverted)
-        finger = self.units.finger
         frame = self.bare(inverted, np.zeros(1)).coordinates
         gaps, multiplied = self.gaps(), Multiplied.of(active)
         system = Extended(frame, multiplied.n, self.large, self.stiffness)
@@ -280,25 +283,32 @@ class Obstructed:
             active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
         )
         terms = (*self._terms_of(own), multiplier_term(system))
-        domes = self._domes_of(own)
-        followed = domes[0] if len(domes) == 1 else Together(domes, self.n_own)
-        scale, stiffness = (
-            self._by_finger(finger.stroke),
-            self._by_finger(self.units.holding_stiffness),
-        )
-        slack = Slack(gaps, frame.size, multiplied)
         return LoadedPotential(
             system,
             terms,
-            slack,
+            Slack(gaps, frame.size, multiplied),
             law,
-            followed,
-            scale,
-            stiffness,
+            *self._followed(self._domes_of(own)),
             self._growing_of(own),
             n_multipliers=multiplied.n,
             may_kink=np.asarray(active.any(axis=0)),
         )
+
+    def _followed(self, domes: tuple[OfPart, ...]) -> tuple[OfPart | Together, Array, Array]:
+        """By what paths are followed, its scale and what holds it: by domes.
+
+        And by how far jaws have opened, where their own force may turn back: no path by domes sees
+        how far one step takes them.
+        """
+        scale = self._by_finger(self.units.finger.stroke)
+        stiffness = self._by_finger(self.units.holding_stiffness)
+        softening = None if self.motion is None else self.motion.softening
+        if softening is None:
+            return domes[0] if len(domes) == 1 else Together(domes, self.n_own), scale, stiffness
+        every = Together((*domes, self._opening), self.n_own + self._n_motions)
+        both = (scale, softening.scale), (stiffness, softening.stiffness)
+        scale, stiffness = (_with_row(values, value) for values, value in both)
+        return every, scale, stiffness
 
     def _by_finger(self, values: Array) -> Array:
         """Values of each unit, (unit, …), for all fingers."""
@@ -355,3 +365,8 @@ class Obstructed:
             acts = potential.coordinates.finger.acting > 0.0  # others only have a wide gap
             own.append((springs.extension > self.units.wells.spring_barrier) & acts)
         return np.concatenate(own)
+
+
+def _with_row(values: Array, value: float) -> Array:
+    """Values by row, (row, …), and one more row of a single value."""
+    return np.concatenate((values, np.full((1, *values.shape[1:]), value)))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dpgcli.design.bodies import Body, Disc, Jaws, Polygon
+from dpgcli.design.bodies import Body, Disc, Jaws, Polygon, gives_way
 from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.grasp import BLOCK, LANE
@@ -73,8 +73,7 @@ def effort(scene: Scene, body: Body) -> float:
 
 def is_moving(scene: Scene) -> bool:
     """Whether the scene's body is let go of once it is in its place."""
-    gives_way = isinstance(scene.body, Jaws) and scene.body.stiffness is not None
-    return scene.held is not Held.FIXED or gives_way
+    return scene.held is not Held.FIXED or gives_way(scene.body)
 
 
 def design_seconds(scene: Scene) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Indices
-from dpgcli.design.bodies import Body, Jaws
+from dpgcli.design.bodies import Body, Jaws, gives_way
 from dpgcli.design.scene import Held
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.closing import Closing, closed, with_reach
@@ -20,6 +20,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped, Placed, described
 from dpgcli.grasping.shapes import ContactShapes, Motion
+from dpgcli.mechanics.aperture import KeptApart
 from dpgcli.mechanics.terms import Quadratic
 from dpgcli.states.certify import Status
 
@@ -38,14 +39,22 @@ def motion_of(body: Body, held: Held, frames: Sequence[FingerFrame]) -> Motion |
     """
     ways, resistance = WAYS[held][..., None], None
     apart = np.zeros((2, 0, 1))
-    if isinstance(body, Jaws) and body.stiffness is not None:
+    if isinstance(body, Jaws) and gives_way(body):
         apart = np.array([0.0, 0.5])[:, None, None]
-        resistance = Quadratic(np.reshape(body.stiffness, (1, -1)))
+        resistance = _resistance(body)
     if not ways.size and not apart.size:
         return None
     along = (np.concatenate((ways, frame.side * apart), axis=1) for frame in frames)
     told = zip(frames, along, strict=True)
     return Motion(tuple(frame.along(own) for frame, own in told), resistance)
+
+
+def _resistance(jaws: Jaws) -> Quadratic | KeptApart:
+    """What opening jaws costs, by how far they are from their gap."""
+    if jaws.curve is not None:
+        return KeptApart(jaws.curve, np.reshape(jaws.gap, -1))
+    assert jaws.stiffness is not None, "jaws that give way"
+    return Quadratic(np.reshape(jaws.stiffness, (1, -1)))
 
 
 def moved_by(held: Held, motions: Array) -> Array:
@@ -56,8 +65,7 @@ def moved_by(held: Held, motions: Array) -> Array:
 
 def opened_by(body: Body, motions: Array) -> Array:
     """How far jaws have opened, (lane,), mm; other bodies, and rigid ones, do not."""
-    gives_way = isinstance(body, Jaws) and body.stiffness is not None
-    return np.asarray(motions[-1] if gives_way else 0.0 * motions[-1])
+    return np.asarray(motions[-1] if gives_way(body) else 0.0 * motions[-1])
 
 
 def let_go(
@@ -107,6 +115,8 @@ def _let_go(
         is_there, lost = _is_held(own, gone.shapes), Status.NOT_HELD
     is_lost = (status == Status.STABLE) & ~is_there
     status = np.where(is_lost, np.uint8(lost), status)
+    is_beyond = _are_beyond(motion, gone.shapes.coordinates[own.n_own :])
+    status = np.where((status == Status.STABLE) & is_beyond, np.uint8(Status.BEYOND_TABLE), status)
     fingers = described(own, codes, gone, status, with_margins=with_margins)
     events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
     told = zip(fingers, events, strict=True)
@@ -140,6 +150,17 @@ def _closed_on_jaws(
     own = replace(own, motion=motion)
     gone = released(own, shapes)
     return own, replace(gone, resets=(*came.resets, *gone.resets))
+
+
+def _are_beyond(motion: Motion, moved: Array) -> NDArray[np.bool_]:
+    """Which jaws are at an aperture beyond those of their table, by (motion, lane), mm.
+
+    Or would be there without a push: no spec has such a gap, but a design of a sweep may.
+    """
+    law = motion.resistance
+    if not isinstance(law, KeptApart):
+        return np.zeros(moved.shape[1], bool)
+    return np.asarray(law.curve.is_beyond(law.rest + moved[-1]) | law.curve.is_beyond(law.rest))
 
 
 def _is_held(own: Obstructed, shapes: ContactShapes) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
+from dpgcli.mechanics.aperture import KeptApart, Softening
 from dpgcli.mechanics.pressure import DomeVolumes
 
 
@@ -59,6 +60,12 @@ class Motion:
     def n(self) -> int:
         """Number of motions."""
         return int(self.directions[0].shape[1])
+
+    @property
+    def softening(self) -> Softening | None:
+        """How what resists it softens; None if it does not."""
+        law = self.resistance
+        return law.curve.softening if isinstance(law, KeptApart) else None
 
     def take_lanes(self, index: Indices) -> "Motion":
         """Those of some lanes."""

@@ -8,7 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Indices, distinct
-from dpgcli.design.bodies import Body, Jaws
+from dpgcli.design.bodies import Body, Jaws, gives_way
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
@@ -107,8 +107,7 @@ def grasps(
     is_alike = bool(body.is_mirrored) and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
-    gives_way = isinstance(body, Jaws) and body.stiffness is not None
-    before, later = (None, closing) if gives_way else (closing, None)
+    before, later = (None, closing) if gives_way(body) else (closing, None)
     parts: list[Placed] = []
     for frame, codes in zip(seen_from, needed, strict=True):
         if parts and is_alike:

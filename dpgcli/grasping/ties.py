@@ -28,7 +28,7 @@ def tied(own: Obstructed, at_fold: ContactShapes, load: Array, cell: Indices) ->
     own, shapes = own.take_lanes(lanes), at_fold.take_lanes(lanes)
     family = own.family(shapes.inverted, shapes.active)
     before = family.followed(shapes.coordinates).value
-    is_own = np.arange(n_units)[:, None] == unit
+    is_own = np.arange(family.followed.n_cells)[:, None] == unit
     hold = Term("hold", family.followed, Holding(None, ~is_own * family.stiffness, before))
     pressed = own.pressed(shapes.inverted, shapes.push, beyond[lanes])
     potential = Potential(pressed.coordinates, (*pressed.terms, hold))

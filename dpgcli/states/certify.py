@@ -32,8 +32,9 @@ class Status(IntEnum):
     NOT_BISTABLE = 3
     GAP_CLOSED = 4  # under pressure only: see `actuation.rest`
     NOT_HELD = 5  # of a body that may move only: see `grasping.release`
-    FOLDED = 6
-    NOT_CONVERGED = 7
+    BEYOND_TABLE = 6  # of jaws whose forces are in a table only
+    FOLDED = 7
+    NOT_CONVERGED = 8
 
     @property
     def text(self) -> str:
@@ -55,6 +56,7 @@ _MEANINGS = {
     Status.GAP_CLOSED: "a gap is closed beyond the place of its dome at rest, which would push as "
     "pressure comes; where that dome really is a calibration's curve knows",
     Status.NOT_HELD: "nothing keeps the body between the fingers: let go of, it leaves them",
+    Status.BEYOND_TABLE: "jaws would rest at an aperture beyond those of their table of forces",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
     "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",

@@ -127,6 +127,8 @@ def test_keys_of_a_body_need_a_body_in_the_base() -> None:
 
 
 JAWS = {"jaws": {"gap_mm": 20.0, "height_mm": 12.0}, "at_mm": [32.0, 0.0]}
+TABLE = {"jaw_gap_mm": [10.0, 20.0], "force_N": [0.5, 0.0]}
+MECHANISM = {**JAWS, "compliance": {"table": TABLE}}
 WEDGE = {"polygon": [[-8.0, 0.0], [8.0, -10.0], [8.0, 10.0]], "at_mm": [32.0, 0.0]}
 
 
@@ -137,6 +139,7 @@ WEDGE = {"polygon": [[-8.0, 0.0], [8.0, -10.0], [8.0, 10.0]], "at_mm": [32.0, 0.
         (BODY, "object.compliance.stiffness_N_per_mm"),
         (JAWS, "object.disc.diameter_mm"),
         (JAWS, "object.compliance.stiffness_N_per_mm"),
+        (MECHANISM, "object.compliance.stiffness_N_per_mm"),
         (WEDGE, "object.disc.diameter_mm"),
         (WEDGE, "object.jaws.height_mm"),
     ],
@@ -144,6 +147,14 @@ WEDGE = {"polygon": [[-8.0, 0.0], [8.0, -10.0], [8.0, 10.0]], "at_mm": [32.0, 0.
 def test_keys_of_another_body_are_refused(body: dict[str, Any], key: str) -> None:
     with pytest.raises(SpecError, match=f"the base has no {key.rpartition('.')[0]}"):
         swept({**SPEC, "object": body}, (key, [20.0, 25.0]))
+
+
+def test_gaps_beyond_a_table_have_no_answer() -> None:
+    """No rest there is known, whatever fingers do."""
+    result = swept({**SPEC, "object": MECHANISM}, ("object.jaws.gap_mm", [18.0, 22.0]))
+    told = result.designs.to_pandas()
+    assert told["n_unknown_grasps"].tolist() == [0, 8]
+    assert told["squeeze_max_N"][0] > 0.0 and np.isnan(told["squeeze_max_N"][1])
 
 
 def test_requirements_by_forces_are_warned_of() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dpgcli.errors import SpecError
+from dpgcli.files.scene_file.forces import with_forces
 from dpgcli.files.scene_file.histories import with_history
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
@@ -67,11 +68,11 @@ def scene_in(document: Document, path: str | Path, settings: Sequence[str] = ())
 
 
 def with_files(document: Document, folder: Path) -> Document:
-    """The document with what the files hold that it names, calibrations and histories.
+    """The document with what the files hold that it names, calibrations, histories and forces.
 
     Names are relative to the spec's folder.
     """
-    return with_history(with_calibrations(document, folder), folder)
+    return with_forces(with_history(with_calibrations(document, folder), folder), folder)
 
 
 def folder_of(path: str | Path) -> Path:

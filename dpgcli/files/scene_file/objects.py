@@ -1,19 +1,24 @@
 """The keys of a spec's object, their types and their meaning."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from dpgcli.design.bodies import FRICTION, MASS, PLACES, Body, Disc, Friction, Jaws, Polygon
-from dpgcli.design.problems import Issue
+from dpgcli.design.problems import Issue, number
 from dpgcli.files.calibration.models import Bounded
 from dpgcli.files.sections import NotNegative, Positive, Section
+from dpgcli.mechanics.aperture import FEWEST_POINTS, ForceCurve
 from dpgcli.text import KeyPath
 
 PLACE, POLYGON = "at_mm", "polygon"
+TABLE: KeyPath = ("compliance", "table")
+GAP, FORCE = "jaw_gap_mm", "force_N"  # columns of such a table
+MOST_POINTS = 10_000
 KINDS = ("disc", "jaws", POLYGON)
 MOST_CORNERS = 64
 EXPECTED = {
@@ -21,10 +26,14 @@ EXPECTED = {
     **dict.fromkeys(PLACES, "a number in mm"),
     "held": '"fixed", "guided" (moves along x) or "free"',
     "stiffness_N_per_mm": "a stiffness > 0 in N/mm",
+    GAP: f"{FEWEST_POINTS} to {MOST_POINTS:,} apertures in mm",
+    FORCE: f"{FEWEST_POINTS} to {MOST_POINTS:,} forces in N",
     FRICTION: "a coefficient >= 0, such as 0.5",
     MASS: "a mass > 0 in g",
     POLYGON: f"three to {MOST_CORNERS} corners in mm, such as [[0, -10], [20, 0], [0, 10]]",
 }
+OF_TABLE = "the name of a CSV file with the columns jaw_gap_mm and force_N"
+LISTS = (PLACE, POLYGON, GAP, FORCE)
 NO_FRICTION = Issue(
     (MASS,), "friction beside it, which bears the weight", "none", "give one such as friction: 0.5"
 )
@@ -32,6 +41,22 @@ NO_FRICTION = Issue(
 Corner = list[float]
 Side = tuple[Corner, Corner]
 TwoNumbers = Annotated[list[Bounded], Field(min_length=2, max_length=2)]
+Numbers = Annotated[list[Bounded], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]
+
+
+def expected_at(path: KeyPath) -> str:
+    """What is expected of tables, and of the parts of lists, of an object, in words; else empty.
+
+    >>> expected_at(("polygon", 2)), expected_at(("polygon", 2, 0)), expected_at(("held",))
+    ('a corner, two numbers in mm such as [20, 0]', 'a number in mm', '')
+    """
+    if path == TABLE:
+        return OF_TABLE
+    if path[:1] == (POLYGON,) and len(path) > 1:
+        is_corner = len(path) == len((POLYGON, 0))
+        return "a corner, two numbers in mm such as [20, 0]" if is_corner else "a number in mm"
+    parts = {(*TABLE, GAP): "an aperture in mm", (*TABLE, FORCE): "a force in N"}
+    return parts.get(path[:-1], "")
 
 
 class DiscSpec(Section):
@@ -49,12 +74,60 @@ class JawsSpec(Section):
     )
 
 
-class ComplianceSpec(Section):
-    """What keeps jaws apart: a linear force against closing, none at their gap."""
+class ForceTableSpec(Section):
+    """Forces that keep jaws apart, by aperture."""
 
-    stiffness_N_per_mm: Positive = Field(
-        description="Force against closing per mm that the jaws are closer than their gap, N/mm."
+    jaw_gap_mm: Numbers = Field(description="Apertures of the jaws, rising, in mm.")
+    force_N: Numbers = Field(description="The force that keeps them apart at each, in N.")
+
+    @property
+    def known(self) -> ForceCurve:
+        """The value that it stands for."""
+        return ForceCurve(np.array(self.jaw_gap_mm), np.array(self.force_N))
+
+    def issues(self, gap: float) -> Iterator[Issue]:
+        """What is wrong between its keys, or for jaws with a gap; paths begin with its own."""
+        gaps = self.jaw_gap_mm
+        if len(self.force_N) != len(gaps):
+            yield Issue((FORCE,), f"{len(gaps):,} forces, as apertures", f"{len(self.force_N):,}")
+        falls = [place for place in range(1, len(gaps)) if gaps[place] <= gaps[place - 1]]
+        for place in falls[:1]:
+            expected = f"an aperture above {number(gaps[place - 1])} mm"
+            yield Issue((GAP, place), expected, number(gaps[place]))
+        if not falls and not gaps[0] <= gap <= gaps[-1]:
+            expected = f"the gap of the jaws, {number(gap)} mm, within the table"
+            yield Issue((), expected, f"{number(gaps[0])} to {number(gaps[-1])} mm")
+
+
+def _table(said: object) -> object:
+    """A file's name is another's to read: `forces` has put its columns there by then."""
+    return None if isinstance(said, str) else said
+
+
+class ComplianceSpec(Section):
+    """What keeps jaws apart: a linear force against closing, none at their gap, or a table."""
+
+    stiffness_N_per_mm: Positive | None = Field(
+        default=None,
+        description="Force against closing per mm that the jaws are closer than their gap, N/mm.",
     )
+    table: Annotated[
+        ForceTableSpec | None,
+        BeforeValidator(_table, json_schema_input_type=ForceTableSpec | str | None),
+    ] = Field(
+        default=None,
+        description="Or the force that keeps them apart by their aperture: the name of a CSV file "
+        "with the columns jaw_gap_mm and force_N.",
+    )
+
+    def issues(self, gap: float) -> list[Issue]:
+        """What is wrong between its keys; paths begin with its own."""
+        said = self.given()
+        if len(said) != 1:
+            found = " and ".join(said) or "none of them"
+            return [Issue((), "one of stiffness_N_per_mm and table", found)]
+        own = () if self.table is None else self.table.issues(gap)
+        return [issue._replace(path=("table", *issue.path)) for issue in own]
 
 
 class ObjectSpec(Section):
@@ -116,8 +189,12 @@ class ObjectSpec(Section):
         """The value that it stands for."""
         center = np.array(self._place, float)
         if self.jaws is not None:
-            k = None if self.compliance is None else self.compliance.stiffness_N_per_mm
-            return Jaws(center, self.jaws.gap_mm, self.jaws.height_mm, k)
+            jaws = Jaws(center, self.jaws.gap_mm, self.jaws.height_mm)
+            own = self.compliance
+            if own is None:
+                return jaws
+            curve = None if own.table is None else own.table.known
+            return replace(jaws, stiffness=own.stiffness_N_per_mm, curve=curve)
         if self.polygon is not None:
             return Polygon(center, np.array(self.polygon, float).T)
         assert self.disc is not None, "one of the three"
@@ -132,6 +209,10 @@ class ObjectSpec(Section):
             return [Issue((), "one of disc, jaws and polygon", found)]
         if self.compliance is not None and self.jaws is None:
             return [Issue(("compliance",), "jaws, which only give way", said[0])]
+        if self.compliance is not None and self.jaws is not None:
+            wrong = self.compliance.issues(self.jaws.gap_mm)
+            if wrong:
+                return [issue._replace(path=("compliance", *issue.path)) for issue in wrong]
         if self.mass_g is not None and self.friction is None:
             return [NO_FRICTION]
         if None in self._place:
@@ -151,6 +232,9 @@ def told_of(body: Body, held: str) -> dict[str, Any]:
         kind = {"jaws": {"gap_mm": body.gap, "height_mm": body.height}}
         if body.stiffness is not None:
             kind["compliance"] = {"stiffness_N_per_mm": body.stiffness}
+        if body.curve is not None:
+            table = {GAP: body.curve.gap.tolist(), FORCE: body.curve.force.tolist()}
+            kind["compliance"] = {"table": table}
     else:
         kind = {POLYGON: body.around.T.tolist()}
     return {**kind, PLACE: body.center.tolist(), "held": held}
@@ -161,10 +245,11 @@ def _wrong_sides(corners: list[Corner]) -> Iterator[Issue]:
     sides = list(zip(corners, [*corners[1:], *corners[:1]], strict=True))
     path: KeyPath = (POLYGON,)
     is_any = False
-    for number, (start, end) in enumerate(sides):
+    for place, (start, end) in enumerate(sides):
         if start == end:
             is_any = True
-            yield Issue((*path, number), "sides with a length", f"{_side(number, sides)} of 0 mm")
+            found = f"{_side(place, sides)} of 0 mm"
+            yield Issue((*path, place), "sides with a length", found, "leave out one of its ends")
     for (one, a), (other, b) in combinations(enumerate(sides), 2):
         are_next = other - one in (1, len(sides) - 1)
         if not is_any and (_folds_back(a, b) if are_next else _meet(a, b)):
@@ -172,8 +257,8 @@ def _wrong_sides(corners: list[Corner]) -> Iterator[Issue]:
             yield Issue(path, "a polygon that does not cross itself", found, "list corners in turn")
 
 
-def _side(number: int, sides: list[Side]) -> str:
-    return f"side {number + 1}-{(number + 1) % len(sides) + 1}"
+def _side(place: int, sides: list[Side]) -> str:
+    return f"side {place + 1}-{(place + 1) % len(sides) + 1}"
 
 
 def _meet(one: Side, other: Side) -> bool:

@@ -57,6 +57,7 @@ SECTIONS: dict[KeyPath, type[Section]] = {
     ("object", "disc"): objects.DiscSpec,
     ("object", "jaws"): objects.JawsSpec,
     ("object", "compliance"): objects.ComplianceSpec,
+    ("object", *objects.TABLE): objects.ForceTableSpec,
     ("data",): DataSpec,
     ("uncertainty",): Tolerances,
 }
@@ -94,9 +95,8 @@ HINTS = {
 CALIBRATION: KeyPath = ("finger", "calibration")
 UNCERTAINTY: KeyPath = ("uncertainty",)
 OBJECT: KeyPath = ("object",)
-LISTS = ((*OBJECT, objects.PLACE), (*OBJECT, objects.POLYGON))
 TEXTS = ("calibration", "law", "model_error", "held", DIRECTION)
-PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, objects.PLACE, objects.POLYGON)
+PAIRS = (*DataSpec.model_fields, loads.TIP_FORCE, *objects.LISTS)
 MAPPINGS = ("overrides", *EXPECTED)
 MOST_SHOWN = 6  # parts of a list
 WHOLE = (("data",), ("loads",))  # sections whose values may be lists
@@ -175,7 +175,7 @@ def _problem(document: Document, error: Any) -> Problem:
     if path[:2] == CALIBRATION:  # once, not once for each kind of value it may be
         path = CALIBRATION
         error = {**error, "type": "", "input": _at(document.data, path)}
-    is_whole = path[:1] in WHOLE or path[:2] in LISTS
+    is_whole = path[:1] in WHOLE or path[:2] == (*OBJECT, objects.PLACE)
     is_said = error["type"] not in ("extra_forbidden", "missing")
     if is_whole and is_said and len(path) > 1:
         path = path[:2]  # of the value, not of one of its numbers
@@ -183,16 +183,16 @@ def _problem(document: Document, error: Any) -> Problem:
     if error["type"] == "extra_forbidden":
         return document.problem(path, *_unknown(path))
     key = str(path[-1]) if path else "document"
-    show = _shown if path[:1] in WHOLE else shown
+    show = _shown if path[:1] in (*WHOLE, OBJECT) else shown
     found = "nothing" if error["type"] == "missing" else show(error["input"])
-    is_worded = path[:-1] == UNCERTAINTY or bool(expected_at(path))
+    is_worded = path[:-1] == UNCERTAINTY or bool(_expected_at(path))
     hint = ("" if is_worded else _hint(key, error)) or beyond(error["input"])
     return document.problem(path, _expected(path), found, hint)
 
 
 def _shown(value: Any) -> str:
     """A value as messages show it; the parts of a short list, too."""
-    if isinstance(value, list) and len(value) <= MOST_SHOWN:
+    if isinstance(value, list) and len(value) <= MOST_SHOWN and list not in map(type, value):
         return f"[{', '.join(map(shown, value))}]"
     return shown(value)
 
@@ -207,9 +207,16 @@ def _expected(path: KeyPath) -> str:
     key = str(path[-1]) if path else "document"
     if path[:-1] == UNCERTAINTY:
         return f"a standard uncertainty >= 0 in {unit_of(key) or 'its unit'}, or one such as 10%"
+    if worded := _expected_at(path):
+        return worded
     if _pattern(path) in SECTIONS or key == "overrides":
         return "a section of keys"
-    return expected_at(path) or OWN.get(key, expected_of(key))
+    return OWN.get(key, expected_of(key))
+
+
+def _expected_at(path: KeyPath) -> str:
+    """What is expected at a place that says more than its key; empty elsewhere."""
+    return expected_at(path) or objects.expected_at(path[1:] if path[:1] == OBJECT else ())
 
 
 def _hint(key: str, error: Any) -> str:

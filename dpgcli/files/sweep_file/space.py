@@ -239,8 +239,12 @@ class SpaceReader:
         if section not in self.base:
             return section
         own = self.base[section]
-        needs = section == OBJECT and isinstance(own, dict) and others[0] not in (*PLACES, *own)
-        return f"{section}.{others[0]}" if needs else ""
+        if section != OBJECT or not isinstance(own, dict) or others[0] in PLACES:
+            return ""
+        kept = own.get(others[0])
+        if kept is None:
+            return f"{section}.{others[0]}"
+        return key if isinstance(kept, dict) and others[1] not in kept else ""
 
     def constraint(self, place: int, text: str, data: dict[str, Any] | None) -> Expression | None:
         """The rule, with names that are keys of the space or of the base spec, if it is known."""
