@@ -2,61 +2,110 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from dpgcli.api.inputs import SceneInput, check_texts, files_of, path_of, point
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    check_texts,
+    files_of,
+    path_of,
+    point,
+    setting_texts,
+)
 from dpgcli.arrays import Array
-from dpgcli.design.bodies import PLACES, Body, Disc, Jaws, gives_way
+from dpgcli.design.bodies import FRICTION, MASS, PLACES, Body, Jaws, gives_way
 from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.files.scene_file import folder_of
 from dpgcli.files.scene_file.forces import with_forces
-from dpgcli.files.scene_file.objects import TABLE, ObjectSpec
+from dpgcli.files.scene_file.objects import PLACE, TABLE
 from dpgcli.files.scene_file.problems import checked_object
-from dpgcli.files.yaml_file import read_document
+from dpgcli.files.scene_file.settings import with_settings
+from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.grasping.frames import begins_in_base
 from dpgcli.text import number_in, shortened
 
 SMALLEST, LARGEST = 1e-3, 1e4  # mm: of what a text says
 JAW_HEIGHT = 40.0  # mm, unless the text says it
 SUFFIXES = (".yaml", ".yml")
+OWN = "object."  # settings of the body
 KINDS = (
     "expected disc and its diameter in mm such as disc:40, jaws and their gap such as jaws:30 or "
     f"jaws:30x40 with their height, each from {SMALLEST:g} to {LARGEST:g}, or a .yaml file"
 )
 
 
-def with_body(given: SceneInput, said: str | None, at: Sequence[float] | None) -> SceneInput:
+def own_settings(settings: Settings, said: str | None) -> tuple[Settings, tuple[str, ...]]:
+    """The settings of a spec, and those of the body that is said instead of the spec's own.
+
+    >>> own_settings({"finger.units": 3, "object.held": "free"}, "disc:40")
+    (('finger.units=3',), ('object.held="free"',))
+    """
+    if said is None:
+        return settings, ()
+    texts = setting_texts(settings)
+    of_body = tuple(text for text in texts if text.lstrip().startswith(OWN))
+    return tuple(text for text in texts if text not in of_body), of_body
+
+
+def with_body(
+    given: SceneInput, said: str | None, at: Sequence[float] | None, settings: Sequence[str] = ()
+) -> SceneInput:
     """The same with the body of these arguments, or of its own.
 
-    A text says what it is or names a file of the keys of `object`; `at` is its place. Raises
-    UsageError for what is no body, SpecError for a wrong file.
+    A text says what it is or names a file of the keys of `object`; `at` is its place, `settings`
+    are "object.key=value" texts. Raises UsageError for what is no body, SpecError for a wrong file.
     """
     check_texts(object=said)
     scene, known = given.scene, given.scene.body
-    if said is None and known is None:
-        raise UsageError(
-            Field("object"), ": expected a body such as disc:40, here or as object in the spec"
-        )
     place = None if at is None else np.array(point("at", at))
-    if known is not None and said is None:
+    if said is None:
+        if known is None:
+            what = ": expected a body such as disc:40, here or as object in the spec"
+            raise UsageError(Field("object"), what)
         body = known if place is None else replace(known, center=place)
         return replace(given, scene=replace(scene, body=body))
-    if known is not None and place is None:
-        place = known.center
-    said = str(said)
-    if said.lower().endswith(SUFFIXES):
-        spec, files = _of_file(said, place)
-        body = spec.known if at is None else replace(spec.known, center=_known(place))
-        body = _giving_way(body, known)
-        held = Held(spec.held) if "held" in spec.model_fields_set else scene.held
-        friction = spec.known_friction or scene.friction
-        scene = replace(scene, body=body, held=held, friction=friction)
-        return replace(given, scene=scene, files=(*given.files, *files))
-    body = _giving_way(_of_text(said, place), known)
-    return replace(given, scene=replace(scene, body=body))
+    whole = _document(said)
+    whole = replace(whole, data=_completed(whole.data, scene, place))
+    own = (text.lstrip().removeprefix(OWN) for text in settings)
+    document = with_forces(with_settings(whole, [*own]), folder_of(whole.file), TABLE)
+    if PLACE not in document.data and not document.data.keys() >= {*PLACES}:
+        raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
+    spec = checked_object(document)
+    scene = replace(
+        scene,
+        body=_giving_way(spec.known, known),
+        held=Held(spec.held) if "held" in spec.model_fields_set else scene.held,
+        friction=spec.known_friction,
+    )
+    files = files_of(*whole.files, *document.files)
+    return replace(given, scene=scene, files=(*given.files, *files))
+
+
+def _document(said: str) -> Document:
+    """The keys of a body: those in a file of this name, or those that a text stands for."""
+    if not said.lower().endswith(SUFFIXES):
+        return Document(str(Field("object")), _of_text(said), {})
+    path = path_of("object", said)
+    document = read_document(path)
+    return replace(document, files=(path,))
+
+
+def _completed(data: dict[str, Any], scene: Scene, place: Array | None) -> dict[str, Any]:
+    """Keys of a body with its place; with place and friction of the scene's where it has none."""
+    if place is not None:
+        data = {key: value for key, value in data.items() if key not in PLACES}
+        data |= {PLACE: place.tolist()}
+    elif PLACE not in data and scene.body is not None:
+        data = data | {PLACE: scene.body.center.tolist()}
+    if scene.friction is None or FRICTION in data:
+        return data
+    rubs = {FRICTION: scene.friction.coefficient, MASS: scene.friction.mass}
+    return rubs | data
 
 
 def _giving_way(body: Body, known: Body | None) -> Body:
@@ -66,33 +115,17 @@ def _giving_way(body: Body, known: Body | None) -> Body:
     return body
 
 
-def _of_file(name: str, place: Array | None) -> tuple[ObjectSpec, tuple[Path, ...]]:
-    """The keys in a file, which may leave its place to others, and the files that were read."""
-    path = path_of("object", name)
-    document = with_forces(read_document(path), path.parent, TABLE)
-    if "at_mm" not in document.data:
-        parts = [document.data.get(key) for key in PLACES]
-        at = parts if place is None and None not in parts else _known(place).tolist()
-        document = replace(document, data={**document.data, "at_mm": at})
-    return checked_object(document), files_of(path, *document.files)
-
-
-def _known(place: Array | None) -> Array:
-    if place is None:
-        raise UsageError(Field("at"), ": expected the place of the body in mm, such as 40,0")
-    return place
-
-
-def _of_text(said: str, place: Array | None) -> Body:
+def _of_text(said: str) -> dict[str, Any]:
+    """The keys that a text such as "jaws:30x40" stands for. Raises UsageError for what is none."""
     kind, _, sizes = said.partition(":")
     numbers = [number_in(size) for size in sizes.split("x")]
     is_known = len(numbers) in {"disc": (1,), "jaws": (1, 2)}.get(kind, ())
     if not is_known or not all(SMALLEST <= size <= LARGEST for size in numbers):
         raise UsageError(Field("object"), f" {shortened(said)}: {KINDS}")
     if kind == "disc":
-        return Disc(_known(place), 0.5 * numbers[0])
+        return {"disc": {"diameter_mm": numbers[0]}}
     gap, height = (*numbers, JAW_HEIGHT)[:2]
-    return Jaws(_known(place), gap, height)
+    return {"jaws": {"gap_mm": gap, "height_mm": height}}
 
 
 def check_body(scene: Scene, body: Body) -> None:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import body_lines, check_body, force_lines, pressure_lines, with_body
+from dpgcli.api.bodies import (
+    body_lines,
+    check_body,
+    force_lines,
+    own_settings,
+    pressure_lines,
+    with_body,
+)
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -151,7 +158,8 @@ class GraspResult:
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
         scene = self.grasps.scene
-        chosen = {"object": told_of(self.grasps.body, scene.held), "approach": self.way.value}
+        told = told_of(self.grasps.body, scene.held, scene.friction)
+        chosen = {"object": told, "approach": self.way.value}
         if (closing := self.grasps.closing) is not None:
             chosen |= told_history(closing.pressure, closing.history)
         write_scene_rows(table_path(table), scene, self.given.json, self.columns, self.rows, chosen)
@@ -210,8 +218,9 @@ def grasp(
     """
     check_flags(both=both)
     way = chosen(Way, "approach", approach)
-    given, closing = grasp_input(spec, settings, way, pressure)
-    with_it = with_body(given, object, at)
+    of_spec, of_body = own_settings(settings, object)
+    given, closing = grasp_input(spec, of_spec, way, pressure)
+    with_it = with_body(given, object, at, of_body)
     said = None if patterns is None else as_texts("patterns", patterns)
     return grasp_of(with_it, patterns_of(given.scene, way, said), both, way, closing)
 

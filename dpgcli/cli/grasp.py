@@ -87,7 +87,7 @@ def grasp(
     quiet: Quiet = False,
 ) -> None:
     """Let fingers close on a body: contacts, forces, and which units reset."""
-    from dpgcli.api.bodies import with_body
+    from dpgcli.api.bodies import own_settings, with_body
     from dpgcli.api.grasp import (
         check_drawable,
         check_work,
@@ -106,11 +106,12 @@ def grasp(
     way = Way(approach.value)
     if jaws is not None:
         _check_alone(body, both, approach, pressure)
-    given, closing = grasp_input(spec, settings or (), way, pressure)
+    of_spec, of_body = own_settings(settings or (), body)
+    given, closing = grasp_input(spec, of_spec, way, pressure)
     if jaws is not None:
         _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
         return
-    given = with_body(given, body, point("--at", at))
+    given = with_body(given, body, point("--at", at), of_body)
     chosen = patterns_of(given.scene, way, patterns or None)
     pairs = pairs_of(chosen, given.scene, both)
     if plot is not None:

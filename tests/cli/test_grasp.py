@@ -169,7 +169,7 @@ def test_wrong_keys_of_an_object(call: Any, folder: Path, gripper: str) -> None:
     for said in (
         "object.disc.diameter_mm: expected a length > 0 in mm, found -4",
         "object.disc.color: expected a known key",
-        "object.at_mm: expected two numbers in mm, such as [40, 0], found a list",
+        "object.at_mm: expected two numbers in mm, such as [40, 0], found [4]",
         'object.held: expected "fixed", "guided" (moves along x) or "free", found "loosely"',
     ):
         assert said in result.stderr

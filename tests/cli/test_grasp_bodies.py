@@ -113,7 +113,7 @@ def test_refusals(call: Any, gripper: str, arguments: tuple[str, ...], said: str
         ("polygon: [[0, 0], [9, 0], [4, 0], [4, 5]]", "found side 1-2 crosses side 2-3"),
         ("polygon: [[0, 0], [9, 0], [9, 0], [0, 9]]", "found side 2-3 of 0 mm"),
         ("polygon: [[0, 0], [9, 0]]", "polygon: expected three to 64 corners in mm"),
-        ("polygon: [[0, 0], [9], [9, 0]]", "polygon: expected three to 64 corners in mm"),
+        ("polygon: [[0, 0], [9], [9, 0]]", "polygon.1: expected a corner, two numbers in mm"),
         ("jaws: {gap_mm: 0, height_mm: 4}", "jaws.gap_mm: expected a length > 0 in mm, found 0"),
         ("jaws: {gap_mm: 3}", "jaws.height_mm: expected a length > 0 in mm, found nothing"),
         ("disc: {diameter_mm: 9}\nmass_g: 300", "mass_g: expected friction beside it"),
@@ -176,3 +176,49 @@ def test_both_parts_of_a_place_stand_for_it(
     assert result.exit_code == (ExitCode.DONE if is_whole else ExitCode.USAGE)
     said = "object.at_mm: expected two numbers in mm, such as [40, 0], found nothing"
     assert (said in result.stdout + result.stderr) is not is_whole
+
+
+def test_settings_are_those_of_the_body_that_is_said(call: Any, folder: Path, gripper: str) -> None:
+    """Whether the spec has an object or not, and the place may be one of them."""
+    chosen = ("--pattern", "11100", "--object", "disc:40")
+    friction = ("--set", "object.friction=0.5", "--set", "object.held=guided")
+    (row,) = rows_of(call, gripper, *chosen, "--at", "45,0", *friction)
+    assert row["status"] == "not_held" and "payload_N" in row
+    spec = with_object(folder, gripper, "  jaws: {gap_mm: 3, height_mm: 4}\n  at_mm: [45, 0]")
+    assert rows_of(call, spec, *chosen, *friction) == [row]
+    assert rows_of(call, gripper, *chosen, *friction, "--set", "object.at_mm=[45, 0]") == [row]
+    said = "  disc: {diameter_mm: 40}\n  at_mm: [45, 0]\n  friction: 0.5\n  held: guided"
+    assert rows_of(call, with_object(folder, gripper, said), "--pattern", "11100") == [row]
+    assert rows_of(call, with_object(folder, gripper, said), *chosen, "--at", "45,0") == [row]
+
+
+def test_wrong_settings_of_the_body_that_is_said(call: Any, gripper: str) -> None:
+    said = ("--object", "disc:40", "--at", "45,0", "--set")
+    for setting, wrong in (
+        ("object.held=loose", '--set: object.held: expected "fixed", "guided"'),
+        ("object.mass_g=4", "--set: object.mass_g: expected friction beside it"),
+        ("object.jaws.gap_mm=4", "--set: object.jaws.height_mm: expected a length > 0 in mm"),
+        ("object.compliance.stiffness_N_per_mm=4", "object.compliance: expected jaws, which only"),
+    ):
+        result = call("grasp", gripper, *said, setting)
+        assert result.exit_code == ExitCode.USAGE and wrong in result.stderr, result.stderr
+
+
+def test_jaws_of_a_file_have_their_forces_beside_it(call: Any, folder: Path, gripper: str) -> None:
+    (folder / "bodies").mkdir()
+    own = folder / "bodies" / "own.yaml"
+    own.write_text("jaws: {gap_mm: 55, height_mm: 40}\ncompliance: {table: f.csv}\n")
+    table = own.with_name("f.csv")
+    table.write_text("jaw_gap_mm,force (mN)\n55,0\n45,500\n35,1000\n")
+    chosen = ("--object", str(own), "--at", "45,0", "--pattern", "01100")
+    (row,) = rows_of(call, gripper, *chosen)
+    stiff = ("--set", "object.compliance={stiffness_N_per_mm: 0.05}")
+    (other,) = rows_of(call, gripper, *chosen, *stiff)
+    assert row["squeeze_N"] == pytest.approx(other["squeeze_N"], rel=1e-9) and row["squeeze_N"] > 0
+    result = call("grasp", gripper, *chosen, *RIGID, "-o", str(table))
+    assert result.exit_code == ExitCode.USAGE and table.read_text().startswith("jaw_gap_mm")
+    table.write_text("jaw_gap_mm,force_N\n35,1\n40,0.1\n45,0.4\n54,0.39\n55,0\n")
+    result = call("grasp", gripper, *chosen, *RIGID, "-o", "g.parquet")
+    assert "warning: the forces of the jaws do not fall from 40 to 45 mm: one" in result.stderr
+    kept = pq.read_schema(folder / "g.parquet").metadata[b"dpg.object"]
+    assert json.loads(kept)["compliance"]["table"]["force_N"] == [1.0, 0.1, 0.4, 0.39, 0.0]

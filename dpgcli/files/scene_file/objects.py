@@ -220,7 +220,7 @@ class ObjectSpec(Section):
         return list(_wrong_sides(self.polygon or []))
 
 
-def told_of(body: Body, held: str) -> dict[str, Any]:
+def told_of(body: Body, held: str, friction: Friction | None = None) -> dict[str, Any]:
     """A body as a spec's object says it, in plain values.
 
     >>> told_of(Disc(np.array([40.0, 0.0]), 20.0), "free")
@@ -237,7 +237,9 @@ def told_of(body: Body, held: str) -> dict[str, Any]:
             kind["compliance"] = {"table": table}
     else:
         kind = {POLYGON: body.around.T.tolist()}
-    return {**kind, PLACE: body.center.tolist(), "held": held}
+    rubs = {} if friction is None else {FRICTION: friction.coefficient, MASS: friction.mass}
+    told = {**kind, PLACE: body.center.tolist(), "held": held, **rubs}
+    return {key: value for key, value in told.items() if value is not None}
 
 
 def _wrong_sides(corners: list[Corner]) -> Iterator[Issue]:

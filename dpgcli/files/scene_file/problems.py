@@ -140,9 +140,14 @@ def checked_object(document: Document) -> objects.ObjectSpec:
         told = error.errors(include_url=False)
         problems += [_problem(inner, {**e, "loc": (*OBJECT, *e["loc"])}) for e in told]
     if problems:
-        own = [replace(p, key=p.key.removeprefix("object.")) for p in problems]
-        raise SpecError(in_order(own))
+        raise SpecError(in_order([_in_own_file(p, document) for p in problems]))
     return found
+
+
+def _in_own_file(problem: Problem, document: Document) -> Problem:
+    """A problem of a body with its key as the document has it; in settings it stands in full."""
+    is_own = problem.file == document.file
+    return replace(problem, key=problem.key.removeprefix("object.")) if is_own else problem
 
 
 def checked_keys(document: Document) -> Spec:
