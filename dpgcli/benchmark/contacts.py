@@ -24,7 +24,8 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference.contact import ExtendedContact, RoundBody, extended_contact
+from dpgcli.reference.bodies import RoundBody
+from dpgcli.reference.contact import ExtendedContact, extended_contact
 from dpgcli.reference.equilibria import ExtendedStates
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status

@@ -169,6 +169,8 @@ def _put_right(obstructed: Obstructed, shapes: ContactShapes, load: Array) -> No
         family = obstructed.family(shapes.inverted, shapes.active)
         measured = family.measure(obstructed.stacked(shapes))
         is_wrong = family.law.margin(measured, load) < -OUT_OF_ORDER
+        pulls = shapes.active & (obstructed.without_rounding(-shapes.push) > 0.0)
+        is_wrong |= pulls & ~obstructed.are_kept
         lanes = np.flatnonzero(shapes.is_there & is_wrong.any(axis=0))
         if not len(lanes):
             break

@@ -114,5 +114,5 @@ def _cases(subject: str, family: Family, base: Finger) -> Iterator[Case]:
 
 
 def _by_chain_alone(variant: Variant) -> bool:
-    """Whether bars do not give way, or there is pressure or a disc."""
-    return variant.finger.is_rigid or bool(variant.pressure) or variant.disc is not None
+    """Whether bars do not give way, or there is pressure or a body."""
+    return variant.finger.is_rigid or bool(variant.pressure) or variant.body is not None

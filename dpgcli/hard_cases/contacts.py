@@ -1,21 +1,20 @@
-"""States against a disc in hard cases: what the solver finds, judged by extended precision.
+"""States against a body in hard cases: what the solver finds, judged by extended precision.
 
 A state is right if the reference finds it next to the one that is called stable: an equilibrium of
 the same pattern, pushed at as many places, no place pulling and none penetrated, that gives way on
 no motion which its contacts leave.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import Disc, Polygon
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, met
 from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Touch, Verdict
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference.contact import ExtendedContact, RoundBody, extended_contact, penetration
+from dpgcli.reference.bodies import Body, RoundBody
+from dpgcli.reference.contact import ExtendedContact, extended_contact, penetration
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of, inverted_units
@@ -24,18 +23,17 @@ from dpgcli.states.units import UnitSolutions
 
 DEEPEST = 1e-9  # mm: penetration
 STATED_ERROR = 1e-9  # of a push, in N and as a share of the largest
-STAGES = 8  # in which a disc grows about the reference's own search
+STAGES = 8  # in which a body grows about the reference's own search
 
 
 def answered(case: Case) -> Answer:
-    """Let the disc of a case grow about the finger in its pattern."""
-    finger, disc = case.variant.finger, _disc(case)
-    body = Disc(np.array(disc.center), disc.radius)
+    """Let the body of a case grow about the finger in its pattern."""
+    finger, body = case.variant.finger, _body(case)
     placed = met(
         UnitSolutions.of(finger),
         chain_potential,
-        np.array([disc.thickness]),
-        body,
+        np.array([body.thickness]),
+        _grown_as(body),
         frames(None)[0],
         codes_of(case.inverted),
     )
@@ -45,9 +43,18 @@ def answered(case: Case) -> Answer:
     return _answer(placed, found)
 
 
-def _disc(case: Case) -> RoundBody:
-    assert case.variant.disc is not None, "a case with a disc"
-    return case.variant.disc
+def _body(case: Case) -> Body:
+    assert case.variant.body is not None, "a case with a body"
+    return case.variant.body
+
+
+def _grown_as(body: Body) -> Disc | Polygon:
+    """The body of the solver."""
+    if isinstance(body, RoundBody):
+        return Disc(np.array(body.center), body.radius)
+    corners = np.array(body.corners).T
+    middle = corners.mean(axis=1)
+    return Polygon(middle, corners - middle[:, None])
 
 
 def _answer(placed: Placed, found: Grasped) -> Answer:
@@ -78,7 +85,7 @@ def _answer(placed: Placed, found: Grasped) -> Answer:
 
 
 def judged(case: Case, answer: Answer) -> Outcome:
-    """The verdict on an answer with a disc in the way, and the true errors."""
+    """The verdict on an answer with a body in the way, and the true errors."""
     if answer.status != Status.STABLE:
         return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)
     truth = _next_to(case, answer)
@@ -101,17 +108,17 @@ def _next_to(case: Case, answer: Answer) -> ExtendedContact | None:
     return extended_contact(
         case.variant.finger,
         answer.reached[:, 0],
-        _disc(case),
+        _body(case),
         answer.nodes[:, 0],
         answer.touch.walls,
     )
 
 
 def _is_right(case: Case, answer: Answer, truth: ExtendedContact) -> bool:
-    """Whether an answer is the state that is next to it, and does not penetrate the disc."""
+    """Whether an answer is the state that is next to it, and does not penetrate the body."""
     assert answer.touch is not None, "an answer of contact"
     height = float(case.variant.finger.segment_height[0, 0])
-    deep = penetration(_disc(case), answer.nodes[:, 0], height)
+    deep = penetration(_body(case), answer.nodes[:, 0], height)
     is_state = truth.is_minimum and truth.in_pattern
     return is_state and len(truth.push) == len(answer.touch.push) and deep <= DEEPEST
 
@@ -128,15 +135,15 @@ def _refusal(case: Case, answer: Answer) -> Verdict:
 
 
 def _is_held(case: Case) -> bool:
-    """Whether the reference keeps the pattern as the disc grows from where it meets the finger."""
-    finger, disc = case.variant.finger, _disc(case)
+    """Whether the reference keeps the pattern as the body grows from where it meets the finger."""
+    finger, body = case.variant.finger, _body(case)
     free = settle(UnitSolutions.of(finger), chain_potential, case.inverted, DEFAULT_TOLERANCE)
     coordinates, at = free.potential.coordinates, free.equilibrium.coordinates
     nodes = np.stack(coordinates.stations(at), axis=1).reshape(-1)
     walls = (coordinates.springs(at).extension - coordinates.openings(at))[:, 0]
-    deep = penetration(disc, nodes, float(finger.segment_height[0, 0]))
+    deep = penetration(body, nodes, float(finger.segment_height[0, 0]))
     for left in np.arange(STAGES)[::-1] / STAGES:
-        smaller = replace(disc, radius=disc.radius - left * deep)
+        smaller = body.smaller(left * deep)
         found = extended_contact(finger, case.inverted[:, 0], smaller, nodes, walls)
         if found is None or not (found.is_minimum and found.in_pattern):
             return False

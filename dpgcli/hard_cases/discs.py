@@ -17,7 +17,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference.contact import RoundBody
+from dpgcli.reference.bodies import RoundBody
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.settle import settle
@@ -49,11 +49,13 @@ class Free(NamedTuple):
         x, y = self.along(side)
         return np.array([y, -x])
 
-    def yielding(self, disc: RoundBody, sides: list[int]) -> Array:
-        """How far sides give way to a push of 1 N on each of them, mm, (side,)."""
+    def yielding(self, discs: list[RoundBody], sides: list[int]) -> Array:
+        """How far sides give way to a push of 1 N on each by a disc, mm, (side,)."""
         at = self.settled.equilibrium.coordinates
-        body = Obstacle.disc(np.array(disc.center), disc.radius)
-        slope = FaceGaps(self.bare, body)(at).gradient[:, sides, 0]
+        met = [Obstacle.disc(np.array(disc.center), disc.radius) for disc in discs]
+        pairs = zip(met, sides, strict=True)
+        slopes = [FaceGaps(self.bare, body)(at).gradient[:, side, 0] for body, side in pairs]
+        slope = np.stack(slopes, axis=1)
         rates = np.zeros((len(at), len(sides)))
         rates[self.bare.places] = slope
         hessian = self.settled.potential.evaluate(at).hessian[..., 0]
@@ -99,7 +101,7 @@ def held_by_both(corner: int) -> Place:
 
     def center(free: Free, radius: float, depth: float) -> Array:
         x, y = _between(free, corner, np.full(2, radius))
-        give = free.yielding(RoundBody((x, y), radius, 0.0), [corner - 1, corner])
+        give = free.yielding([RoundBody((x, y), radius, 0.0)] * 2, [corner - 1, corner])
         return _between(free, corner, radius - depth * give / give.max())
 
     return center
@@ -146,14 +148,14 @@ def discs(base: Finger) -> Iterator[Variant]:
         yield from _at(NEXT_TO_CLAMP, *bars, depth=AT_CLAMP)
         for by in GRAZING:
             yield from _at(BELOW_CLAMP, *bars, depth=-by)
-    for words, values in _others(base).items():
+    for words, values in others(base).items():
         for spot in SPOTS.values():
             yield from _at(spot, f"{words}, k_L = ∞", rigid(changed(finger, **values)))
     for name in ("side", "tip", "corner"):
         yield from _at(SPOTS[name], *hard, depth=RESETTING)
 
 
-def _others(base: Finger) -> dict[str, dict[str, float]]:
+def others(base: Finger) -> dict[str, dict[str, float]]:
     """What else a finger may have, by name."""
     return {
         "walls": {"wall_compliance": 1.0 / float(base.bistable_stiffness.min())},
@@ -167,7 +169,7 @@ def _at(
 ) -> Iterator[Variant]:
     """A disc so deep in the free state, if there is one and the base is not in the disc."""
     thickness = LAYER * float(finger.segment_height[0, 0])
-    free, radius = _free(finger, spot.pattern, thickness), 0.5 * diameter
+    free, radius = free_state(finger, spot.pattern, thickness), 0.5 * diameter
     if free.settled.status[0] != Status.STABLE:
         return
     x, y = spot.center(free, radius, depth)
@@ -175,10 +177,11 @@ def _at(
         side = f"{abs(depth):g} mm {'deep' if depth > 0.0 else 'away'}"
         disc = RoundBody((float(x), float(y)), radius, thickness)
         label = f"disc of {diameter:g} mm {spot.words}, {side}, {bars}"
-        yield Variant(label, finger, (spot.pattern,), disc=disc)
+        yield Variant(label, finger, (spot.pattern,), body=disc)
 
 
-def _free(finger: Finger, pattern: str, thickness: float) -> Free:
+def free_state(finger: Finger, pattern: str, thickness: float) -> Free:
+    """The free state of a pattern of a finger whose layer is so thick, mm."""
     inverted = np.array([[digit == "1"] for digit in pattern])
     free = settle(UnitSolutions.of(finger), chain_potential, inverted, DEFAULT_TOLERANCE)
     bare = Face.of(free.potential.coordinates, np.array([[thickness]]))

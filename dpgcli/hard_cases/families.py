@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.hard_cases.discs import discs
+from dpgcli.hard_cases.bodies import bodies
 from dpgcli.hard_cases.variants import (
     LONG_FINGER,
     Family,
@@ -360,6 +360,6 @@ FAMILIES = (
     Family("coupling", _coupling),  # κ/k_θ from −0.499 to 0.4999999
     Family("loads", _loads),  # forces, couples and weights up to those that reset a unit
     Family("pressure", _pressure),  # thresholds of pressure, at the ends of what there is
-    Family("contact", discs),  # a disc in the way: large and small, grazing, in corners
+    Family("contact", bodies),  # a body in the way: large and small, grazing, in corners
     Family("mirror", _mirror),  # searches that begin folded through or mirrored
 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
-from dpgcli.reference.contact import RoundBody
+from dpgcli.reference.bodies import Body
 
 LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
 
@@ -31,7 +31,7 @@ class Variant:
 
     The solver gets lengths in another unit, with `scale` of these units in a mm. With a sign
     `pressure` the pressure on all domes goes that way, and what is asked for is where the first of
-    them loses its place. With a `disc` in the way the state is one against it.
+    them loses its place. With a `body` in the way the state is one against it.
     """
 
     label: str
@@ -40,7 +40,7 @@ class Variant:
     start: Start = Start()
     scale: float = 1.0
     pressure: int = 0
-    disc: RoundBody | None = None
+    body: Body | None = None
 
 
 class Family(NamedTuple):

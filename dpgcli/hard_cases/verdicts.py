@@ -49,7 +49,7 @@ def answered(case: Case) -> Answer:
     """Solve a case in its own unit of length; the answer is in mm."""
     if case.variant.pressure:
         return thresholds.answered(case)
-    if case.variant.disc is not None:
+    if case.variant.body is not None:
         return contacts.answered(case)
     scale = case.variant.scale
     units = UnitSolutions.of(scaled(case.variant.finger, scale))
@@ -133,7 +133,7 @@ def dense(band: Array) -> Array:
 
 def judged(case: Case, answer: Answer) -> Outcome:
     """The answer's verdict and true errors by extended precision."""
-    if case.variant.disc is not None:
+    if case.variant.body is not None:
         return contacts.judged(case, answer)
     if answer.status != Status.STABLE:
         return Outcome(case, answer, _refusal(case, answer), np.nan, np.nan)

@@ -1,21 +1,21 @@
-"""Equilibria of a finger against a disc in extended precision: the reference for contact.
+"""Equilibria of a finger against a body in extended precision: the reference for contact.
 
-The finger's energy is that of `reference.energy`; the face is drawn from its nodes here, and gaps
-are differentiated by differences, which cost no digits that are missed. A state is what Newton's
-method makes of the optimality conditions of a set of contacts: balance with their pushes, no gap at
-them. The set is right where no contact pulls and no other place is penetrated.
+The finger's energy is that of `reference.energy`; gaps are those of `reference.bodies`, and are
+differentiated by differences, which cost no digits that are missed. A state is what Newton's method
+makes of the optimality conditions of a set of contacts: balance with their pushes, no gap at them.
+The set is right where no contact pulls and no other place is penetrated.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
-from dpgcli.reference.energy import Expansion, Vector, cross, measured
+from dpgcli.reference.bodies import Body, ExactBody, Place, exact
+from dpgcli.reference.energy import Expansion
 from dpgcli.reference.equilibria import (
     Energy,
     ExtendedArray,
@@ -39,24 +39,8 @@ STIFFENED = 15  # digits by which contacts are stiffer than bars where curvature
 
 
 @dataclass(frozen=True)
-class RoundBody:
-    """A disc in the finger's frame, and the thickness of the finger's layer, mm."""
-
-    center: tuple[float, float]
-    radius: float
-    thickness: float
-
-
-class Place(NamedTuple):
-    """A place of the face: a side, the first is 0, or the corner at the end of so many sides."""
-
-    number: int
-    is_corner: bool
-
-
-@dataclass(frozen=True)
 class ExtendedContact:
-    """An equilibrium against a disc, known to more digits than doubles have.
+    """An equilibrium against a body, known to more digits than doubles have.
 
     `pose` is tip x, y (mm) and angle (rad), (3,), `energy` in mJ. `push` (contact,) N are those at
     `places`, in their order along the face. `is_minimum`: positive curvature on the motions that
@@ -75,14 +59,15 @@ class ExtendedContact:
 
 
 def extended_contact(
-    finger: Finger, pattern: Flags, body: RoundBody, nodes: Array, walls: Array, digits: int = 50
+    finger: Finger, pattern: Flags, body: Body, nodes: Array, walls: Array, digits: int = 50
 ) -> ExtendedContact | None:
-    """The equilibrium of a pattern (unit,) against a disc, next to `nodes` (4 n,) and `walls`, mm.
+    """The equilibrium of a pattern (unit,) against a body, next to `nodes` (4 n,) and `walls`, mm.
 
     None where there is none. As many digits as the bars are stiffer than the springs are carried on
     top.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.reference.bodies import RoundBody
     >>> straight = np.array([13.5, 0.0, 13.5, 10.75])
     >>> body = RoundBody((9.0, -8.0), 8.0, 0.0)  # it touches a straight unit without a layer
     >>> finger, ground, rigid = uniform_finger(1, **STUDY), np.array([False]), np.zeros(1)
@@ -94,7 +79,7 @@ def extended_contact(
     lost = digits_lost(finger)
     with mpmath.workdps(digits + lost):
         bars = energy_of(finger, extended_units(finger), extended(walls))
-        search = _Search(bars, _ExactBody.of(body), digits, lost)
+        search = _Search(bars, exact(body), digits, lost)
         here = bars.unknowns(extended(nodes))
         try:
             found = search.with_contacts(here, search.closed(here, mpmath.mpf(NEAR)))
@@ -115,77 +100,15 @@ def extended_contact(
         )
 
 
-def penetration(body: RoundBody, nodes: Array, height: float) -> float:
-    """How deep a disc is in the face of a finger with these nodes (4 n,), mm; 0 where it is not."""
+def penetration(body: Body, nodes: Array, height: float) -> float:
+    """How deep a body is in the face of a finger with these nodes (4 n,), mm; 0 where it is not."""
     import mpmath
 
     with mpmath.workdps(30):
-        exact = _ExactBody.of(body)
-        face = exact.face([mpmath.mpf(0)] * 3 + [mpmath.mpf(height), *extended(nodes)])
-        return max(0.0, -float(min(exact.gap(face, place) for place in exact.places(face))))
-
-
-class _ExactBody(NamedTuple):
-    """A `RoundBody` in mpmath numbers."""
-
-    center: Vector
-    radius: "mpf"
-    thickness: "mpf"
-
-    @classmethod
-    def of(cls, body: RoundBody) -> "_ExactBody":
-        x, y, radius, thickness = extended(np.array([*body.center, body.radius, body.thickness]))
-        return cls((x, y), radius, thickness)
-
-    def face(self, stations: Sequence["mpf"]) -> list[Vector]:
-        """F_0 … F_n by the nodes B_0, T_0, B_1, …: half a layer inside B on the line to T."""
-        nodes = []
-        for k in range(0, len(stations), 4):
-            x, y, top_x, top_y = stations[k : k + 4]
-            _, along = measured((top_x - x, top_y - y))
-            nodes.append((x - self.thickness * along[0] / 2, y - self.thickness * along[1] / 2))
-        return nodes
-
-    def gap_of(self, stations: list["mpf"], place: Place) -> "mpf":
-        """The gap at a place by the nodes: of those beside it only, the others far from it."""
-        first = max(0, place.number - place.is_corner)
-        beside = self.face(stations[4 * first : 4 * place.number + 8])
-        return self.gap(beside, Place(place.number - first, place.is_corner))
-
-    def places(self, face: list[Vector]) -> list[Place]:
-        """The nearest place of each side, each once, along the face."""
-        found = []
-        for number, (start, end) in enumerate(pairwise(face)):
-            along, away = _between(start, end), _between(start, self.center)
-            reached = _dot(along, away)
-            if reached <= 0 or reached >= _dot(along, along):
-                found.append(Place(number + int(reached > 0), True))
-            else:
-                found.append(Place(number, False))
-        return sorted(dict.fromkeys(found), key=lambda place: place.number - 0.5 * place.is_corner)
-
-    def gap(self, face: list[Vector], place: Place) -> "mpf":
-        """Distance of the disc from a place, negative where it is in or behind the face."""
-        if not place.is_corner:
-            start, end = face[place.number : place.number + 2]
-            _, along = measured(_between(start, end))
-            return cross(_between(start, self.center), along) - self.radius
-        corner = face[place.number]
-        distance, away = measured(_between(corner, self.center))
-        beside = [
-            measured(_between(start, end))[1]
-            for start, end in pairwise(face[max(0, place.number - 1) : place.number + 2])
-        ]
-        is_behind = len(beside) == 2 and sum(cross(away, along) for along in beside) < 0
-        return (-distance if is_behind else distance) - self.radius
-
-
-def _between(start: Vector, end: Vector) -> Vector:
-    return end[0] - start[0], end[1] - start[1]
-
-
-def _dot(v: Vector, w: Vector) -> "mpf":
-    return v[0] * w[0] + v[1] * w[1]
+        own = exact(body)
+        face = own.face([mpmath.mpf(0)] * 3 + [mpmath.mpf(height), *extended(nodes)])
+        gaps = (own.gap(face, place) for place in own.places(face))
+        return max(0.0, -float(min(gaps, default=0)))
 
 
 class _Balance(NamedTuple):
@@ -199,10 +122,10 @@ class _Balance(NamedTuple):
 
 @dataclass(frozen=True)
 class _Search:
-    """Newton's method on the optimality conditions of contacts, of one finger and disc."""
+    """Newton's method on the optimality conditions of contacts, of one finger and body."""
 
     bars: Energy
-    body: _ExactBody
+    body: ExactBody
     digits: int
     lost: int
 
@@ -218,7 +141,7 @@ class _Search:
         return [0, 0, 0, self.bars.units[0].height, *self.bars.nodes(unknowns)]
 
     def closed(self, unknowns: list["mpf"], within: "mpf") -> list[Place]:
-        """The places at which the disc is within so much, mm."""
+        """The places at which the body is within so much, mm."""
         face = self.body.face(self.stations(unknowns))
         return [p for p in self.body.places(face) if self.body.gap(face, p) <= within]
 

@@ -6,14 +6,8 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
-from dpgcli.reference.contact import (
-    RoundBody,
-    _Balance,
-    _ExactBody,
-    _Search,
-    extended_contact,
-    penetration,
-)
+from dpgcli.reference.bodies import RoundBody, exact
+from dpgcli.reference.contact import _Balance, _Search, extended_contact, penetration
 from dpgcli.reference.equilibria import energy_of
 from dpgcli.reference.units import extended_units
 
@@ -118,7 +112,7 @@ def test_curvature_counts_on_the_motions_that_contacts_leave(along: int, is_mini
     """Downhill across the contact, which holds that back; up or down along it."""
     with mpmath.workdps(50):
         bars = energy_of(unit(), extended_units(unit()), [])
-        search = _Search(bars, _ExactBody.of(RoundBody(CENTER, 8.0, 0.0)), 50, 0)
+        search = _Search(bars, exact(RoundBody(CENTER, 8.0, 0.0)), 50, 0)
         zero, one = mpmath.mpf(0), mpmath.mpf(1)
         hessian = [[-one, zero], [zero, along * one]]
         found = _Balance([zero, zero], {}, [[one, zero]], hessian)
