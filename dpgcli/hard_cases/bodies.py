@@ -1,8 +1,8 @@
 """The family of bodies in the way of a finger: discs, and such as have straight sides.
 
-Those are a plate along a phalanx and shorter than it, so that it meets both ends of the plate; a
-wedge that points at a phalanx; and a block that the end of the face comes down on. Each is placed
-by the face of the free state, and reaches into it by so much.
+Those are plates along a phalanx, shorter than it or beyond its end; a wedge that points at a
+phalanx; and a block that the end of the face comes down on. Each is placed by the face of the free
+state, and reaches into it by so much.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,27 +28,26 @@ from dpgcli.hard_cases.discs import (
 )
 from dpgcli.hard_cases.variants import Variant, changed, repeated, rigid, with_bars
 from dpgcli.mechanics.finger import Finger
-from dpgcli.reference.bodies import StraightBody
+from dpgcli.reference.bodies import RoundBody, StraightBody
 from dpgcli.states.certify import Status
 
 SIZES = (1.0, 5.0, 25.0, 100.0, 500.0)  # mm
-SIZE, NARROW = 20.0, 8.0  # mm, where others are varied; of a plate, less than a phalanx
+
+
+Corners = Callable[[Free, float, float], Array]  # of a body of a size, so deep, (corner, 2)
 
 
 class Spot(NamedTuple):
-    """Where a body meets the free state of a pattern, and its corners by size.
-
-    Corners (corner, 2) are counted along the face and inwards from where it is touched.
-    """
+    """Where a body meets the free state of a pattern."""
 
     words: str
     pattern: str
-    where: Callable[[Free], tuple[Array, Array]]  # a point of the face, and a direction inwards
-    corners: Callable[[float], Array]
+    corners: Corners
+    size: float  # mm, where others are varied
 
 
 def plate(size: float) -> Array:
-    """Flat towards the face."""
+    """Flat towards the face; corners along it and inwards from where it is touched, (corner, 2)."""
     return np.array([[-0.5, 0.0], [0.5, 0.0], [0.5, 0.6], [-0.5, 0.6]]) * size
 
 
@@ -57,30 +56,59 @@ def wedge(size: float) -> Array:
     return np.array([[0.0, 0.0], [0.6, 1.0], [-0.4, 0.8]]) * size
 
 
-def on_side(side: int, share: float) -> Callable[[Free], tuple[Array, Array]]:
+def on_side(side: int, share: float, shape: Callable[[float], Array]) -> Corners:
     """On a side, straight in front of it."""
 
-    def where(free: Free) -> tuple[Array, Array]:
+    def corners(free: Free, size: float, depth: float) -> Array:
         start, end = free.face[:, side], free.face[:, side + 1]
-        return start + share * (end - start), free.inwards(side)
+        return _placed(start + share * (end - start), free.inwards(side), shape(size), depth)
 
-    return where
+    return corners
 
 
-def at_tip(free: Free) -> tuple[Array, Array]:
-    """At the end of the face, from below and ahead."""
+def at_tip(free: Free, size: float, depth: float) -> Array:
+    """A plate at the end of the face, from below and ahead."""
     last = free.face.shape[1] - 2
     way = free.inwards(last) + 0.4 * free.along(last)
-    return free.face[:, -1], way / np.hypot(*way)
+    return _placed(free.face[:, -1], way / np.hypot(*way), plate(size), depth)
 
 
-PLATE = Spot("plate along phalanx 2", "000", on_side(1, 0.45), plate)
-WEDGE = Spot("wedge at phalanx 3", "111", on_side(2, 0.6), wedge)
-BLOCK = Spot("block below the tip", "011", at_tip, plate)
-SPOTS = (PLATE, WEDGE, BLOCK)
+def held_twice(side: int, shares: tuple[float, float], end: float) -> Corners:
+    """A plate against two places of a side, tilted so that both push alike.
+
+    It ends `end` times as far from the first as the second is.
+    """
+
+    def corners(free: Free, size: float, depth: float) -> Array:
+        inwards, start = free.inwards(side), free.face[:, side]
+        touched = [start + share * (free.face[:, side + 1] - start) for share in shares]
+        below = [point + inwards for point in touched]
+        discs = [RoundBody((float(x), float(y)), 1.0, 0.0) for x, y in below]
+        give = free.yielding(discs, [side, side])
+        reach = depth * give / give.max()
+        first, second = (at - r * inwards for at, r in zip(touched, reach, strict=True))
+        second = first + end * (second - first)
+        return np.array([first, first + size * inwards, second + size * inwards, second])
+
+    return corners
+
+
+def _placed(point: Array, inwards: Array, shape: Array, depth: float) -> Array:
+    """Corners of a shape at a point, the body to the left of its sides."""
+    along = np.array([-inwards[1], inwards[0]])
+    shape = shape[::-1]  # inwards is to the right of the face
+    return np.asarray(point + shape[:, :1] * along + (shape[:, 1:] - depth) * inwards)
+
+
+PLATE = Spot("plate along phalanx 2", "000", on_side(1, 0.45, plate), 8.0)
+WEDGE = Spot("wedge at phalanx 3", "111", on_side(2, 0.6, wedge), 20.0)
+BLOCK = Spot("block below the tip", "011", at_tip, 20.0)
+ENDS = Spot("plate held by phalanx 2 at both ends", "000", held_twice(1, (0.2, 0.8), 1.0), 5.0)
+TIP = Spot("plate held by phalanx 3 and its tip", "101", held_twice(2, (0.3, 1.0), 1.5), 5.0)
+SPOTS = (PLATE, WEDGE, BLOCK, ENDS, TIP)
 SIZED = (WEDGE, BLOCK)
-UNDER_ALL = Spot("plate along all phalanges", "000", on_side(1, 0.5), plate)
-NEXT_TO_CLAMP = Spot("wedge next to the clamp", "000", on_side(0, 0.05), wedge)
+UNDER_ALL = Spot("plate along all phalanges", "000", on_side(1, 0.5, plate), 80.0)
+NEXT_TO_CLAMP = Spot("wedge next to the clamp", "000", on_side(0, 0.05, wedge), 4.0)
 
 
 def bodies(base: Finger) -> Iterator[Variant]:
@@ -89,43 +117,33 @@ def bodies(base: Finger) -> Iterator[Variant]:
     finger = repeated(base, N_UNITS)
     stiff, hard = ("k_L/k_b = 1e3", with_bars(finger, 1e3)), ("k_L = ∞", rigid(finger))
     for bars, spot, size in product((hard, stiff), SIZED, SIZES):
-        yield from _at(spot, *bars, size)
+        yield from _at(spot._replace(size=size), *bars)
     for ratio, spot in product(RATIOS, SPOTS):
-        yield from _at(spot, f"k_L/k_b = {ratio:g}", with_bars(finger, ratio), _size(spot))
+        yield from _at(spot, f"k_L/k_b = {ratio:g}", with_bars(finger, ratio))
     for spot, by, side in product(SPOTS, GRAZING, (1.0, -1.0)):
-        yield from _at(spot, *hard, _size(spot), side * by)
+        yield from _at(spot, *hard, side * by)
     for bars in (hard, stiff):
-        yield from _at(UNDER_ALL, *bars, 80.0)
-        yield from _at(NEXT_TO_CLAMP, *bars, 4.0, AT_CLAMP)
+        yield from _at(UNDER_ALL, *bars)
+        yield from _at(NEXT_TO_CLAMP, *bars, AT_CLAMP)
     for words, values in others(base).items():
         for spot in SPOTS:
             own = f"{words}, k_L = ∞", rigid(changed(finger, **values))
-            yield from _at(spot, *own, _size(spot))
+            yield from _at(spot, *own)
     for spot in SPOTS:
-        yield from _at(spot, *hard, _size(spot), RESETTING)
+        yield from _at(spot, *hard, RESETTING)
 
 
-def _size(spot: Spot) -> float:
-    return NARROW if spot is PLATE else SIZE
-
-
-def _at(
-    spot: Spot, bars: str, finger: Finger, size: float, depth: float = DEEP
-) -> Iterator[Variant]:
+def _at(spot: Spot, bars: str, finger: Finger, depth: float = DEEP) -> Iterator[Variant]:
     """A body so deep in the free state, if there is one and the base is not in the body."""
-    thickness = LAYER * float(finger.segment_height[0, 0])
-    free = free_state(finger, spot.pattern, thickness)
+    height = float(finger.segment_height[0, 0])
+    free = free_state(finger, spot.pattern, LAYER * height)
     if free.settled.status[0] != Status.STABLE:
         return
-    point, inwards = spot.where(free)
-    along = np.array([-inwards[1], inwards[0]])
-    corners = spot.corners(size)[::-1]  # inwards is to the right: the body to the left of its sides
-    placed = point + corners[:, :1] * along + (corners[:, 1:] - depth) * inwards
-    height = float(finger.segment_height[0, 0])
+    corners = spot.corners(free, spot.size, depth)
     base = shapely.LineString([free.face[:, 0], (0.0, height)])
-    if shapely.Polygon(placed).intersects(base):
+    if shapely.Polygon(corners).intersects(base):
         return
-    body = StraightBody(tuple((float(x), float(y)) for x, y in placed), thickness)
+    body = StraightBody(tuple((float(x), float(y)) for x, y in corners), LAYER * height)
     side = f"{abs(depth):g} mm {'deep' if depth > 0.0 else 'away'}"
-    label = f"{spot.words}, {size:g} mm, {side}, {bars}"
+    label = f"{spot.words}, {spot.size:g} mm, {side}, {bars}"
     yield Variant(label, finger, (spot.pattern,), body=body)
