@@ -31,6 +31,8 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.bodies import RoundBody, StraightBody
 from dpgcli.states.certify import Status
 
+STIFFNESSES = (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9, np.inf)  # N/mm, of jaws
+AXIS = 30.0  # mm: of the gripper, below the fingers' bases
 SIZES = (1.0, 5.0, 25.0, 100.0, 500.0)  # mm
 
 
@@ -111,6 +113,17 @@ UNDER_ALL = Spot("plate along all phalanges", "000", on_side(1, 0.5, plate), 80.
 NEXT_TO_CLAMP = Spot("wedge next to the clamp", "000", on_side(0, 0.05, wedge), 4.0)
 
 
+def jaws(free: Free, size: float, depth: float) -> Array:
+    """A block about the axis of a gripper, whose plate the end of the face comes down on."""
+    x, y = free.face[:, -1]
+    left, right, high = x - size, x + size, y + depth
+    low = -2.0 * AXIS - high
+    return np.array([[left, low], [right, low], [right, high], [left, high]])
+
+
+JAWS = Spot("jaws below the tip", "011", jaws, 12.0)
+
+
 def bodies(base: Finger) -> Iterator[Variant]:
     """All of them, about three units of a finger."""
     yield from discs(base)
@@ -131,9 +144,15 @@ def bodies(base: Finger) -> Iterator[Variant]:
             yield from _at(spot, *own)
     for spot in SPOTS:
         yield from _at(spot, *hard, RESETTING)
+    for stiffness, (bars, depth) in product(STIFFNESSES, ((hard, DEEP), (stiff, 1.0))):
+        yield from _at(JAWS, *bars, depth, stiffness)
+    for by in GRAZING:
+        yield from _at(JAWS, *hard, by, 1.0)
 
 
-def _at(spot: Spot, bars: str, finger: Finger, depth: float = DEEP) -> Iterator[Variant]:
+def _at(
+    spot: Spot, bars: str, finger: Finger, depth: float = DEEP, stiffness: float = np.inf
+) -> Iterator[Variant]:
     """A body so deep in the free state, if there is one and the base is not in the body."""
     height = float(finger.segment_height[0, 0])
     free = free_state(finger, spot.pattern, LAYER * height)
@@ -143,7 +162,9 @@ def _at(spot: Spot, bars: str, finger: Finger, depth: float = DEEP) -> Iterator[
     base = shapely.LineString([free.face[:, 0], (0.0, height)])
     if shapely.Polygon(corners).intersects(base):
         return
-    body = StraightBody(tuple((float(x), float(y)) for x, y in corners), LAYER * height)
+    own = tuple((float(x), float(y)) for x, y in corners)
+    body = StraightBody(own, LAYER * height, stiffness)
     side = f"{abs(depth):g} mm {'deep' if depth > 0.0 else 'away'}"
-    label = f"{spot.words}, {spot.size:g} mm, {side}, {bars}"
+    gives = "" if np.isinf(stiffness) else f", {stiffness:g} N/mm"
+    label = f"{spot.words}, {spot.size:g} mm, {side}{gives}, {bars}"
     yield Variant(label, finger, (spot.pattern,), body=body)

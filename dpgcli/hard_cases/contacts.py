@@ -7,13 +7,18 @@ no motion which its contacts leave.
 
 import numpy as np
 
-from dpgcli.design.bodies import Disc, Polygon
-from dpgcli.grasping.frames import frames
+from dpgcli.arrays import Array
+from dpgcli.design.bodies import Body as SolverBody
+from dpgcli.design.bodies import Disc, Jaws, Polygon
+from dpgcli.design.scene import Gripper, Held
+from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, met
+from dpgcli.grasping.release import let_go, motion_of
 from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Touch, Verdict
+from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference.bodies import Body, RoundBody
+from dpgcli.reference.bodies import Body, RoundBody, StraightBody
 from dpgcli.reference.contact import ExtendedContact, extended_contact, penetration
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
@@ -27,20 +32,43 @@ STAGES = 8  # in which a body grows about the reference's own search
 
 
 def answered(case: Case) -> Answer:
-    """Let the body of a case grow about the finger in its pattern."""
+    """Let the body of a case grow about the finger in its pattern, and yield if it does."""
     finger, body = case.variant.finger, _body(case)
-    placed = met(
-        UnitSolutions.of(finger),
-        chain_potential,
-        np.array([body.thickness]),
-        _grown_as(body),
-        frames(None)[0],
-        codes_of(case.inverted),
-    )
+    if isinstance(body, StraightBody) and np.isfinite(body.stiffness):
+        return _on_jaws(case, body)
+    placed = _met(case, _grown_as(body), frames(None)[0])
     (found,) = described(
         placed.own, [placed.codes], placed.grown, placed.status, with_margins=False
     )
-    return _answer(placed, found)
+    shapes = placed.grown.shapes
+    return _answer(finger.with_domes(shapes.inverted), shapes.coordinates, found)
+
+
+def _met(case: Case, body: SolverBody, frame: FingerFrame) -> Placed:
+    return met(
+        UnitSolutions.of(case.variant.finger),
+        chain_potential,
+        np.array([_body(case).thickness]),
+        body,
+        frame,
+        codes_of(case.inverted),
+    )
+
+
+def _on_jaws(case: Case, body: StraightBody) -> Answer:
+    """Of one of two mirrored fingers about jaws, each of whose plates moves half of the way."""
+    (left, low), (right, high) = (f(np.array(body.corners), axis=0) for f in (np.min, np.max))
+    center = np.array([0.5 * (left + right), 0.0])
+    jaws = Jaws(center, high - low, right - left, 0.5 * body.stiffness)
+    seen = frames(Gripper(-(low + high), 0.0))
+    parts, lane = [_met(case, jaws, frame) for frame in seen], np.zeros(1, int)
+    motion = motion_of(jaws, Held.FIXED, seen)
+    assert motion is not None, "jaws that give way"
+    found, opened, shapes = let_go(parts, [lane, lane], motion, Held.FIXED, with_margins=False)
+    n = case.variant.finger.n_units
+    own = case.variant.finger.with_domes(shapes.inverted[:n])
+    at = shapes.coordinates[: -len(opened)][::2]
+    return _answer(own, at, found[0], -0.5 * float(opened[-1, 0]))
 
 
 def _body(case: Case) -> Body:
@@ -57,11 +85,8 @@ def _grown_as(body: Body) -> Disc | Polygon:
     return Polygon(middle, corners - middle[:, None])
 
 
-def _answer(placed: Placed, found: Grasped) -> Answer:
-    own, shapes = placed.own, placed.grown.shapes
-    n_units = own.units.finger.n_units
-    coordinates = own.potentials(shapes.inverted)[0].coordinates
-    at = shapes.coordinates
+def _answer(finger: Finger, at: Array, found: Grasped, yielded: float = 0.0) -> Answer:
+    n_units, coordinates = finger.n_units, chain_potential(finger).coordinates
     pose, _ = coordinates.tip(at)
     walls = coordinates.springs(at).extension - coordinates.openings(at)
     reached = inverted_units(found.after, n_units)
@@ -80,7 +105,7 @@ def _answer(placed: Placed, found: Grasped) -> Answer:
         residual_floor=np.nan,
         condition=np.nan,
         iterations=0,
-        touch=Touch(push[push > 0.0], walls[:, 0]),
+        touch=Touch(push[push > 0.0], walls[:, 0], yielded),
     )
 
 
@@ -111,6 +136,7 @@ def _next_to(case: Case, answer: Answer) -> ExtendedContact | None:
         _body(case),
         answer.nodes[:, 0],
         answer.touch.walls,
+        answer.touch.yielded,
     )
 
 
@@ -118,7 +144,10 @@ def _is_right(case: Case, answer: Answer, truth: ExtendedContact) -> bool:
     """Whether an answer is the state that is next to it, and does not penetrate the body."""
     assert answer.touch is not None, "an answer of contact"
     height = float(case.variant.finger.segment_height[0, 0])
-    deep = penetration(_body(case), answer.nodes[:, 0], height)
+    body = _body(case)
+    if isinstance(body, StraightBody):
+        body = body.lowered(answer.touch.yielded)
+    deep = penetration(body, answer.nodes[:, 0], height)
     is_state = truth.is_minimum and truth.in_pattern
     return is_state and len(truth.push) == len(answer.touch.push) and deep <= DEEPEST
 
@@ -139,13 +168,13 @@ def _is_held(case: Case) -> bool:
     finger, body = case.variant.finger, _body(case)
     free = settle(UnitSolutions.of(finger), chain_potential, case.inverted, DEFAULT_TOLERANCE)
     coordinates, at = free.potential.coordinates, free.equilibrium.coordinates
-    nodes = np.stack(coordinates.stations(at), axis=1).reshape(-1)
+    nodes, yielded = np.stack(coordinates.stations(at), axis=1).reshape(-1), 0.0
     walls = (coordinates.springs(at).extension - coordinates.openings(at))[:, 0]
     deep = penetration(body, nodes, float(finger.segment_height[0, 0]))
     for left in np.arange(STAGES)[::-1] / STAGES:
         smaller = body.smaller(left * deep)
-        found = extended_contact(finger, case.inverted[:, 0], smaller, nodes, walls)
+        found = extended_contact(finger, case.inverted[:, 0], smaller, nodes, walls, yielded)
         if found is None or not (found.is_minimum and found.in_pattern):
             return False
-        nodes, walls = found.nodes, found.walls
+        nodes, walls, yielded = found.nodes, found.walls, found.yielded
     return True

@@ -52,13 +52,14 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Touch:
-    """What a finger against a disc is said to feel: pushes (contact,) N, along its face.
+    """What a finger against a body is said to feel: pushes (contact,) N, in the reference's order.
 
-    `walls` (unit,) mm are what they make walls yield.
+    `walls` (unit,) mm are what they make walls yield, and the body has `yielded` by so much, mm.
     """
 
     push: Array
     walls: Array
+    yielded: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -41,17 +41,22 @@ class RoundBody:
 class StraightBody:
     """A convex body by its corners in the finger's frame, itself to the left of its sides; mm.
 
-    `thickness` is that of the finger's layer.
+    `thickness` is that of the finger's layer. It yields along −y with a `stiffness`, N/mm.
     """
 
     corners: tuple[tuple[float, float], ...]
     thickness: float
+    stiffness: float = np.inf
 
     @property
     def name(self) -> str:
         """What it is, with its size."""
         width, height = np.ptp(np.array(self.corners), axis=0)
         return f"{len(self.corners)} corners within {width:g} x {height:g} mm"
+
+    def lowered(self, by: float) -> "StraightBody":
+        """Where it is once it has yielded, mm."""
+        return replace(self, corners=tuple((x, y - by) for x, y in self.corners))
 
     def smaller(self, by: float) -> "StraightBody":
         """With its sides moved inwards, mm.
@@ -86,6 +91,9 @@ class Place(NamedTuple):
 
 class ExactBody(Protocol):
     """A body in mpmath numbers."""
+
+    def lowered(self, by: "mpf") -> "ExactBody":
+        """Further along −y."""
 
     def face(self, stations: Sequence["mpf"]) -> list[Vector]:
         """F_0 … F_n by the nodes B_0, T_0, B_1, …"""
@@ -143,6 +151,10 @@ class _Round(_Faced):
     center: Vector
     radius: "mpf"
 
+    def lowered(self, by: "mpf") -> "_Round":
+        """Further along −y."""
+        return replace(self, center=(self.center[0], self.center[1] - by))
+
     def places(self, face: list[Vector]) -> list[Place]:
         """The nearest place of each side, along the face."""
         found = []
@@ -176,6 +188,10 @@ class _Straight(_Faced):
     """A `StraightBody`."""
 
     corners: list[Vector]
+
+    def lowered(self, by: "mpf") -> "_Straight":
+        """Further along −y."""
+        return replace(self, corners=[(x, y - by) for x, y in self.corners])
 
     def places(self, face: list[Vector]) -> list[Place]:
         """Corner by corner of the body the sides that it is over, then side by side nodes."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
-from dpgcli.reference.bodies import Body, ExactBody, Place, exact
+from dpgcli.reference.bodies import Body, ExactBody, Place, StraightBody, exact
 from dpgcli.reference.energy import Expansion
 from dpgcli.reference.equilibria import (
     Energy,
@@ -26,7 +26,7 @@ from dpgcli.reference.equilibria import (
     long_doubles,
     pose_in_pattern,
 )
-from dpgcli.reference.units import extended_units
+from dpgcli.reference.units import Unit, extended_units
 
 if TYPE_CHECKING:
     from mpmath import mpf
@@ -45,7 +45,7 @@ class ExtendedContact:
     `pose` is tip x, y (mm) and angle (rad), (3,), `energy` in mJ. `push` (contact,) N are those at
     `places`, in their order along the face. `is_minimum`: positive curvature on the motions that
     contacts leave. `in_pattern` as in `ExtendedStates`. `nodes` (4 n,) and `walls` (unit,), mm, are
-    rounded to doubles.
+    rounded to doubles, and so is by how much the body has `yielded`, mm.
     """
 
     pose: ExtendedArray
@@ -56,15 +56,22 @@ class ExtendedContact:
     in_pattern: bool
     nodes: Array
     walls: Array
+    yielded: float = 0.0
 
 
 def extended_contact(
-    finger: Finger, pattern: Flags, body: Body, nodes: Array, walls: Array, digits: int = 50
+    finger: Finger,
+    pattern: Flags,
+    body: Body,
+    nodes: Array,
+    walls: Array,
+    yielded: float = 0.0,
+    digits: int = 50,
 ) -> ExtendedContact | None:
     """The equilibrium of a pattern (unit,) against a body, next to `nodes` (4 n,) and `walls`, mm.
 
-    None where there is none. As many digits as the bars are stiffer than the springs are carried on
-    top.
+    A body that yields has done so by `yielded`, mm. None where there is none. As many digits as the
+    bars are stiffer than the springs are carried on top.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.reference.bodies import RoundBody
@@ -79,24 +86,30 @@ def extended_contact(
     lost = digits_lost(finger)
     with mpmath.workdps(digits + lost):
         bars = energy_of(finger, extended_units(finger), extended(walls))
-        search = _Search(bars, exact(body), digits, lost)
-        here = bars.unknowns(extended(nodes))
+        start = bars.unknowns(extended(nodes))
+        whole: Energy | _Yielding = bars
+        if isinstance(body, StraightBody) and np.isfinite(body.stiffness):
+            whole = _Yielding(bars, *extended(np.array([body.stiffness])))
+            start = [*start, *extended(np.array([yielded]))]
+        search, here = _Search(whole, exact(body), digits, lost), start
         try:
             found = search.with_contacts(here, search.closed(here, mpmath.mpf(NEAR)))
         except (ZeroDivisionError, ValueError):  # nodes that coincide, or a mechanism
             return None
         if found is None:
             return None
-        pose, _, in_pattern = pose_in_pattern(bars, found.unknowns, pattern)
+        own = found.unknowns if whole is bars else found.unknowns[:-1]
+        pose, _, in_pattern = pose_in_pattern(bars, own, pattern)
         return ExtendedContact(
             pose=pose,
-            energy=long_doubles([bars.at(found.unknowns).energy])[0],
+            energy=long_doubles([whole.at(found.unknowns).energy])[0],
             push=long_doubles(found.push.values()),
             places=tuple(found.push),
             is_minimum=search.is_minimum(found),
             in_pattern=in_pattern,
-            nodes=np.array(bars.nodes(found.unknowns), float),
-            walls=np.array(bars.walls(found.unknowns), float),
+            nodes=np.array(bars.nodes(own), float),
+            walls=np.array(bars.walls(own), float),
+            yielded=0.0 if whole is bars else float(found.unknowns[-1]),
         )
 
 
@@ -109,6 +122,45 @@ def penetration(body: Body, nodes: Array, height: float) -> float:
         face = own.face([mpmath.mpf(0)] * 3 + [mpmath.mpf(height), *extended(nodes)])
         gaps = (own.gap(face, place) for place in own.places(face))
         return max(0.0, -float(min(gaps, default=0)))
+
+
+@dataclass(frozen=True)
+class _Yielding:
+    """The energy of a finger and of a body: the last unknown is how far this has yielded."""
+
+    own: Energy
+    stiffness: "mpf"
+
+    @property
+    def units(self) -> list[Unit]:
+        """Those of the finger."""
+        return self.own.units
+
+    @property
+    def scale(self) -> "mpf":
+        """The finger's length."""
+        return self.own.scale
+
+    def at(self, unknowns: list["mpf"]) -> Expansion:
+        """With ½ k u² on top."""
+        *others, yielded = unknowns
+        expansion = self.own.at(others)
+        expansion.energy += self.stiffness * yielded**2 / 2
+        expansion.gradient.append(self.stiffness * yielded)
+        expansion.band.append([self.stiffness])
+        return expansion
+
+    def nodes(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """Those of the finger."""
+        return self.own.nodes(unknowns[:-1])
+
+    def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
+        """The finger's own update, and a sum."""
+        return [*self.own.moved(unknowns[:-1], step[:-1]), unknowns[-1] + step[-1]]
+
+    def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        """By the finger's part of a step."""
+        return self.own.strokes_opened(unknowns[:-1], step[:-1])
 
 
 class _Balance(NamedTuple):
@@ -124,7 +176,7 @@ class _Balance(NamedTuple):
 class _Search:
     """Newton's method on the optimality conditions of contacts, of one finger and body."""
 
-    bars: Energy
+    bars: Energy | _Yielding
     body: ExactBody
     digits: int
     lost: int
@@ -142,8 +194,14 @@ class _Search:
 
     def closed(self, unknowns: list["mpf"], within: "mpf") -> list[Place]:
         """The places at which the body is within so much, mm."""
-        face = self.body.face(self.stations(unknowns))
-        return [p for p in self.body.places(face) if self.body.gap(face, p) <= within]
+        body = self.body_at(unknowns)
+        face = body.face(self.stations(unknowns))
+        return [p for p in body.places(face) if body.gap(face, p) <= within]
+
+    def body_at(self, unknowns: list["mpf"]) -> ExactBody:
+        """The body where it is."""
+        yields = isinstance(self.bars, _Yielding)
+        return self.body.lowered(unknowns[-1]) if yields else self.body
 
     def with_contacts(self, here: list["mpf"], active: list[Place]) -> _Balance | None:
         """The equilibrium with the right set of contacts; None where there is none."""
@@ -195,7 +253,7 @@ class _Search:
         def gap(steps: dict[int, "mpf"]) -> "mpf":
             whole = [steps.get(row, 0) for row in range(len(here))]
             moved = self.bars.moved(here, whole) if steps else here
-            return self.body.gap_of(self.stations(moved), place)
+            return self.body_at(moved).gap_of(self.stations(moved), place)
 
         return gap
 
