@@ -16,7 +16,7 @@ import numpy as np
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.arrays import Array, Columns, Flags, keep_freed_memory
 from dpgcli.benchmark.ablation import ablations, check_ablation
-from dpgcli.benchmark.contacts import DiscCase, meets_disc
+from dpgcli.benchmark.contacts import ContactCase, meets_body
 from dpgcli.benchmark.methods import (
     BenchmarkMethod,
     BenchmarkResult,
@@ -136,7 +136,7 @@ class Bench:
                 yield self._row(method, _only(reference, few))
         if self.scene.pressure is not None:
             yield from self._thresholds(self.scene.pressure)
-        if meets_disc(self.scene):
+        if meets_body(self.scene):
             apart = -(-patterns.shape[1] // TOUCHING_STATES)
             yield from self._contacts(patterns[:, ::apart])
         if self.known is not None:
@@ -190,8 +190,8 @@ class Bench:
             }
 
     def _contacts(self, patterns: Flags) -> Iterator[BenchRow]:
-        """States of the upper finger against the disc."""
-        case, own = DiscCase.of(self.scene, patterns), math.nan
+        """States of the upper finger against the body."""
+        case, own = ContactCase.of(self.scene, patterns), math.nan
         for method in case.methods():
             row = self._row(method, case.truth)
             own = row["seconds_per_state"] if math.isnan(own) else own

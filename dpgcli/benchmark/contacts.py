@@ -1,8 +1,8 @@
-"""Fingers against a disc beside each other: this package and SciPy's constrained minimizers.
+"""Fingers against a body beside each other: this package and SciPy's constrained minimizers.
 
 All have the same energy and the same gaps, with all derivatives that they take, and begin at the
-free states. This package lets the disc grow and so knows which state the finger comes to; others
-look for a minimum with the disc there in full, and one elsewhere is another state's.
+free states. This package lets the body grow and so knows which state the finger comes to; others
+look for a minimum with the body there in full, and one elsewhere is another state's.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.benchmark.methods import BenchmarkMethod, BenchmarkResult
-from dpgcli.design.bodies import Disc
+from dpgcli.design.bodies import Disc, gives_way
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.frames import FingerFrame, begins_in_base, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, placed
@@ -24,7 +24,8 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference.bodies import RoundBody
+from dpgcli.reference.bodies import Body as ExactBody
+from dpgcli.reference.bodies import RoundBody, StraightBody
 from dpgcli.reference.contact import ExtendedContact, extended_contact
 from dpgcli.reference.equilibria import ExtendedStates
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
@@ -39,22 +40,28 @@ SLSQP: Any = {"ftol": 1e-13, "maxiter": 400}
 TRUST_CONSTR: Any = {"gtol": 1e-9, "xtol": 1e-12, "maxiter": 600}
 
 
-def meets_disc(scene: Scene) -> bool:
-    """Whether a scene has a disc that fingers can meet."""
-    is_disc = isinstance(scene.body, Disc) and scene.layer_thickness is not None
-    return is_disc and scene.body is not None and not begins_in_base(scene, scene.body).any()
+def meets_body(scene: Scene) -> bool:
+    """Whether a scene has a body that fingers can meet, and that the reference knows: a convex one.
+
+    It stays where it is, and jaws that give way do not.
+    """
+    body = scene.body
+    if body is None or gives_way(body) or scene.layer_thickness is None:
+        return False
+    is_known = isinstance(body, Disc) or not Obstacle.polygon(body.corners).is_reentrant.any()
+    return bool(is_known) and not begins_in_base(scene, body).any()
 
 
 @dataclass(frozen=True)
-class DiscCase:
-    """Patterns (unit, state) of the upper finger against the scene's disc, and what is true."""
+class ContactCase:
+    """Patterns (unit, state) of the upper finger against the scene's body, and what is true."""
 
     scene: Scene
     patterns: Flags
     truth: ExtendedStates
 
     @classmethod
-    def of(cls, scene: Scene, patterns: Flags) -> "DiscCase":
+    def of(cls, scene: Scene, patterns: Flags) -> "ContactCase":
         """The case with its truth: the states to which this package comes, in full precision."""
         own, found = _grasped(scene, patterns)
         states = [_extended(scene, own, found, state) for state in range(patterns.shape[1])]
@@ -87,7 +94,7 @@ def _upper(scene: Scene) -> FingerFrame:
 
 
 def _grasped(scene: Scene, patterns: Flags) -> tuple[Placed, Grasped]:
-    assert scene.body is not None, "a scene with a disc"
+    assert scene.body is not None, "a scene with a body"
     own = placed(scene, chain_potential, scene.body, _upper(scene), codes_of(patterns))
     (found,) = described(own.own, [own.codes], own.grown, own.status, with_margins=False)
     return own, found
@@ -112,14 +119,19 @@ def _extended(scene: Scene, own: Placed, found: Grasped, state: int) -> Extended
     nodes = np.stack(coordinates.stations(at), axis=1).reshape(-1)
     walls = (coordinates.springs(at).extension - coordinates.openings(at))[:, 0]
     after = inverted_units(found.after[[state]], scene.finger.n_units)[:, 0]
-    return extended_contact(scene.finger, after, _round(scene), nodes, walls)
+    return extended_contact(scene.finger, after, _exact(scene), nodes, walls)
 
 
-def _round(scene: Scene) -> RoundBody:
-    """The disc in the upper finger's frame."""
-    assert isinstance(scene.body, Disc) and scene.layer_thickness is not None, "a disc to meet"
-    x, y = _upper(scene).inside(scene.body.center).tolist()
-    return RoundBody((x, y), float(scene.body.radius), float(np.ravel(scene.layer_thickness)[0]))
+def _exact(scene: Scene) -> ExactBody:
+    """The body in the upper finger's frame, that of the reference."""
+    body, frame = scene.body, _upper(scene)
+    assert body is not None and scene.layer_thickness is not None, "a body to meet"
+    thickness = float(np.ravel(scene.layer_thickness)[0])
+    if isinstance(body, Disc):
+        x, y = frame.inside(body.center).tolist()
+        return RoundBody((x, y), float(body.radius), thickness)
+    around = frame.obstacle(body).points[..., 0]  # the body to the left of its sides
+    return StraightBody(tuple((float(x), float(y)) for x, y in around.T), thickness)
 
 
 def _as_states(states: list[ExtendedContact | None], n_units: int) -> ExtendedStates:
@@ -152,12 +164,13 @@ class Problem(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene) -> "Problem":
-        """That of the upper finger and the disc."""
-        potential, body = chain_potential(scene.finger), _round(scene)
-        face = Face.of(potential.coordinates, np.array([[body.thickness]]))
+        """That of the upper finger and the body."""
+        potential = chain_potential(scene.finger)
+        assert scene.body is not None and scene.layer_thickness is not None, "a body to meet"
+        face = Face.of(potential.coordinates, np.reshape(scene.layer_thickness, (1, 1)))
         unit = np.broadcast_to(potential.coordinates.force_unit, (potential.coordinates.size, 1))
-        disc = Obstacle.disc(np.array(body.center), body.radius)
-        return cls(potential, FaceGaps(face, disc), unit[:, 0])
+        gaps = FaceGaps(face, _upper(scene).obstacle(scene.body))
+        return cls(potential, gaps, unit[:, 0])
 
     @property
     def coordinates(self) -> Any:

@@ -7,12 +7,15 @@ import pytest
 
 from dpgcli.arrays import Array
 from dpgcli.benchmark.bench import Bench, errors
-from dpgcli.benchmark.contacts import DiscCase, Problem, meets_disc
-from dpgcli.design.bodies import Disc, Jaws
+from dpgcli.benchmark.contacts import ContactCase, Problem, meets_body
+from dpgcli.design.bodies import Body, Disc, Jaws, Polygon
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 DISC = Disc(np.array([20.0, 0.0]), 11.5)
+JAWS = Jaws(np.array([22.0, 0.0]), 22.0, 16.0)
+CORNERS = np.array([[-8.0, 8.0, 8.0, -8.0], [-9.0, -12.5, 12.5, 9.0]])
+WEDGE = Polygon(np.array([22.0, 0.0]), CORNERS)
 PATTERNS = np.array([[True, True, False], [True, False, True]])
 LARGEST = {"this": 1e-10, "SLSQP": 1e-5, "trust-constr": 1e-4}
 
@@ -23,12 +26,28 @@ def scene(linear_stiffness: float = 1e3, **changes: object) -> Scene:
     return replace(Scene(finger, (), gripper, 1.5, body=DISC), **changes)
 
 
+@pytest.mark.parametrize("body", [JAWS, WEDGE], ids=["jaws", "wedge"])
+@pytest.mark.parametrize("bars", [1e3, np.inf])
+def test_this_package_finds_the_states_on_straight_bodies(
+    bars: float, body: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dpgcli.benchmark.contacts.BATCH", 6)
+    on_body = ContactCase.of(scene(bars, body=body), PATTERNS)
+    free = ContactCase.of(scene(bars, body=replace(DISC, radius=0.1)), PATTERNS)
+    moved = np.hypot(*(free.truth.pose - on_body.truth.pose)[:2].astype(float))
+    assert (moved > 0.1).any(), "mm: it is touched"
+    for method in list(on_body.methods())[:2]:
+        found = method.run()
+        row = errors(type(found)(found.pose[:, :3], found.energy[:3]), on_body.truth)
+        assert row["n_missing"] == 0 and row["max_tip_error_mm"] < 1e-10
+
+
 @pytest.fixture(scope="module", params=[1e3, np.inf], ids=["elastic", "rigid"])
-def case(request: pytest.FixtureRequest) -> DiscCase:
-    return DiscCase.of(scene(request.param), PATTERNS)
+def case(request: pytest.FixtureRequest) -> ContactCase:
+    return ContactCase.of(scene(request.param), PATTERNS)
 
 
-def test_every_method_finds_the_states(case: DiscCase, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_method_finds_the_states(case: ContactCase, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dpgcli.benchmark.contacts.BATCH", 6)
     assert (case.truth.is_minimum & case.truth.in_pattern).all()
     methods = list(case.methods())
@@ -43,21 +62,21 @@ def test_every_method_finds_the_states(case: DiscCase, monkeypatch: pytest.Monke
         assert row["max_tip_error_mm"] < largest, method.name
 
 
-def test_the_disc_is_touched(case: DiscCase) -> None:
+def test_the_disc_is_touched(case: ContactCase) -> None:
     """Else nothing but free states would be compared."""
-    free = DiscCase.of(replace(case.scene, body=replace(DISC, radius=0.1)), PATTERNS)
+    free = ContactCase.of(replace(case.scene, body=replace(DISC, radius=0.1)), PATTERNS)
     moved = np.hypot(*(free.truth.pose - case.truth.pose)[:2].astype(float))
     assert (moved[:2] > 0.1).all()
 
 
-def test_a_minimum_elsewhere_is_not_found(case: DiscCase) -> None:
+def test_a_minimum_elsewhere_is_not_found(case: ContactCase) -> None:
     away = replace(case.truth, pose=case.truth.pose + np.array([[0.36], [0.0], [0.0]]))
     elsewhere = replace(case, truth=away)
     (method,) = [m for m in elsewhere.methods() if m.name == "SciPy SLSQP"]
     assert np.isnan(method.run().pose).all()
 
 
-def test_slopes_and_bends_are_those_of_energy_and_gaps(case: DiscCase) -> None:
+def test_slopes_and_bends_are_those_of_energy_and_gaps(case: ContactCase) -> None:
     problem = Problem.of(case.scene)
     size = problem.coordinates.size
     random = np.random.default_rng(1)
@@ -78,15 +97,19 @@ def test_slopes_and_bends_are_those_of_energy_and_gaps(case: DiscCase) -> None:
         np.testing.assert_allclose(by_steps, own, rtol=1e-7, atol=1e-9)
 
 
-def test_only_a_disc_that_can_be_met_is_measured() -> None:
-    assert meets_disc(scene())
-    assert not meets_disc(scene(body=None))
-    assert not meets_disc(scene(layer_thickness=None))
-    assert not meets_disc(scene(body=Disc(np.array([2.0, 20.0]), 5.0)))
-    assert not meets_disc(scene(body=Jaws(np.array([30.0, 0.0]), 10.0, 20.0)))
+def test_only_a_body_that_can_be_met_is_measured() -> None:
+    assert meets_body(scene())
+    assert not meets_body(scene(body=None))
+    assert not meets_body(scene(layer_thickness=None))
+    assert not meets_body(scene(body=Disc(np.array([2.0, 20.0]), 5.0)))
+    assert meets_body(scene(body=JAWS))
+    assert not meets_body(scene(body=replace(JAWS, stiffness=1.0)))
+    assert meets_body(scene(body=WEDGE))
+    notched = np.array([[-8.0, 8.0, 2.0, 8.0, -8.0], [-9.0, -9.0, 0.0, 9.0, 9.0]])
+    assert not meets_body(scene(body=Polygon(np.array([25.0, 0.0]), notched)))
 
 
-def test_bench_measures_them_where_a_spec_has_a_disc(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_measures_them_where_a_spec_has_a_body(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dpgcli.benchmark.contacts.BATCH", 6)
     rows = list(Bench(scene(np.inf), 1)._contacts(PATTERNS))
     assert [row["group"] for row in rows] == ["contact"] * 4
