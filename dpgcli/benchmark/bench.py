@@ -47,7 +47,7 @@ from dpgcli.temporary import temporary_folder
 
 MOST_STATES, MOST_UNITS_SOLVED = 32, 320  # by the reference, which takes its time
 PEER_STATES, MANY_UNITS = 8, 5  # states, fewer for longer fingers
-TOUCHING_STATES = 8  # of those against a disc
+TOUCHING_STATES = 8  # of those against a body
 BATCH = 4096  # states of a call, as in a sweep
 GROWTH_UNITS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)
 TABLE_UNITS = 20  # of a finger all of whose states go into a Parquet file

@@ -32,7 +32,7 @@ GROUPS = {
     "one finger": "The same, for the states of this finger alone",
     "peer": "What one would do instead, state by state",
     "pressure": "The pressure at which the straight finger first snaps",
-    "contact": "The states against the spec's disc",
+    "contact": "The states against the spec's body",
     "model": "The lattice against the data given",
     "units": "All 2^n states of longer fingers",
     "designs": "Many designs at once",

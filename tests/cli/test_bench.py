@@ -44,7 +44,7 @@ def test_a_spec_with_a_disc_has_its_states(call: Any, monkeypatch: pytest.Monkey
     disc = ("-s", "object={disc: {diameter_mm: 16}, at_mm: [25, -14]}")
     result = call(*BENCH, *disc)
     assert result.exit_code == ExitCode.DONE
-    _, _, table = result.stdout.partition("The states against the spec's disc\n\n")
+    _, _, table = result.stdout.partition("The states against the spec's body\n\n")
     heads, *lines = table.split("\n\n")[0].splitlines()
     assert heads.split()[:3] == ["method", "certified", "n_missing"]
     assert [line.split("  ")[0] for line in lines] == [

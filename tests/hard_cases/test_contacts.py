@@ -10,6 +10,7 @@ from dpgcli.hard_cases.cases import Case, built_in_cases
 from dpgcli.hard_cases.outcomes import Answer, Touch, Verdict
 from dpgcli.hard_cases.table import rows, summarized
 from dpgcli.hard_cases.verdicts import answered, judged, stress
+from dpgcli.reference.bodies import RoundBody, StraightBody
 from dpgcli.states.certify import Status
 
 
@@ -125,16 +126,63 @@ def test_a_disc_that_grazes_two_phalanges_pushes_one_or_none(
 
 def test_the_family_is_what_the_manual_says(built_in: dict[str, Case]) -> None:
     variants = [case.variant for case in built_in.values()]
-    discs = [variant.disc for variant in variants]
+    bodies = [variant.body for variant in variants if variant.body is not None]
     assert {case.formulation for case in built_in.values()} == {"chain"}
-    diameters = {2.0 * disc.radius for disc in discs if disc is not None}
+    diameters = {2.0 * body.radius for body in bodies if isinstance(body, RoundBody)}
     assert (min(diameters), max(diameters)) == (1.0, 500.0)
+    straight = [body for body in bodies if isinstance(body, StraightBody)]
+    sizes = [np.ptp(np.array(body.corners), axis=0).max() for body in straight]
+    assert min(sizes) < 1.2 and max(sizes) > 500.0, "mm"
+    yields = {body.stiffness for body in straight}
+    assert np.inf in yields and (min(yields), max(yields - {np.inf})) == (1e-6, 1e9)
+    n_jaws = sum("jaws" in label for label in built_in)
+    assert (len(bodies) - len(straight), len(straight) - n_jaws, n_jaws) == (128, 112, 18)
     fingers = [variant.finger for variant in variants]
     ratios = {float(f.linear_stiffness.max() / f.bistable_stiffness.max()) for f in fingers}
     assert np.inf in ratios
     assert (min(ratios), max(ratios - {np.inf})) == pytest.approx((1.0, 1e15))
-    for words in ("clamp", "tip", "between", "held by", "walls", "away"):
+    for words in ("clamp", "tip", "between", "held by", "walls", "away", "wedge", "block"):
         assert any(words in label for label in built_in)
+
+
+@pytest.mark.parametrize(
+    ("label", "n_pushes"),
+    [
+        ("plate held by phalanx 2 at both ends, 5 mm, 0.1 mm deep, k_L/k_b = 1e+15", 2),
+        ("plate held by phalanx 3 and its tip, 5 mm, 1e-09 mm deep, k_L = ∞", 2),
+        ("plate along phalanx 2, 8 mm, 1e-09 mm deep, k_L = ∞", 1),
+        ("wedge next to the clamp, 4 mm, 0.001 mm deep, k_L/k_b = 1e3", 1),
+        ("block below the tip, 500 mm, 0.1 mm deep, k_L = ∞", 1),
+        ("jaws below the tip, 12 mm, 0.1 mm deep, 1e-06 N/mm, k_L = ∞", 1),
+        ("jaws below the tip, 12 mm, 1 mm deep, 1e+09 N/mm, k_L/k_b = 1e3", 1),
+    ],
+)
+def test_straight_sides_and_jaws_are_right(
+    built_in: dict[str, Case], label: str, n_pushes: int
+) -> None:
+    case = built_in[label]
+    answer = answered(case)
+    outcome = judged(case, answer)
+    assert outcome.verdict is Verdict.RIGHT and answer.touch is not None
+    assert len(answer.touch.push) == n_pushes and (answer.touch.push > 0.0).all()
+    assert outcome.true_tip_error < 1e-11 and outcome.true_force_error < 1e-12
+
+
+def test_jaws_that_have_yielded_less_are_penetrated(built_in: dict[str, Case]) -> None:
+    case = built_in["jaws below the tip, 12 mm, 0.1 mm deep, 1 N/mm, k_L = ∞"]
+    answer = answered(case)
+    assert answer.touch is not None and answer.touch.yielded > 0.01, "mm"
+    for by, verdict in ((0.5e-9, Verdict.RIGHT), (2e-9, Verdict.WRONG)):
+        less = replace(answer.touch, yielded=answer.touch.yielded - by)
+        assert judged(case, replace(answer, touch=less)).verdict is verdict
+
+
+def test_a_push_on_jaws_that_is_off_is_overconfident(built_in: dict[str, Case]) -> None:
+    case = built_in["jaws below the tip, 12 mm, 0.1 mm deep, 1 N/mm, k_L = ∞"]
+    answer = answered(case)
+    assert answer.touch is not None
+    off = replace(answer.touch, push=answer.touch.push + 1.1e-9)
+    assert judged(case, replace(answer, touch=off)).verdict is Verdict.OVERCONFIDENT
 
 
 def test_tables_have_the_error_of_pushes_and_of_nothing_else(held: Case) -> None:
