@@ -117,6 +117,9 @@ def _let_go(
     status = np.where(is_lost, np.uint8(lost), status)
     is_beyond = _are_beyond(motion, gone.shapes.coordinates[own.n_own :])
     status = np.where((status == Status.STABLE) & is_beyond, np.uint8(Status.BEYOND_TABLE), status)
+    if closing is None:  # of bodies that have got away there is where they were let go of
+        away = np.flatnonzero(status == Status.NOT_HELD)
+        gone.shapes.put(away, start.take_lanes(away))
     fingers = described(own, codes, gone, status, with_margins=with_margins)
     events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
     told = zip(fingers, events, strict=True)

@@ -51,10 +51,11 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             _draw_body(axes, found.body, bodies[row])
             for finger in fingers:
                 draw_finger(axes, finger, POINTS / scale)
-            if fingers:
+            status = Status(rows["status"][row])
+            if status is Status.STABLE:
                 _draw_forces(axes, found, row, LONGEST * max(window.size) / (largest or 1.0))
             else:
-                word = Status(rows["status"][row]).text.replace("_", "\n", 1)
+                word = status.text.replace("_", "\n", 1)
                 middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
                 axes.text(0.5, 0.5, word, color=WORD, style="italic", **middle)
         foot.draw(figure, window, grid)
@@ -86,8 +87,12 @@ def _draw_body(axes: Any, body: Body, around: Points) -> None:
 
 
 def _fingers(found: Grasps, profile: Profile, row: int, rows: Columns) -> tuple[FingerShape, ...]:
-    """The shapes of a row's fingers; none without an answer."""
-    if rows["status"][row] != Status.STABLE:
+    """The shapes of a row's fingers; none without an answer.
+
+    Where the body gets away they are as they were when it was let go of.
+    """
+    is_let_go = rows["status"][row] == Status.NOT_HELD and found.closing is None
+    if rows["status"][row] != Status.STABLE and not is_let_go:
         return ()
     taken = [(frame, *found.take(place, row)) for place, frame in enumerate(found.frames)]
     return tuple(_shape(found, profile, frame, own, lane) for frame, own, lane in taken)

@@ -314,3 +314,17 @@ def test_soft_fingers_touch_as_stiff_ones_do(held: Held, reference_finger: Finge
     )
     assert stiff["n_contacts"].tolist() == other["n_contacts"].tolist() != [0]
     assert other["squeeze_N"] == pytest.approx(1e-12 * stiff["squeeze_N"], rel=1e-9)
+
+
+def test_fingers_of_a_body_that_gets_away_are_where_it_was_let_go_of(
+    reference_finger: Fingers,
+) -> None:
+    """For pictures: as those about a body that stays."""
+    scene, pairs = gripper_of(reference_finger(5)), ("00000/00000", "00001/00001")
+    free, fixed = (grasped(scene, CAN, held, *pairs) for held in (Held.FREE, Held.FIXED))
+    assert grasp_rows(free)["status"].tolist() == [Status.NOT_HELD, Status.STABLE]
+    for finger in range(2):
+        (gone, own), (stays, lane) = free.take(finger, 0), fixed.take(finger, 0)
+        for at, expected in zip(gone.nodes, stays.nodes, strict=True):
+            assert at[:, own] == pytest.approx(expected[:, lane], abs=1e-9)
+    assert not np.allclose(free.fingers[0].face[..., 1], fixed.fingers[0].face[..., 1], atol=1e-3)
