@@ -199,8 +199,9 @@ def grasp(
 
     `object` is such as "disc:40", a disc of 40 mm, "jaws:30x40", two plates of 40 mm with a gap of
     30 mm, or the name of a YAML file; `at` is its place (mm) in the gripper's frame. They are those
-    of the spec's `object` unless given. Patterns are globs such as "111*", or a pair of them
-    for the upper and the lower finger, "111*/11100"; with `both` every pattern meets every other.
+    of the spec's `object` unless given; beside an `object` settings such as object.held are its.
+    Patterns are globs such as "111*", or a pair of them for the upper and the lower finger,
+    "111*/11100"; with `both` every pattern meets every other.
     With the `approach` "place" the body grows from nothing at its place, with "insert" it comes in
     along −x from beyond the fingers, and with "close" the fingers then go through pressures, as
     `actuate` takes them, until there is none; in the end the body is let go of, if the spec says
