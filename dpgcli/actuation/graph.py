@@ -80,7 +80,7 @@ def reachable(
     """
     n_units, n_designs = pressed.finger.n_units, len(reach)
     begin = np.zeros(n_designs, np.uint64) if start is None else start
-    design = np.flatnonzero(_is_state(pressed, np.arange(n_designs), begin))
+    design = np.flatnonzero(are_states(pressed, np.arange(n_designs), begin))
     states = [(design, begin[design])]
     is_known = np.zeros(n_designs << n_units, bool)
     parts, n_lost, n_unknown = [_no_pulses()], 0, 0
@@ -107,7 +107,7 @@ def stable_states(pressed: Pressed, n_designs: int) -> Flags:
     found = []
     for key in chunks(n_designs << n_units, lanes_at_once(n_units)):
         design, code = _of_keys(key.astype(np.int64), n_units)
-        found.append(_is_state(pressed, design, code))
+        found.append(are_states(pressed, design, code))
     return np.concatenate(found).reshape(n_designs, -1)
 
 
@@ -170,7 +170,8 @@ def _no_pulses() -> Pulses:
     return Pulses(nothing, codes, nothing, nothing, free, free, codes, np.zeros(0, bool))
 
 
-def _is_state(pressed: Pressed, design: Indices, code: Codes) -> Flags:
+def are_states(pressed: Pressed, design: Indices, code: Codes) -> Flags:
+    """Which patterns of designs are certified stable states without pressure, (lane,)."""
     inverted = inverted_units(code, pressed.finger.n_units)
     _, settled = at_rest(pressed.take_lanes(design), inverted)
     return np.asarray(settled.status == Status.STABLE)

@@ -98,18 +98,27 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     >>> [Departure(code).name for code in rows.outcome]
     ['LEAVES', 'STAYS', 'STAYS', 'LEAVES']
     """
-    n_units = pressed.finger.n_units
     reach = thresholds_alone(pressed).reach
     is_stable = stable_states(pressed, 1)
     code = np.flatnonzero(is_stable[0]).astype(np.uint64)
     directions = Directions.of(np.zeros(len(code), np.int64), code, int(line_of.max()) + 1)
-    parts = [_first(pressed, line_of, reach, part) for part in directions.chunks(n_units)]
-    transitions = Transitions.joined([_none(), *parts])
+    transitions = first_flips(pressed, line_of, reach, directions)
     leads = transitions.take(np.flatnonzero(transitions.outcome == Departure.LEAVES))
     known = leads.code.astype(np.int64), leads.after.astype(np.int64)
     reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
     n_unknown = int(reached.n_unknown[0])
     return StateGraph(transitions, is_stable[0], reached.is_reached[0], n_unknown, float(reach[0]))
+
+
+def first_flips(
+    pressed: Pressed, line_of: Indices, reach: Array, directions: Directions
+) -> Transitions:
+    """What first happens to states, all certified, in these directions, in their order.
+
+    `reach` (design,) is how far pressures go, MPa.
+    """
+    parts = directions.chunks(pressed.finger.n_units)
+    return Transitions.joined([_none(), *(_first(pressed, line_of, reach, p) for p in parts)])
 
 
 def _none() -> Transitions:

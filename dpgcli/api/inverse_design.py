@@ -6,12 +6,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dpgcli.api.given import GoalInput, goal_input
 from dpgcli.api.inputs import Settings, check_flags, check_numbers, check_whole, path_of
+from dpgcli.api.reached import reached
 from dpgcli.api.tables import Table
-from dpgcli.arrays import Array, Columns, keep_freed_memory
+from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import doubts_about
 from dpgcli.design.scene import Scene
@@ -19,20 +18,14 @@ from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
-from dpgcli.search.goal import Goal, state_quantities
-from dpgcli.search.maps import map_columns
 from dpgcli.search.search import Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
-from dpgcli.search.targets import TargetEvaluation, reason_against
+from dpgcli.search.targets import reason_against
 from dpgcli.search.unmet import how_slopes_are_found
 from dpgcli.states.columns import Column
-from dpgcli.states.patterns import inverted_units, texts
-from dpgcli.states.plan import Request
-from dpgcli.states.predict import predict
 from dpgcli.text import counted, enumerated
 
-AGREEMENT = 1e-9  # of a number: a design's, and that of predict from its spec
-OVERLAP, MOST_NAMED = "fingers_overlap", 3
+MOST_NAMED = 3  # designs in a line
 
 
 @dataclass(frozen=True)
@@ -110,7 +103,7 @@ class InverseDesignResult:
 
     @property
     def _tables(self) -> GoalTables:
-        return tables_of(self.given.goal)
+        return GoalTables(self.given.goal)
 
     def save(self, folder: str | Path) -> None:
         """Write the designs, the trace and a spec for each design into a folder.
@@ -177,16 +170,10 @@ def inverse_design(
     return found
 
 
-def tables_of(goal: Goal) -> GoalTables:
-    """The columns of a goal's tables."""
-    longest = int(max(goal.lists.get(UNITS, (goal.base.units,))))
-    return GoalTables(goal, state_quantities(longest, is_gripper=bool(goal.base.gripper)))
-
-
 def _doubts(tables: GoalTables, scene: Scene) -> list[str]:
     """Why no design should be chosen by what a goal asks for, in a line for each reason."""
     known = {trust.output: trust for trust in scene.trusts}
-    asked = [tables.quantities[name] for name in TargetEvaluation(tables.goal).names]
+    asked = tables.quantities.values()
     trusts = {
         column.name: [known[output] for output in column.outputs if output in known]
         for column in (*asked, *tables.map_columns)
@@ -209,7 +196,7 @@ def found_for(
         raise UsageError(Field("evaluations"), f" {evaluations}: expected 1 design or more")
     if budget is not None and not 0.0 < budget < float("inf"):
         raise UsageError(Field("budget"), f" {budget:g}: expected a time > 0 s")
-    if strict and (doubts := _doubts(tables_of(given.goal), scene_of(given.base))):
+    if strict and (doubts := _doubts(GoalTables(given.goal), scene_of(given.base))):
         lines = (part for doubt in doubts for part in ("\n", doubt))
         raise UsageError(Field("strict"), " allows no goal about what is doubted:", *lines)
     keep_freed_memory()
@@ -226,47 +213,10 @@ def found_for(
         {key: _plain(key, column[k]) for key, column in values.items()} for k in range(len(best))
     ]
     specs = tuple(design_spec(given.base_document, own) for own in designs)
-    reached = tuple(_reached(given, spec, searched, k) for k, spec in enumerate(specs))
-    return InverseDesignResult(given, searched, specs, reached)
+    found = tuple(reached(given.goal, spec, best, k) for k, spec in enumerate(specs))
+    return InverseDesignResult(given, searched, specs, found)
 
 
 def _plain(key: str, value: Any) -> float | int:
     """A value as a spec has it: numbers of units are whole."""
     return int(value) if key == UNITS else float(value)
-
-
-def _reached(given: GoalFile, spec: Spec, searched: Searched, place: int) -> Reached:
-    """What predict finds for a spec; it has to be what the search found."""
-    goal, best = given.goal, searched.best
-    codes = best.codes[:, place]
-    patterns = tuple(texts(inverted_units(codes, spec.finger.units)).astype(str).tolist())
-    names = TargetEvaluation(goal).names
-    values: tuple[tuple[float, ...], ...] = ()
-    overlapping: tuple[str, ...] = ()
-    if goal.targets:
-        of_pair = (OVERLAP,) if spec.gripper is not None else ()
-        request = Request(tuple(dict.fromkeys(patterns)), ("status", *of_pair, *names))
-        rows = predict(scene_of(spec), request).arrays()
-        index = {pattern: row for row, pattern in enumerate(rows["pattern"].tolist())}
-        values = tuple(
-            tuple(float(rows[name][index[pattern]]) for name in target.columns)
-            for target, pattern in zip(goal.targets, patterns, strict=True)
-        )
-        if of_pair:
-            overlapping = tuple(own for own, row in index.items() if rows[OVERLAP][row])
-        told = np.concatenate(values)
-        tolerances = np.repeat([t.tolerance for t in goal.targets], [len(v) for v in values])
-        asked = np.concatenate([target.values for target in goal.targets])
-        _check_agreement(told, asked + best.residuals.values[:, place] * tolerances)
-    units = {UNITS: np.array([spec.finger.units])}
-    columns = map_columns(spec.design, [*best.columns], units) if best.columns else {}
-    for name, column in columns.items():
-        _check_agreement(column, best.columns[name][[place]])
-    single = {name: column[0].item() for name, column in columns.items()}
-    return Reached(patterns, values, single, overlapping)
-
-
-def _check_agreement(told: Array, searched: Array) -> None:
-    """A broken invariant: both are the same states of the same finger."""
-    apart = np.abs(told - searched)
-    assert (apart <= AGREEMENT * np.maximum(1.0, np.abs(told))).all(), "predict finds the same"

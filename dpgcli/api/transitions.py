@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.actuation.alone import REACH
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
-from dpgcli.actuation.transition_table import COLUMNS, transition_rows
+from dpgcli.actuation.transition_table import COLUMNS, REACHABLE, transition_rows
 from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
 from dpgcli.api.predict import MOST_DRAWN
@@ -22,7 +22,7 @@ from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column, Kind
+from dpgcli.states.columns import Column
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
@@ -36,7 +36,6 @@ MOST_UNITS = 16  # minutes of work
 MOST_SCATTERED = 2_000_000  # thresholds: minutes of work, too
 MOST_NAMED = 16  # states in a line of the summary
 OF_STATES = ("pattern", "status", "energy_mJ", "tip_x_mm", "tip_y_mm", "tip_angle_rad")
-REACHABLE = Column("reachable", "", "whether pulses lead to it from rest", kind=Kind.FLAG)
 
 
 @dataclass(frozen=True)

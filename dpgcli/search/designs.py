@@ -62,9 +62,7 @@ class Designs:
 
     def misses(self, goal: Goal) -> Array:
         """By how many tolerances each target is missed, (target, design)."""
-        ends = np.cumsum([len(target.values) for target in goal.targets])[:-1]
-        parts = np.split(self.residuals.values, ends) if goal.targets else []
-        found = [np.sqrt((part**2).sum(axis=0)) for part in parts]
+        found = [np.sqrt((self.residuals.values[part] ** 2).sum(axis=0)) for part in goal.parts]
         return np.array(found).reshape(len(goal.targets), len(self))
 
     @property

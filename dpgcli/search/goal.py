@@ -2,27 +2,18 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import product
+from functools import cached_property
+from itertools import pairwise, product
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.design.dimensions import Design
-from dpgcli.mechanics.terms import LOAD
-from dpgcli.states.columns import Kind
-from dpgcli.states.quantities import Quantity, declared
 from dpgcli.sweeps.expressions import Expression
 
 TIP = "tip"
 OF_TIP = ("tip_x_mm", "tip_y_mm")
-KINDS = ("bistable", "wall", "hinge", "bar", LOAD)
 Choice = Mapping[str, float]  # a value for each key that has a list of them
-
-
-def state_quantities(n_units: int, *, is_gripper: bool) -> dict[str, Quantity]:
-    """The quantities of states that can be targets, by name: numbers that show the model's."""
-    every = declared(n_units, KINDS, is_gripper)
-    return {q.name: q for q in every if q.kind is Kind.NUMBER and q.outputs}
 
 
 def suffix_of(unit: str) -> str:
@@ -53,7 +44,8 @@ class Target:
     """What a quantity of a state should be, to within a tolerance in the quantity's unit.
 
     One of the states that match the `pattern` has to meet it. `quantity` is a column of states, or
-    the tip, whose place has two parts and is missed by its distance.
+    the tip, whose place has two parts and is missed by its distance. Without a pattern it is a
+    column of whole designs.
     """
 
     pattern: str
@@ -69,7 +61,7 @@ class Target:
     @property
     def text(self) -> str:
         """What is asked for, in words."""
-        return f"{self.quantity} of {self.pattern}"
+        return f"{self.quantity} of {self.pattern}" if self.pattern else self.quantity
 
 
 @dataclass(frozen=True)
@@ -97,6 +89,17 @@ class Goal:
     constraints: tuple[Expression, ...] = ()
     objectives: tuple[Objective, ...] = ()
     known: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def of_states(self) -> tuple[Target, ...]:
+        """The targets that are about states."""
+        return tuple(target for target in self.targets if target.pattern)
+
+    @cached_property
+    def parts(self) -> tuple[slice, ...]:
+        """The rows of each target among those of the numbers that all targets ask for."""
+        ends = np.cumsum([0, *(len(target.values) for target in self.targets)]).tolist()
+        return tuple(slice(*pair) for pair in pairwise(ends))
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ A map is all states of a design, as `sweep` computes it. Slopes by the ranges ar
 differences, all in one batch: extremes of maps have no others where two states change places.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,10 +13,10 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.dimensions import Design, unit_of
-from dpgcli.search.goal import Goal
-from dpgcli.states.accuracy import DEFAULT_TOLERANCE
+from dpgcli.search.columns import evaluation_of
+from dpgcli.search.goal import Goal, Range
 from dpgcli.states.columns import Column, Group, Kind
-from dpgcli.sweeps.evaluation import VALUE_OF, DesignEvaluation, DesignStatus
+from dpgcli.sweeps.evaluation import VALUE_OF, DesignStatus
 from dpgcli.sweeps.expressions import Expression, margins
 from dpgcli.sweeps.metrics import METRICS
 
@@ -104,24 +104,50 @@ class MapEvaluation:
 
     def __call__(self, values: Mapping[str, Array]) -> Maps:
         """Objectives, margins and their slopes, of designs with these values by key."""
-        ranges = self.goal.ranges
-        n, k = len(next(iter(values.values()))), len(ranges)
-        stacked = {key: np.tile(column, 2 * k + 1) for key, column in values.items()}
-        for place, each in enumerate(ranges):
-            step = DIFFERENCE * each.width
-            middle = np.clip(values[each.key], each.low + step, each.high - step)
-            first = (2 * place + 1) * n
-            stacked[each.key][first : first + n] = middle - step
-            stacked[each.key][first + n : first + 2 * n] = middle + step
-        columns = self.columns(stacked, self.sloped)
+        k, n = len(self.goal.ranges), len(next(iter(values.values())))
+        columns = self.columns(around(self.goal.ranges, values), self.sloped)
         rooms = self.margins(columns, (2 * k + 1) * n)
         return Maps(*_sloped(self.objectives(columns), k, n), *_sloped(rooms, k, n))
 
 
+def around(ranges: Sequence[Range], values: Mapping[str, Array]) -> dict[str, Array]:
+    """Values by key of designs, and behind them those a little less and more, range by range."""
+    n, k = len(next(iter(values.values()))), len(ranges)
+    stacked = {key: np.tile(column, 2 * k + 1) for key, column in values.items()}
+    for place, each in enumerate(ranges):
+        step = DIFFERENCE * each.width
+        middle = np.clip(values[each.key], each.low + step, each.high - step)
+        first = (2 * place + 1) * n
+        stacked[each.key][first : first + n] = middle - step
+        stacked[each.key][first + n : first + 2 * n] = middle + step
+    return stacked
+
+
 def _sloped(rows: Array, k: int, n: int) -> tuple[Array, Array]:
     """Values (row, design), and slopes (row, range, design), from values around designs."""
-    around = rows[:, n:].reshape(len(rows), k, 2, n)
-    return rows[:, :n], (around[:, :, 1] - around[:, :, 0]) / (2.0 * DIFFERENCE)
+    beside = rows[:, n:].reshape(len(rows), k, 2, n)
+    return rows[:, :n], (beside[:, :, 1] - beside[:, :, 0]) / (2.0 * DIFFERENCE)
+
+
+def sloped_columns(
+    goal: Goal, names: Sequence[str], values: Mapping[str, Array], *, with_slopes: bool = True
+) -> tuple[Array, Array]:
+    """Columns of designs with these values by key, and slopes by the ranges' widths.
+
+    (name, design) and (name, range, design); counts have slopes of zero, as all have without.
+    """
+    k, n = len(goal.ranges), len(next(iter(values.values())))
+    rows, slopes = np.full((len(names), n), np.nan), np.zeros((len(names), k, n))
+    for is_smooth in (True, False):
+        few = [name for name in names if (name not in COUNTS) == is_smooth]
+        own = [names.index(name) for name in few]
+        if few and is_smooth and with_slopes:
+            found = map_columns(goal.base, few, around(goal.ranges, values))
+            rows[own], slopes[own] = _sloped(np.array([found[name] for name in few]), k, n)
+        elif few:
+            found = map_columns(goal.base, few, values)
+            rows[own] = [found[name] for name in few]
+    return rows, slopes
 
 
 def map_columns(
@@ -143,12 +169,3 @@ def map_columns(
     stable, partly, *_ = (status.encode() for status in DesignStatus)
     is_there = (rows["status"] == stable) | (rows["status"] == partly)
     return {name: np.where(is_there, rows[name], np.nan) for name in names}
-
-
-def evaluation_of(base: Design, values: Mapping[str, Column]) -> DesignEvaluation:
-    """That of a sweep around a base, over values that keys can have."""
-    return DesignEvaluation(base, {}, _is_possible, values, (), DEFAULT_TOLERANCE)
-
-
-def _is_possible(values: Mapping[str, float]) -> str:
-    raise ValueError(f"ranges and lists have values that keys can have: {values}")

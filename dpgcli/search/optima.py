@@ -61,10 +61,9 @@ class Optima:
                 objective_slopes=(slopes * residuals[:, None]).sum(axis=0)[None],
             )
         elif goal.targets:
-            ends = np.cumsum([len(target.values) for target in goal.targets])[:-1]
-            rooms = [1.0 - (part**2).sum(axis=0) for part in np.split(residuals, ends)]
-            products = np.split(-2.0 * slopes * residuals[:, None], ends)
-            ways = [part.sum(axis=0) for part in products]
+            rooms = [1.0 - (residuals[part] ** 2).sum(axis=0) for part in goal.parts]
+            products = -2.0 * slopes * residuals[:, None]
+            ways = [products[part].sum(axis=0) for part in goal.parts]
             maps = maps._replace(
                 margins=np.concatenate((maps.margins, rooms)),
                 margin_slopes=np.concatenate((maps.margin_slopes, ways)),

@@ -1,18 +1,20 @@
 """Tables of a search: the designs found, and the steps of every search."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.dimensions import UNITS, unit_of
+from dpgcli.search.columns import plain, renamed
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal, Target, suffix_of
 from dpgcli.search.maps import MapEvaluation
+from dpgcli.search.targets import TargetEvaluation
 from dpgcli.search.unmet import Standing
 from dpgcli.states.columns import Column, Kind
-from dpgcli.states.quantities import Quantity
 from dpgcli.sweeps.evaluation import VALUE_OF, short_names
 from dpgcli.sweeps.metrics import METRICS
 
@@ -22,6 +24,7 @@ MEETS = Column(
     "meets_all", "", "each target is met within its tolerance, constraints hold", kind=Kind.FLAG
 )
 ACTIVE = Column("active", "", "bounds and constraints that hold it back", kind=Kind.TEXT)
+DTYPES: Mapping[Kind, type] = {Kind.COUNT: np.int64, Kind.FLAG: np.bool_}
 PLACE = (
     Column("search", "", "number of the search", kind=Kind.COUNT),
     Column("step", "", "its steps so far", kind=Kind.COUNT),
@@ -32,7 +35,8 @@ PLACE = (
 class Reached:
     """What a design comes to: for each target the nearest state and its quantities; columns.
 
-    Those in `overlapping` are the states of targets in which the fingers of a gripper overlap.
+    Targets about designs have no state. Those in `overlapping` are the states of targets in which
+    the fingers of a gripper overlap.
     """
 
     patterns: tuple[str, ...]
@@ -49,10 +53,14 @@ class Reached:
 
 @dataclass(frozen=True)
 class GoalTables:
-    """The columns and rows of a goal's tables; `quantities` are those of states, by name."""
+    """The columns and rows of a goal's tables."""
 
     goal: Goal
-    quantities: Mapping[str, Quantity]
+
+    @cached_property
+    def quantities(self) -> Mapping[str, Column]:
+        """The columns that targets are about, by name."""
+        return TargetEvaluation(self.goal).columns
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -76,7 +84,7 @@ class GoalTables:
     def map_columns(self) -> tuple[Column, ...]:
         """The columns of designs that constraints and objectives are about."""
         names = MapEvaluation(self.goal).names
-        return tuple(_plain(metric) for metric in METRICS if metric.name in names)
+        return tuple(plain(metric) for metric in METRICS if metric.name in names)
 
     @property
     def trace_columns(self) -> tuple[Column, ...]:
@@ -105,10 +113,11 @@ class GoalTables:
     def _of_targets(self) -> Iterator[Column]:
         for number, target in enumerate(self.goal.targets, start=1):
             head, quantities = f"target_{number}", [self.quantities[n] for n in target.columns]
-            what = f"the state of {target.pattern} that is nearest"
-            yield Column(f"{head}_pattern", "", what, kind=Kind.PATTERN)
+            if target.pattern:
+                what = f"the state of {target.pattern} that is nearest"
+                yield Column(f"{head}_pattern", "", what, kind=Kind.PATTERN)
             for quantity in quantities:
-                yield replace(_plain(quantity), name=f"{head}_{quantity.name}")
+                yield renamed(quantity, f"{head}_{quantity.name}")
             unit, outputs = quantities[0].unit, quantities[0].outputs
             missed = f"{head}_miss{suffix_of(unit)}"
             yield Column(missed, unit, "by how much it is missed", outputs=outputs)
@@ -122,17 +131,20 @@ class GoalTables:
         rows: Columns = {"design": np.arange(1, n + 1)}
         rows |= {name: values[key] for key, name in short_names(goal.keys).items()}
         for column in self.map_columns:
-            kind = np.int64 if column.kind is Kind.COUNT else np.float64
+            kind = DTYPES.get(column.kind, np.float64)
             rows[column.name] = np.array([each.columns[column.name] for each in reached], kind)
         rows["misfit"] = np.sqrt(((misses / tolerances) ** 2).sum(axis=1))
         is_met = (misses <= tolerances).all(axis=1)
         rows["meets_all"] = np.asarray(is_met & designs.hold.all(axis=0))
         told = iter(self._of_targets())
         for place, target in enumerate(goal.targets):
-            patterns = [each.patterns[place].encode() for each in reached]
-            rows[next(told).name] = np.array(patterns, f"S{max(map(len, patterns), default=1)}")
+            if target.pattern:
+                patterns = [each.patterns[place].encode() for each in reached]
+                rows[next(told).name] = np.array(patterns, f"S{max(map(len, patterns), default=1)}")
             for part in range(len(target.values)):
-                rows[next(told).name] = np.array([each.values[place][part] for each in reached])
+                column = next(told)
+                told_of = [each.values[place][part] for each in reached]
+                rows[column.name] = np.array(told_of, DTYPES.get(column.kind, np.float64))
             rows[next(told).name] = misses[:, place]
         standings = [self.standing(designs, place) for place in range(n)]
         rows["active"] = np.array([each.active for each in standings], np.str_)
@@ -141,8 +153,3 @@ class GoalTables:
     def standing(self, designs: Designs, place: int) -> Standing:
         """How one of the designs stands."""
         return Standing(self.goal, designs.take(np.array([place])), self.units)
-
-
-def _plain(column: Column) -> Column:
-    kind = column.kind
-    return Column(column.name, column.unit, column.description, kind=kind, outputs=column.outputs)

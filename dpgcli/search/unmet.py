@@ -91,10 +91,8 @@ class Standing:
 
     def _targets(self) -> Iterator[Wish]:
         residuals, slopes = self.design.residuals
-        first = 0
-        for number, target in enumerate(self.goal.targets):
-            part = slice(first, first + len(target.values))
-            first = part.stop
+        pairs = zip(self.goal.targets, self.goal.parts, strict=True)
+        for number, (target, part) in enumerate(pairs):
             size = float(np.linalg.norm(residuals[part, 0]))
             way = (slopes[part, :, 0] * residuals[part, :1]).sum(axis=0) / max(size, 1e-300)
             name, miss = f"target {number + 1} ({target.text})", size * target.tolerance
@@ -158,9 +156,10 @@ class Standing:
 def how_slopes_are_found(goal: Goal) -> Iterator[str]:
     """Which slopes are not exact, and what has none."""
     maps = MapEvaluation(goal)
-    names = [*TargetEvaluation(goal).by_differences, *sorted(maps.sloped - COUNTS)]
-    if names:
+    targets = TargetEvaluation(goal)
+    names = [*targets.by_differences, *sorted(maps.sloped - COUNTS)]
+    if names := [*dict.fromkeys(names)]:
         yield f"slopes of {enumerated(names)} by central differences: there are no exact ones"
-    if counts := sorted(maps.names & COUNTS):
-        kept = "searches do not follow counts, but stay where these hold"
+    if counts := sorted({*targets.stepwise, *(maps.names & COUNTS)}):
+        kept = "searches do not follow what changes in steps, but stay where it holds"
         yield f"{enumerated(counts)}: {kept}"

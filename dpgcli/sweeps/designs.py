@@ -60,7 +60,7 @@ def design_states(
             has_bars=not exactness.drops_bars,
         )
         found = solved_rows(units_of(units, lanes), inverted, request)
-        return found | _with_body(scene, units, around, lanes, np.tile(codes, len(designs)))
+        return found | with_body(scene, units, around, lanes, np.tile(codes, len(designs)))
 
     n_units = units.finger.n_units
     size = lanes_at_once(n_units)
@@ -80,7 +80,7 @@ def design_states(
             yield Block(designs, rows, metrics.columns(only) if is_last else None)
 
 
-def _with_body(
+def with_body(
     scene: Scene, units: UnitSolutions, around: Surroundings, lanes: Indices, codes: Codes
 ) -> Columns:
     """What states (lane,) do with the body, none without one."""

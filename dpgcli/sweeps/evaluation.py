@@ -149,29 +149,12 @@ class DesignEvaluation:
                 issues = found.problems.of(index)
                 reasons[int(places[index])] = "; ".join(issue.statement for issue in issues)
             right = np.flatnonzero(~found.are_wrong)
-            obstacle = self._reasons_against_bodies(found, right)
+            obstacle = reasons_against_bodies(found, right)
             reasons |= {int(places[index]): why for index, why in obstacle.items()}
             right = right[~np.isin(right, [*obstacle])]
             origins[places[right]] = found.gravest_origins[right]
             batches += [(places[alike], found.batch(alike)) for alike in found.alike(right)]
         return batches, origins, reasons
-
-    def _reasons_against_bodies(self, found: Resolution, designs: Indices) -> dict[int, str]:
-        """Why fingers of some designs cannot meet their body, by design."""
-        if self.base.body is None or not len(designs):
-            return {}
-        from dpgcli.grasping.frames import begins_in_base
-
-        reasons: dict[int, str] = {}
-        for alike in found.alike(designs):
-            scene = found.batch(alike)
-            if scene.layer_thickness is None:
-                reasons |= dict.fromkeys(alike.tolist(), NO_FACE)
-                continue
-            assert scene.body is not None, "the base has one"
-            begin = begins_in_base(scene, scene.body)
-            reasons |= dict.fromkeys(alike[begin].tolist(), IN_BASE)
-        return reasons
 
     def _are_possible(self, values: DesignValues) -> Flags:
         """Which designs have only values that their keys can have."""
@@ -216,7 +199,7 @@ class DesignEvaluation:
         for places, design in by_units(self.base, values, np.flatnonzero(right)):
             found = resolve(design)
             possible = ~found.are_wrong
-            possible[[*self._reasons_against_bodies(found, np.flatnonzero(possible))]] = False
+            possible[[*reasons_against_bodies(found, np.flatnonzero(possible))]] = False
             right[places] = possible
         return allowed, right
 
@@ -295,6 +278,24 @@ class DesignEvaluation:
         reason[list(reasons)] = texts
         rows["reason"] = reason
         return {column.name: rows[column.name] for column in self.design_columns}
+
+
+def reasons_against_bodies(found: Resolution, designs: Indices) -> dict[int, str]:
+    """Why fingers of some designs cannot meet their body, by design; nothing without a body."""
+    if found.design.body is None or not len(designs):
+        return {}
+    from dpgcli.grasping.frames import begins_in_base
+
+    reasons: dict[int, str] = {}
+    for alike in found.alike(designs):
+        scene = found.batch(alike)
+        if scene.layer_thickness is None:
+            reasons |= dict.fromkeys(alike.tolist(), NO_FACE)
+            continue
+        assert scene.body is not None, "the design has one"
+        begin = begins_in_base(scene, scene.body)
+        reasons |= dict.fromkeys(alike[begin].tolist(), IN_BASE)
+    return reasons
 
 
 def by_units(

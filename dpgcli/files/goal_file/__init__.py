@@ -85,7 +85,7 @@ def goal_in(
     if base_spec is not None:
         units = [int(n) for n in lists.get(UNITS, (base_spec.finger.units,))]
         possible = [n for n in units if 1 <= n <= MAX_UNITS]
-        of_targets = TargetReader(reader, possible, base_spec.gripper is not None)
+        of_targets = TargetReader(reader, possible, base_spec.design)
         targets = [of_targets.target(*pair) for pair in enumerate(_listed(document, "targets"))]
         known = {} if base is None else numbers_of(base.data)
         of_maps = MapReader(reader, base_spec.design, known)

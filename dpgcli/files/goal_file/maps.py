@@ -10,14 +10,11 @@ from typing import Any
 from dpgcli.design.dimensions import Design
 from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.space import SpaceReader
+from dpgcli.search.columns import NUMBERS, design_columns
 from dpgcli.search.goal import Objective
-from dpgcli.search.maps import evaluation_of
-from dpgcli.states.columns import Kind
 from dpgcli.sweeps.expressions import Expression, ExpressionError, contradict, expression
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.text import KeyPath
-
-NUMBERS = (Kind.COUNT, Kind.NUMBER)
 
 
 @dataclass
@@ -31,8 +28,7 @@ class MapReader:
     @cached_property
     def names(self) -> list[str]:
         """Columns that designs have, and keys, by their last part where one key alone has it."""
-        own = {column.name for column in evaluation_of(self.base, {}).design_columns}
-        columns = [m.name for m in METRICS if m.name in own and m.kind in NUMBERS]
+        columns = [*design_columns(self.base)]
         keys = self.space.keys | self.known.keys()
         last = Counter(key.rsplit(".", 1)[-1] for key in keys)
         return [*columns, *sorted(keys), *sorted(n for n, count in last.items() if count == 1)]

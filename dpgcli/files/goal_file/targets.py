@@ -1,32 +1,43 @@
-"""The targets of a goal, read: quantities of states, what they should be, and how exactly."""
+"""The targets of a goal, read: quantities of states or designs, what these should be."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
+from dpgcli.design.dimensions import Design, GivenPressure
+from dpgcli.design.outputs import Output
 from dpgcli.errors import NothingSelectedError, UsageError
 from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.space import SpaceReader
-from dpgcli.search.goal import OF_TIP, TIP, Target, state_quantities, suffix_of
+from dpgcli.search.columns import design_columns, state_columns
+from dpgcli.search.goal import OF_TIP, TIP, Target, suffix_of
+from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import select
+from dpgcli.sweeps.extent import MOST_PRESSED
+from dpgcli.sweeps.grasps import grasp_columns
+from dpgcli.sweeps.metrics import METRICS
 from dpgcli.text import KeyPath, quoted
 
+HALF = 0.5  # the tolerance of what is so or not
 MOST_STATES = 2**12  # of a finger, among which the nearest is looked for
 
 
 @dataclass
 class TargetReader:
-    """Reads targets for fingers of some numbers of units; problems go to those of the space."""
+    """Reads targets around a base, for some numbers of units; problems go to those of the space."""
 
     space: SpaceReader
     n_units: Sequence[int]
-    is_gripper: bool
+    base: Design
 
     def __post_init__(self) -> None:
-        longest = max(self.n_units, default=1)
-        self.columns = state_quantities(longest, is_gripper=self.is_gripper)
+        self.of_states = state_columns(self.base, max(self.n_units, default=1))
+        self.of_designs = design_columns(self.base)
+        self.columns = {**self.of_designs, **self.of_states}
 
     def target(self, place: int, said: Any) -> Target | None:
         """A target, or None with a problem."""
@@ -37,34 +48,66 @@ class TargetReader:
         quantity, n_before = said.get("quantity"), len(self.space.problems)
         if not self._is_known(path, quantity):
             return None
-        tolerance_key = f"tolerance{suffix_of(self._unit(str(quantity)))}"
+        column = self.columns[OF_TIP[0] if quantity == TIP else str(quantity)]
+        is_flag, has_pattern = column.kind is Kind.FLAG, column.name in self.of_states
+        tolerance_key = f"tolerance{suffix_of(column.unit)}"
+        known = ["pattern"] * has_pattern + ["quantity", "value"] + [tolerance_key] * (not is_flag)
         for key in said:
-            if key not in (known := ("pattern", "quantity", "value", tolerance_key)):
+            if key not in known:
                 close = get_close_matches(key, known, n=1)
                 hint = f"did you mean {close[0]}?" if close else f"known here: {', '.join(known)}"
+                if key == "pattern":
+                    hint = f"{quantity} is of whole designs"
                 self.space.wrong((*path, key), "a known key", shown(key), hint)
-        values = self._values(path, said.get("value"), 2 if quantity == TIP else 1)
-        tolerance = said.get(tolerance_key)
+        values = self._values(path, said.get("value"), quantity, is_flag=is_flag)
+        tolerance = HALF if is_flag else said.get(tolerance_key)
         if not (_is_number(tolerance) and float(tolerance or 0.0) > 0.0):
             self.space.wrong((*path, tolerance_key), "a number > 0", shown(tolerance))
-        self._check_pattern((*path, "pattern"), said.get("pattern"))
-        if len(self.space.problems) > n_before:
+        if has_pattern:
+            self._check_pattern((*path, "pattern"), said.get("pattern"))
+        self._check_pressed(path, column)
+        if len(self.space.problems) > n_before or tolerance is None:
             return None
-        return Target(said["pattern"], str(quantity), values, float(said[tolerance_key]))
-
-    def _unit(self, quantity: str) -> str:
-        return self.columns[OF_TIP[0] if quantity == TIP else quantity].unit
+        return Target(said.get("pattern", ""), str(quantity), values, float(tolerance))
 
     def _is_known(self, path: KeyPath, quantity: Any) -> bool:
         known = [TIP, *self.columns]
         if isinstance(quantity, str) and quantity in known:
             return True
         close = get_close_matches(str(quantity), known, n=1, cutoff=0.0)
-        hint = f"the nearest is {close[0]}; dpg help columns"
-        self.space.wrong((*path, "quantity"), "tip, or a column of states", shown(quantity), hint)
+        hint = self._lacking(str(quantity)) or f"the nearest is {close[0]}; dpg help designing"
+        expected = "tip, or a column of states or of designs"
+        self.space.wrong((*path, "quantity"), expected, shown(quantity), hint)
         return False
 
-    def _values(self, path: KeyPath, said: Any, n: int) -> tuple[float, ...]:
+    def _lacking(self, quantity: str) -> str:
+        """Which section the base would need for a quantity to be there."""
+        with_gripper = replace(self.base, gripper={"base_spacing_mm": np.ones(1)})
+        with_pressure = replace(self.base, pressure=self.base.pressure or GivenPressure())
+        of_body = {c.name for c in grasp_columns(is_pair=True, has_friction=True)}
+        of_body |= {metric.name for metric in METRICS if metric.group is Group.GRASP}
+        if quantity in of_body:
+            return "the base has no object" if self.base.body is None else "its object has it not"
+        for section, base in (("gripper", with_gripper), ("pressure", with_pressure)):
+            if quantity in {**state_columns(base, base.units), **design_columns(base)}:
+                return f"the base has no {section}"
+        return ""
+
+    def _check_pressed(self, path: KeyPath, column: Column) -> None:
+        """Note fingers that are too long to be followed under pressure."""
+        longest = max(self.n_units, default=1)
+        if Output.PRESSURES in column.outputs and longest > MOST_PRESSED:
+            expected = f"at most {MOST_PRESSED} units under pressure"
+            self.space.wrong((*path, "quantity"), expected, f"{longest}")
+
+    def _values(
+        self, path: KeyPath, said: Any, quantity: Any, *, is_flag: bool
+    ) -> tuple[float, ...]:
+        if is_flag:
+            if not isinstance(said, bool):
+                self.space.wrong((*path, "value"), "true or false", shown(said))
+            return (float(bool(said)),)
+        n = 2 if quantity == TIP else 1
         values = said if isinstance(said, list) else [said]
         is_right = len(values) == n and (n > 1) == isinstance(said, list)
         if not (is_right and all(map(_is_number, values))):
