@@ -27,6 +27,7 @@ class Designs:
 
     `codes` are the states nearest to the targets, (target, design). `columns` are those of maps
     that matter, `objectives` (objective, design) all to be least, `hold` (constraint, design).
+    `are_finished` where no limit ended the search, (design,).
     """
 
     choice: Mapping[str, Array]
@@ -36,6 +37,7 @@ class Designs:
     columns: Mapping[str, Array]
     objectives: Array
     hold: Flags
+    are_finished: Flags
 
     @classmethod
     def at(cls, goal: Goal, choice: Mapping[str, Array], points: Array) -> "Designs":
@@ -45,12 +47,17 @@ class Designs:
         maps = MapEvaluation(goal)
         n = points.shape[1]
         if not goal.has_maps:
-            nothing = np.zeros((0, n))
-            return cls(choice, points, residuals, codes, {}, nothing, nothing > 0.0)
+            nothing, every = np.zeros((0, n)), np.ones(n, bool)
+            return cls(choice, points, residuals, codes, {}, nothing, nothing > 0.0, every)
         known = maps.columns(values)
         columns = {name: known[name] for name in sorted(maps.names)}
         objectives, hold = maps.objectives(known), maps.hold(known)
-        return cls(choice, points, residuals, codes, columns, objectives, hold)
+        every = np.ones(n, bool)
+        return cls(choice, points, residuals, codes, columns, objectives, hold, every)
+
+    def with_finished(self, are_finished: Flags) -> "Designs":
+        """The same, of searches that a limit ended or not."""
+        return replace(self, are_finished=are_finished)
 
     def __len__(self) -> int:
         return int(self.points.shape[1])
@@ -82,6 +89,7 @@ class Designs:
             columns={name: column[index] for name, column in self.columns.items()},
             objectives=self.objectives[:, index],
             hold=self.hold[:, index],
+            are_finished=self.are_finished[index],
         )
 
     @classmethod
@@ -100,6 +108,7 @@ class Designs:
             {name: last([part.columns[name] for part in parts]) for name in first.columns},
             last([part.objectives for part in parts]),
             last([part.hold for part in parts]),
+            last([part.are_finished for part in parts]),
         )
 
     @property

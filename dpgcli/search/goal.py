@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise, product
+from math import prod
 
 import numpy as np
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Indices
 from dpgcli.design.dimensions import Design
 from dpgcli.sweeps.expressions import Expression
 
@@ -116,10 +117,30 @@ class Goal:
         """How many numbers the targets ask for."""
         return sum(len(target.values) for target in self.targets)
 
+    @property
+    def n_choices(self) -> int:
+        """How many combinations of listed values there are."""
+        return prod(map(len, self.lists.values()))
+
     def choices(self) -> Iterator[Choice]:
         """Every combination of the listed values, the last list fastest."""
         for values in product(*self.lists.values()):
             yield dict(zip(self.lists, values, strict=True))
+
+    def listed(self) -> dict[str, Array]:
+        """The same, as values by key, (choice,)."""
+        every = np.array([*product(*self.lists.values())], float)
+        return dict(zip(self.lists, every.reshape(-1, len(self.lists)).T, strict=True))
+
+    def choice_at(self, places: Indices) -> dict[str, Array]:
+        """Values by key of choices at places in the lists, (list, choice)."""
+        pairs = zip(self.lists.items(), places, strict=True)
+        return {key: np.array(values, float)[place] for (key, values), place in pairs}
+
+    def told(self, objectives: Array) -> dict[str, Array]:
+        """Objectives (objective, design), all to be least, as they are, by name."""
+        pairs = zip(self.objectives, objectives, strict=False)
+        return {each.name: -row if each.is_maximized else row for each, row in pairs}
 
     def values(self, choice: Mapping[str, Array], points: Array) -> dict[str, Array]:
         """Values by key of designs at points (range, design), with listed ones by design."""

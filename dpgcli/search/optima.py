@@ -142,17 +142,18 @@ class Optima:
             self.tell(Asked(n_before + numbers, values, told, self._misfits(found)))
             return found
 
+        are_done = np.ones(len(begin), bool)
         try:
             ends = descend_within(evaluate, begin.points, own, sizes)
         except TimeIsUpError:
-            ends = latest
+            ends, are_done = latest, ~are_done
         if any(rule.names & COUNTS for rule in goal.constraints):
             ends = last_that_hold(
                 lambda points: np.asarray(Designs.at(goal, begin.choice, points).hold.all(axis=0)),
                 begin.points,
                 ends,
             )
-        return Designs.at(goal, begin.choice, ends)
+        return Designs.at(goal, begin.choice, ends).with_finished(are_done)
 
 
 def _size(margins: Array) -> float:

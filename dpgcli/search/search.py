@@ -1,45 +1,64 @@
-"""A search: from random starts for every choice of listed values to the best designs."""
+"""A search: from random starts for every choice of listed values to the best designs.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from time import monotonic
-from typing import TYPE_CHECKING
+It is cut into parts, by choices and sets of starts, each of which any process can do by itself: how
+it is cut depends on the goal and the limits alone, so that who does what changes nothing.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from time import time
 
 import numpy as np
 
-from dpgcli.arrays import Array, Columns, Indices
-from dpgcli.search.descent import Descent, Residuals, Step, descend
+from dpgcli.arrays import Array, Columns
 from dpgcli.search.designs import Designs, best_of
-from dpgcli.search.goal import Choice, Goal
-from dpgcli.search.targets import TargetEvaluation
-
-if TYPE_CHECKING:
-    from dpgcli.search.optima import Asked
+from dpgcli.search.goal import Goal
+from dpgcli.search.part import Clock, Found, Part, searched_part
 
 STARTS = 32  # for each choice of listed values, in each round
+POLISHED_STARTS = 8  # where a population has found a choice
 MOST_LANES = 2**10  # at once
-DRAWS = 8  # of a start, until it is a finger that has the states
+MOST_PARTS = 16  # of a round, as long as choices are few
+MOST_CHOICES = 1000  # that are all tried
+SHARE = 0.5  # of what is left that a population may use
 
 
-@dataclass
+@dataclass(frozen=True)
 class Limits:
     """When a search ends: after so many evaluated designs, or so many seconds; else one round."""
 
     evaluations: int | None = None
     seconds: float | None = None
-    n_evaluated: int = field(init=False, default=0)
-    began: float = field(init=False, default_factory=monotonic)
 
-    def may_go_on(self) -> bool:
-        """Whether neither is used up."""
-        is_late = self.seconds is not None and monotonic() - self.began >= self.seconds
-        is_long = self.evaluations is not None and self.n_evaluated >= self.evaluations
-        return not (is_late or is_long)
 
-    @property
-    def ends_after_a_round(self) -> bool:
-        """Whether there is none."""
-        return self.evaluations is None and self.seconds is None
+@dataclass(frozen=True)
+class Task:
+    """Does parts of a search: a function that any process can run. `deadline` is in s since 1970.
+
+    Of a part but the first that begins after it there is nothing.
+    """
+
+    goal: Goal
+    seed: int
+    deadline: float | None = None
+
+    def __call__(self, part: Part) -> Found | None:
+        clock = Clock(part.evaluations, self.deadline)
+        if part.number and clock.is_late:
+            return None
+        if part.n_starts:
+            return searched_part(self.goal, self.seed, part, clock)
+        from dpgcli.search.population import chosen
+
+        return chosen(self.goal, np.random.default_rng([self.seed, part.stream]), clock)
+
+
+Run = Callable[[Task, Sequence[Part]], Iterable[Found | None]]
+
+
+def in_turn(task: Task, parts: Sequence[Part]) -> Iterator[Found | None]:
+    """Do parts one after the other, in this process."""
+    yield from map(task, parts)
 
 
 @dataclass(frozen=True)
@@ -59,129 +78,106 @@ class Searched:
     n_evaluated: int
 
 
-def search(goal: Goal, seed: int = 1, limits: Limits | None = None) -> Searched:
-    """Search for designs that meet a goal: the same ones for the same seed, if time allows."""
-    limits = limits or Limits()
-    rounds: list[_Round] = []
-    choices = list(goal.choices())
-    n_at_once = max(1, MOST_LANES // STARTS)
-    while not rounds or (goal.ranges and limits.may_go_on() and not limits.ends_after_a_round):
-        for first in range(0, len(choices), n_at_once):
-            stream = np.random.default_rng([seed, len(rounds)])
-            if rounds and not limits.may_go_on():
-                break
-            some = choices[first : first + n_at_once]
-            number = sum(each.n_searches for each in rounds)
-            rounds.append(_Round(goal, some, limits, number).run(stream))
+def search(goal: Goal, seed: int = 1, limits: Limits | None = None, run: Run = in_turn) -> Searched:
+    """Search for designs that meet a goal: the same ones for the same seed, if time allows.
+
+    `run` does the parts, in whatever order, and gives what they come to in theirs.
+    """
+    rounds = _Rounds(goal, seed, limits or Limits(), run)
+    while rounds.may_go_on:
+        rounds.do_next()
+    found = rounds.found
     return Searched(
         goal,
-        best_of(goal, Designs.joined([each.found for each in rounds])),
-        _joined([part for each in rounds for part in each.trace]),
-        sum(each.n_starts for each in rounds),
-        sum(each.n_empty for each in rounds),
-        any(each.is_stopped for each in rounds),
-        limits.n_evaluated,
+        best_of(goal, Designs.joined([part.designs for part in found])),
+        _trace(found),
+        sum(part.n_starts for part in found),
+        sum(part.n_empty for part in found),
+        rounds.is_cut or any(part.is_stopped for part in found),
+        rounds.n_evaluated,
     )
 
 
-@dataclass
-class _Round:
-    """Searches from starts of some choices, all in one batch."""
+class _Rounds:
+    """Rounds of parts, one after the other; the parts of a round are independent."""
 
-    goal: Goal
-    choices: Sequence[Choice]
-    limits: Limits
-    first: int
-    trace: list[Columns] = field(init=False, default_factory=list)
-    n_empty: int = field(init=False, default=0)
-    is_stopped: bool = field(init=False, default=False)
+    def __init__(self, goal: Goal, seed: int, limits: Limits, run: Run) -> None:
+        self.goal, self.limits, self.run = goal, limits, run
+        deadline = None if limits.seconds is None else time() + limits.seconds
+        self.task = Task(goal, seed, deadline)
+        self.found: list[Found] = []
+        self.n_parts = self.n_streams = 0
+        self.is_cut = False  # whether parts were left out as time was up
 
-    def __post_init__(self) -> None:
-        self.evaluation = TargetEvaluation(self.goal)
-        self.n_each = STARTS if self.goal.ranges else 1
-        self.n_starts = self.n_searches = len(self.choices) * self.n_each
-        self.n_asked: dict[int, int] = {}
-        self.lists = {
-            key: np.repeat([choice[key] for choice in self.choices], self.n_each)
-            for key in self.goal.lists
-        }
+    @property
+    def n_evaluated(self) -> int:
+        return sum(part.n_evaluated for part in self.found)
 
-    def run(self, stream: np.random.Generator) -> "_Round":
-        """Search from drawn starts, to where each search ends or time is up."""
-        points = self._starts(stream)
-        if self.goal.targets and self.goal.ranges:
-            points = self._descended(points)
-        found = Designs.at(self.goal, self.lists, points)
-        if not self.trace:
-            self.limits.n_evaluated += len(found)
-            self.trace.append(self._row(0, Step(np.arange(len(found)), points, found.misfits)))
-        self.n_empty = int((~found.exist).sum())
-        self.found = found.take(np.flatnonzero(found.exist))
-        if self.goal.has_maps and self.goal.ranges and len(self.found):
-            from dpgcli.search.optima import Optima
+    @property
+    def left(self) -> int | None:
+        """Designs that may still be evaluated; None where there is no such limit."""
+        most = self.limits.evaluations
+        return None if most is None else max(most - self.n_evaluated, 0)
 
-            optima = Optima(self.goal, self.found, self._told).found()
-            best = best_of(self.goal, self.found).take(np.arange(1))
-            self.found = Designs.joined([best, optima])
-        return self
+    @property
+    def may_go_on(self) -> bool:
+        """Whether there is a round to do: the first, or one more within the limits."""
+        if not self.found:
+            return True
+        is_limited = self.limits != Limits()
+        can_differ = bool(self.goal.ranges) or self.goal.n_choices > MOST_CHOICES
+        is_late = Clock(None, self.task.deadline).is_late
+        return is_limited and can_differ and self.left != 0 and not is_late
 
-    def _descended(self, start: Array) -> Array:
-        """Points where the targets are missed by least, as far as one gets from each start."""
-        steps = descend(self._evaluate, start, self.limits.may_go_on)
-        for number, (descent, step) in enumerate(steps):
-            self.trace.append(self._row(number, step))
-            last: Descent = descent
-        self.is_stopped |= not last.is_done.all()
-        return last.points
+    def do_next(self) -> None:
+        """A round: of all choices, or of those that a population has found."""
+        if self.goal.n_choices <= MOST_CHOICES:
+            self._do(self.goal.listed(), None, STARTS)
+            return
+        most = None if self.left is None else max(1, int(SHARE * self.left))
+        self._run([Part(self.n_parts, self.n_streams, {}, None, 0, most)])
+        best = self.found[-1].designs
+        if len(best):
+            self._do({**best.choice}, best.points, POLISHED_STARTS)
 
-    def _values(self, points: Array, lanes: Indices) -> dict[str, Array]:
-        return self.goal.values({key: own[lanes] for key, own in self.lists.items()}, points)
+    def _do(self, choices: Mapping[str, Array], begin: Array | None, n_starts: int) -> None:
+        n = len(next(iter(choices.values()))) if choices else 1
+        size = min(MOST_LANES // STARTS, -(-n // MOST_PARTS))
+        firsts = range(0, n, size)
+        n_sets = self._n_sets(len(firsts))
+        left = self.left
+        most = None if left is None else max(1, left // (len(firsts) * n_sets))
+        parts = []
+        for number in range(n_sets * len(firsts)):
+            some = np.arange(n)[firsts[number % len(firsts)] :][:size]
+            own = {key: column[some] for key, column in choices.items()}
+            points = None if begin is None else begin[:, some]
+            stream = self.n_streams + number
+            parts.append(Part(self.n_parts + number, stream, own, points, n_starts, most))
+        self._run(parts)
 
-    def _evaluate(self, points: Array, lanes: Indices) -> Residuals:
-        self.limits.n_evaluated += len(lanes)
-        return self.evaluation(self._values(points, lanes))[0]
+    def _n_sets(self, n_parts: int) -> int:
+        """How many sets of starts a round has: more than one where it is not the last by far."""
+        if not self.found or not self.goal.ranges:
+            return 1
+        most = max(1, MOST_PARTS // n_parts)
+        if self.left is None:
+            return most
+        of_round = max(1, self.n_evaluated // max(1, self.n_parts // n_parts))
+        return int(np.clip(self.left // of_round, 1, most))
 
-    def _starts(self, stream: np.random.Generator) -> Array:
-        """Points at random, drawn again where there is no finger with states to begin with."""
-        start = stream.random((len(self.goal.ranges), self.n_starts))
-        lanes = np.arange(self.n_starts)
-        for _ in range(DRAWS if self.goal.ranges and self.goal.targets else 0):
-            found = self._evaluate(start[:, lanes], lanes).values
-            lanes = lanes[np.isnan(found).any(axis=0)]
-            if not len(lanes):
-                break
-            start[:, lanes] = stream.random((len(start), len(lanes)))
-        return start
-
-    def _told(self, asked: "Asked") -> None:
-        """Count what a search asked; raises TimeIsUpError where that is enough."""
-        from dpgcli.search.optima import TimeIsUpError
-
-        signs = [-1.0 if each.is_maximized else 1.0 for each in self.goal.objectives]
-        names = [each.name for each in self.goal.objectives]
-        searches = (self.first + self.n_starts + asked.searches).tolist()
-        for each in searches:
-            self.n_asked[each] = self.n_asked.get(each, 0) + 1
-        self.n_searches = self.n_starts + len(self.n_asked)
-        place = {
-            "search": np.array(searches),
-            "step": np.array([self.n_asked[each] for each in searches]),
-        }
-        told = dict(zip(names, asked.objectives * np.array(signs)[:, None], strict=False))
-        self.trace.append({**place, **asked.values, "misfit": asked.misfits, **told})
-        self.limits.n_evaluated += len(asked.searches) * (2 * len(self.goal.ranges) + 1)
-        if not self.limits.may_go_on():
-            self.is_stopped = True
-            raise TimeIsUpError
-
-    def _row(self, number: int, step: Step) -> Columns:
-        known = ~np.isnan(step.misfits)
-        lanes, points = step.lanes[known], step.points[:, known]
-        place = {"search": self.first + lanes, "step": np.full(len(lanes), number)}
-        unknown = np.full(len(lanes), np.nan)
-        told = {each.name: unknown for each in self.goal.objectives}
-        return {**place, **self._values(points, lanes), "misfit": step.misfits[known], **told}
+    def _run(self, parts: Sequence[Part]) -> None:
+        found = [*self.run(self.task, parts)]
+        self.found += [part for part in found if part is not None]
+        self.is_cut |= None in found
+        self.n_parts += len(parts)
+        self.n_streams += len(parts)
 
 
-def _joined(parts: Sequence[Columns]) -> Columns:
+def _trace(found: Sequence[Found]) -> Columns:
+    """The rows of all parts, their searches numbered on."""
+    first, parts = 0, []
+    for part in found:
+        parts.append({**part.trace, "search": first + part.trace["search"]})
+        first += max(part.n_starts, 1 + int(part.trace["search"].max(initial=-1)))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

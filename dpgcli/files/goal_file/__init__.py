@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from math import isfinite, prod
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,6 @@ from dpgcli.sweeps.expressions import Expression
 from dpgcli.text import KeyPath
 
 __all__ = ["GoalFile", "goal_in", "goal_of", "read_goal"]
-
-MOST_CHOICES = 1000  # combinations of listed values
 
 
 @dataclass(frozen=True)
@@ -158,10 +156,6 @@ def _varied(
             lists[key] = tuple(range(int(ends[0]), int(ends[1]) + 1))
         else:
             ranges.append(Range(key, *ends))
-    n_choices = prod(map(len, lists.values()))
-    if n_choices > MOST_CHOICES:
-        expected = f"at most {MOST_CHOICES:,} combinations of listed values"
-        reader.wrong(("vary",), expected, f"{n_choices:,}", "give ranges, or fewer values")
     if len(ranges) + len(lists) > MOST_KEYS:
         reader.wrong(("vary",), f"at most {MOST_KEYS} keys", f"{len(ranges) + len(lists)}")
     return tuple(ranges), lists
