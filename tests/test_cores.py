@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dpgcli.api.sweep import Place
+from dpgcli.api.place import Place
 from dpgcli.cores import Cores, cores
 
 GROUPS_1 = "12:cpuset:/\n4:cpu,cpuacct:{0}\n1:name=systemd:/init\n"

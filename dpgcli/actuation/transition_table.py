@@ -26,13 +26,6 @@ COLUMNS = (
     TIE,
     Column("note", "", "why there is no pressure, or no state after it", kind=Kind.TEXT),
 )
-REACHABLE = Column(
-    "reachable",
-    "",
-    "whether pulses lead to it from rest",
-    kind=Kind.FLAG,
-    outputs=(Output.PRESSURES,),
-)  # of states
 DIRECTIONS = {1: "+", -1: "-"}
 
 

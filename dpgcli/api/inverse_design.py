@@ -1,10 +1,11 @@
 """`inverse_design`: designs whose states are as a goal asks for."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dpgcli.api.given import GoalInput, goal_input
 from dpgcli.api.inputs import Settings, check_flags, check_numbers, check_whole, path_of
@@ -24,6 +25,9 @@ from dpgcli.search.targets import reason_against
 from dpgcli.search.unmet import how_slopes_are_found
 from dpgcli.states.columns import Column
 from dpgcli.text import counted, enumerated
+
+if TYPE_CHECKING:
+    from dpgcli.api.place import Place, Say
 
 MOST_NAMED = 3  # designs in a line
 
@@ -111,18 +115,21 @@ class InverseDesignResult:
         They are `best.parquet`, `trace.parquet` and `design_1.yaml` and so on. Raises OutputError,
         and UsageError for files that the designs come from.
         """
-        from dpgcli.files.goal_output import BEST, TRACE, write_designs
+        from dpgcli.files.output import sole_use
 
         path = path_of("output", folder)
+        with sole_use(path):
+            self._write(path)
+
+    def _write(self, folder: Path) -> None:
+        from dpgcli.files.goal_output import BEST, TRACE, write_designs
+
+        trace = self._tables.trace(self.searched.trace)
         tables = (
             (BEST, self.columns, self.rows),
-            (
-                TRACE,
-                self._tables.trace_columns,
-                self._tables.trace(self.searched.trace),
-            ),
+            (TRACE, self._tables.trace_columns, trace),
         )
-        write_designs(path, self.given, tables, self.specs, scene_of(self.specs[0]))
+        write_designs(folder, self.given, tables, self.specs, scene_of(self.specs[0]))
 
 
 def inverse_design(
@@ -133,6 +140,11 @@ def inverse_design(
     seed: int = 1,
     evaluations: int | None = None,
     budget: float | None = None,
+    jobs: int | None = 1,
+    executor: str = "processes",
+    scheduler: str | None = None,
+    wait: float | None = None,
+    restart: bool = False,
     strict: bool = False,
 ) -> InverseDesignResult:
     """Search for designs whose states meet the targets of a goal: its file, or its data.
@@ -140,9 +152,12 @@ def inverse_design(
     In data the `base` may be a spec's data, too; `settings` change it. The search descends from
     random starts, 32 for each combination of listed values, by `seed`. With `evaluations`, a number
     of designs, or a `budget` in seconds it ends there: earlier, or after further starts.
-    Tables and specs go into the folder `output`, if there is one.
+    Tables and specs go into the folder `output`, if there is one, where another call goes on with
+    a search that was interrupted, unless it is to `restart`. `jobs` processes share the work; they
+    import the program that starts them: put its work under `if __name__ == "__main__"`.
+    `executor`, `scheduler` and `wait` are those of `sweep`.
     Raises SpecError for a wrong goal, UsageError for wrong choices, and where it is `strict` for a
-    goal about what no design of the base should be chosen by, OutputError, and
+    goal about what no design of the base should be chosen by, OutputError, WorkplaceError, and
     NothingSelectedError where no start has certified states of the patterns.
 
     >>> lattice = {"segment_length_mm": 13.5, "segment_height_mm": 10.75, "stroke_mm": 3.5,
@@ -156,18 +171,16 @@ def inverse_design(
     >>> found.table["stroke_mm"].round(4).tolist(), found.is_met
     ([3.5164], True)
     """
+    from dpgcli.api.place import Place
+
     check_whole(seed=seed, evaluations=evaluations)
     check_numbers(budget=budget)
-    from dpgcli.files.goal_output import check_folder
-
-    check_flags(strict=strict)
+    check_flags(strict=strict, restart=restart)
+    place = Place(executor, jobs, scheduler, wait)
     given = goal_input(goal, settings)
-    if output is not None:
-        check_folder(path_of("output", output), given)
-    found = found_for(given, seed, evaluations, budget, strict=strict)
-    if output is not None:
-        found.save(output)
-    return found
+    path = None if output is None else path_of("output", output)
+    ends = Ends(seed, evaluations, budget)
+    return found_for(given, path, ends, place, restart=restart, strict=strict)
 
 
 def _doubts(tables: GoalTables, scene: Scene) -> list[str]:
@@ -181,29 +194,69 @@ def _doubts(tables: GoalTables, scene: Scene) -> list[str]:
     return doubts_about(trusts)
 
 
+class Ends(NamedTuple):
+    """The seed of a search, and its limits: how many designs, how many seconds."""
+
+    seed: int = 1
+    evaluations: int | None = None
+    budget: float | None = None
+
+    def limits(self) -> Limits:
+        """The limits; raises UsageError for what is none."""
+        if self.seed is None or self.seed < 0:
+            raise UsageError(Field("seed"), f" {self.seed}: expected a whole number from 0 on")
+        if self.evaluations is not None and self.evaluations < 1:
+            raise UsageError(
+                Field("evaluations"), f" {self.evaluations}: expected 1 design or more"
+            )
+        if self.budget is not None and not 0.0 < self.budget < float("inf"):
+            raise UsageError(Field("budget"), f" {self.budget:g}: expected a time > 0 s")
+        return Limits(self.evaluations, self.budget)
+
+
 def found_for(
     given: GoalFile,
-    seed: int = 1,
-    evaluations: int | None = None,
-    budget: float | None = None,
+    output: Path | None,
+    ends: Ends,
+    place: "Place",
     *,
+    restart: bool = False,
     strict: bool = False,
+    say: "Say" = lambda line: None,
 ) -> InverseDesignResult:
-    """The same, of a goal that was read before."""
-    if seed is None or seed < 0:
-        raise UsageError(Field("seed"), f" {seed}: expected a whole number from 0 on")
-    if evaluations is not None and evaluations < 1:
-        raise UsageError(Field("evaluations"), f" {evaluations}: expected 1 design or more")
-    if budget is not None and not 0.0 < budget < float("inf"):
-        raise UsageError(Field("budget"), f" {budget:g}: expected a time > 0 s")
+    """The same, of a goal that was read before; `say` hears of workers that are waited for."""
+    limits = ends.limits()
     if strict and (doubts := _doubts(GoalTables(given.goal), scene_of(given.base))):
         lines = (part for doubt in doubts for part in ("\n", doubt))
         raise UsageError(Field("strict"), " allows no goal about what is doubted:", *lines)
     keep_freed_memory()
-    searched = search(given.goal, seed, Limits(evaluations, budget))
+    if output is None and place.is_here:
+        return _result(given, search(given.goal, ends.seed, limits))
+    from dpgcli.files.goal_output import check_folder
+    from dpgcli.files.output import sole_use
+    from dpgcli.studies.search import SearchStudy, parts_folder
+
+    with ExitStack() as held:
+        if output is not None:
+            held.enter_context(sole_use(output))
+            check_folder(output, given)
+        # what is found until time is up would be another thing the next time
+        folder = held.enter_context(parts_folder(output if limits.seconds is None else None))
+        workplace = held.enter_context(place.workplace(say))
+        study = SearchStudy(given, ends.seed, limits, workplace, folder)
+        study.begin(restart=restart)
+        found = _result(given, search(given.goal, ends.seed, limits, study.run))
+        if output is not None:
+            found._write(output)
+        study.store.drop()
+    return found
+
+
+def _result(given: GoalFile, searched: Searched) -> InverseDesignResult:
+    """The designs that were found, each found anew from its spec."""
     best = searched.best
     if not len(best):
-        patterns = ", ".join(dict.fromkeys(target.pattern for target in given.goal.targets))
+        patterns = ", ".join(dict.fromkeys(t.pattern for t in given.goal.of_states))
         n, of = counted(searched.n_starts, "start"), f" of {patterns}" if patterns else ""
         why = reason_against(given.goal)
         because = f": {why}" if why else ""

@@ -6,17 +6,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.transition_table import REACHABLE
-from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
-from dpgcli.arrays import Array, Codes, Columns
+from dpgcli.arrays import Array, Codes, Columns, distinct
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.scene import Scene
 from dpgcli.files.scene_file import Spec, scene_of
-from dpgcli.grasping.table import grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.search.columns import body_columns, directions, pressed_columns
 from dpgcli.search.designs import Designs
@@ -24,10 +21,14 @@ from dpgcli.search.goal import Goal
 from dpgcli.search.maps import map_columns
 from dpgcli.search.table import Reached
 from dpgcli.search.targets import TargetEvaluation
+from dpgcli.states.columns import REACHABLE
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from dpgcli.states.units import UnitSolutions
+
+if TYPE_CHECKING:
+    from dpgcli.actuation.transitions import StateGraph
 
 AGREEMENT = 1e-9  # of a number: a design's, and that from its spec
 OVERLAP = "fingers_overlap"
@@ -77,7 +78,7 @@ class _Anew:
     def codes(self) -> Codes:
         """Of states that are nearest to some target, each once."""
         own = [k for k, target in enumerate(self.goal.targets) if target.pattern]
-        return np.unique(self.nearest[own])
+        return distinct(self.nearest[own])
 
     @property
     def values(self) -> tuple[tuple[float, ...], ...]:
@@ -109,6 +110,8 @@ class _Anew:
         of_body, pressed = (names & each(base).keys() for each in (body_columns, pressed_columns))
         found = self._predicted(sorted(names - of_body - pressed))
         if of_body:
+            from dpgcli.grasping.table import grasp_rows, grasps
+
             assert self.scene.body is not None, "the base has it"
             pairs = [self.codes] * (1 if self.scene.gripper is None else 2)
             found |= grasp_rows(grasps(self.scene, chain_potential, self.scene.body, pairs))
@@ -121,6 +124,9 @@ class _Anew:
         return predict(self.scene, request).arrays()
 
     def _under_pressure(self) -> Columns:
+        from dpgcli.actuation.pressed import Pressed
+        from dpgcli.actuation.transitions import state_graph
+
         pressure = self.scene.pressure
         assert pressure is not None, "the base has it"
         units = UnitSolutions.of(self.scene.finger)
@@ -140,8 +146,10 @@ class _Anew:
         return {name: self.known[name] for name in names}
 
 
-def _left_at(graph: StateGraph, codes: Codes, line: int, sign: int) -> Array:
+def _left_at(graph: "StateGraph", codes: Codes, line: int, sign: int) -> Array:
     """The pressures at which states are left that way, MPa."""
+    from dpgcli.actuation.transitions import Departure
+
     rows = graph.transitions
     is_way = (rows.line == line) & (rows.sign == sign)
     leaves = np.isin(rows.outcome, (Departure.LEAVES, Departure.ASTRAY))

@@ -1,7 +1,6 @@
 """`sweep` and `merge`: every design of a space, in two tables."""
 
 import re
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,14 +16,13 @@ from dpgcli.api.inputs import (
     check_flags,
     check_numbers,
     check_texts,
-    check_whole,
     each_of,
     path_of,
     setting_texts,
 )
-from dpgcli.api.report import Say, silent, summarize
+from dpgcli.api.place import Place
+from dpgcli.api.report import silent, summarize
 from dpgcli.api.tables import Table
-from dpgcli.cores import cores
 from dpgcli.errors import Field, Message, UsageError
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
@@ -47,8 +45,6 @@ from dpgcli.studies.sweep import (
     outputs,
     stores,
 )
-from dpgcli.sweeps import cluster, executors, pool
-from dpgcli.sweeps.executors import Backend
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.gate import (
     RequirementVerdict,
@@ -58,10 +54,6 @@ from dpgcli.sweeps.gate import (
     requirement,
 )
 from dpgcli.temporary import temporary_folder
-from dpgcli.text import quoted
-
-EXECUTORS = ("processes", "serial", "dask")
-WAIT = 300.0  # s
 
 
 @dataclass(frozen=True)
@@ -271,83 +263,6 @@ def shard_of(shard: str | Shard | None) -> Shard | None:
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise UsageError(Field("shard"), f" {shard}: expected K/N with K from 1 to N, such as 3/16")
     return Shard(int(match[1]), int(match[2]))
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where designs are evaluated: by how many processes, or by which Dask scheduler's workers.
-
-    `wait` (s) is how long a worker of Dask may be waited for. Raises UsageError for what does not
-    go together.
-    """
-
-    executor: str = "processes"
-    jobs: int | None = None
-    scheduler: str | None = None
-    wait: float | None = None
-
-    def __post_init__(self) -> None:
-        check_whole(jobs=self.jobs)
-        check_texts(executor=self.executor, scheduler=self.scheduler)
-        check_numbers(wait=self.wait)
-        dask, scheduler = Field("executor"), Field("scheduler")
-        if self.executor not in EXECUTORS:
-            raise UsageError(dask, f" {quoted(self.executor)}: expected {', '.join(EXECUTORS)}")
-        if self.jobs is not None and self.jobs < 1:
-            raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
-        if self.is_sent != (self.scheduler is not None):
-            raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
-        if self.scheduler is not None:
-            cluster.check_address(self.scheduler)
-        if self.scheduler is None and self.wait is not None:
-            raise UsageError(Field("wait"), " is for the workers of ", dask, " dask")
-
-    @property
-    def is_sent(self) -> bool:
-        """Whether designs are sent to other machines."""
-        return self.executor == "dask"
-
-    @contextmanager
-    def workplace(self, say: Say) -> Iterator[Backend]:
-        """The workers, for as long as they are needed; `say` hears of those that are waited for."""
-        found = self._found(say)
-        try:
-            yield found
-        finally:
-            found.close()
-
-    def _found(self, say: Say) -> Backend:
-        """The workers, found or about to be started."""
-        if self.scheduler is not None:
-            return self._cluster(self.scheduler, say)
-        n_workers = self.jobs or cores().usable
-        if self.executor == "serial" or n_workers == 1:
-            return executors.serial()
-        _check_importable()
-        return pool.processes(n_workers)
-
-    def _cluster(self, scheduler: str, say: Say) -> Backend:
-        try:
-            return cluster.dask_cluster(scheduler, WAIT if self.wait is None else self.wait, say)
-        except ImportError as error:
-            what = " dask needs Dask: pip install distributed"
-            raise UsageError(Field("executor"), what) from error
-        except (OSError, ValueError) as error:
-            what = f" {scheduler}: no scheduler or no worker answers"
-            why = f"{what}: {str(error) or 'time is up'}"
-            raise UsageError(Field("scheduler"), why) from error
-
-
-def _check_importable() -> None:
-    """Raise UsageError where processes cannot import the program that starts them."""
-    program = sys.modules["__main__"]
-    file, spec = (getattr(program, name, None) for name in ("__file__", "__spec__"))
-    if spec is None and file is not None and not Path(file).exists():
-        raise UsageError(
-            Field("executor"),
-            f" processes: each of them imports the program that starts it, and {file} is no file, "
-            "as where it is read from standard input: save it in a file, or take serial",
-        )
 
 
 def merge(shards: str | Path | Sequence[str | Path], output: str | Path) -> SweepResult:

@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.actuation.alone import REACH
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
-from dpgcli.actuation.transition_table import COLUMNS, REACHABLE, transition_rows
+from dpgcli.actuation.transition_table import COLUMNS, transition_rows
 from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
 from dpgcli.api.predict import MOST_DRAWN
@@ -22,7 +22,7 @@ from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
 from dpgcli.states.certify import Status
-from dpgcli.states.columns import Column
+from dpgcli.states.columns import REACHABLE, Column
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict

@@ -6,8 +6,19 @@ from typing import Annotated
 
 import typer
 
-from dpgcli.cli.exits import ExitCode, say_warnings
-from dpgcli.cli.options import Quiet, Settings, Strict, seconds
+from dpgcli.cli.exits import ExitCode, Terminated, say_warnings
+from dpgcli.cli.options import (
+    MOST_PROCESSES,
+    ExecutorName,
+    Quiet,
+    Restart,
+    Scheduler,
+    Settings,
+    Strict,
+    Wait,
+    Where,
+    seconds,
+)
 from dpgcli.cli.printing import Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
@@ -31,6 +42,10 @@ Budget = Annotated[
     str | None,
     typer.Option("--budget", metavar="TIME", help="End after so long, likewise: 60s, 5m"),
 ]
+Jobs = Annotated[
+    int,
+    typer.Option("-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes that share the work"),
+]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the starts")]
 
 
@@ -40,6 +55,11 @@ def design(
     seed: Seed = 1,
     evaluations: Evaluations = None,
     budget: Budget = None,
+    jobs: Jobs = 1,
+    executor: Where = ExecutorName.PROCESSES,
+    scheduler: Scheduler = None,
+    wait: Wait = None,
+    restart: Restart = False,
     settings: Settings = None,
     printed_as: Annotated[
         Format, typer.Option("--format", help="How to print designs")
@@ -49,18 +69,20 @@ def design(
 ) -> None:
     """Search for designs whose states, and maps of states, are as a goal asks."""
     from dpgcli.api.given import goal_input
-    from dpgcli.api.inverse_design import found_for
+    from dpgcli.api.inverse_design import Ends, found_for
+    from dpgcli.api.place import Place
 
-    limit = None if budget is None else seconds("--budget", budget)
+    ends = Ends(seed, evaluations, None if budget is None else seconds("--budget", budget))
+    limit = None if wait is None else seconds("--wait", wait)
+    place = Place(executor.value, jobs, scheduler, limit)
     given = goal_input(goal, settings or ())
-    if output is not None:
-        from dpgcli.files.goal_output import check_folder
-
-        check_folder(output, given)
-    with under_way("searching", quiet=quiet):
-        found = found_for(given, seed, evaluations, limit, strict=strict)
-    if output is not None:
-        found.save(output)
+    try:
+        with under_way("searching", quiet=quiet):
+            found = found_for(given, output, ends, place, restart=restart, strict=strict, say=say)
+    except (KeyboardInterrupt, Terminated) as stop:
+        if output is None or budget is not None:
+            raise
+        raise type(stop)("what is done is kept, and the same command goes on from there") from None
     print_rows(found.columns, found.rows, printed_as)
     sys.stdout.flush()
     say_warnings(found.warnings)

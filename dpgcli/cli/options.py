@@ -102,6 +102,27 @@ Seed = Annotated[
 ]
 
 
+class ExecutorName(StrEnum):
+    """Where designs are evaluated."""
+
+    PROCESSES = "processes"
+    SERIAL = "serial"
+    DASK = "dask"
+
+
+Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask: tcp://host:port")
+]
+Wait = Annotated[
+    str | None,
+    typer.Option(
+        "--wait", metavar="TIME", help="For a worker of Dask, while none is there  [default: 5m]"
+    ),
+]
+Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
+
+
 class FormulationName(StrEnum):
     """The two formulations of one finger."""
 

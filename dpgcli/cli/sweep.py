@@ -5,7 +5,6 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,12 +16,17 @@ from dpgcli.cli.depfile import Depfile, depfile_text
 from dpgcli.cli.exits import ExitCode, Terminated, check_failed, say_warnings
 from dpgcli.cli.options import (
     MOST_PROCESSES,
+    ExecutorName,
     MaxFailed,
     Quiet,
+    Restart,
+    Scheduler,
     Settings,
     Strict,
     TargetError,
     Tolerance,
+    Wait,
+    Where,
     millimeters,
     seconds,
 )
@@ -32,20 +36,12 @@ from dpgcli.cli.validate import ProblemFormat
 from dpgcli.cores import cores
 
 if TYPE_CHECKING:
-    from dpgcli.api.sweep import Place
+    from dpgcli.api.place import Place
     from dpgcli.arrays import Columns
     from dpgcli.reports.summary import DesignSpace
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict
-
-
-class ExecutorName(StrEnum):
-    """Where designs are evaluated."""
-
-    PROCESSES = "processes"
-    SERIAL = "serial"
-    DASK = "dask"
 
 
 SweepPath = Annotated[Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep")]
@@ -58,20 +54,9 @@ Jobs = Annotated[
         "-j", "--jobs", min=1, max=MOST_PROCESSES, help="Processes  [default: usable cores]"
     ),
 ]
-Where = Annotated[ExecutorName, typer.Option("--executor", help="Where designs are evaluated")]
-Scheduler = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of Dask: tcp://host:port")
-]
-Wait = Annotated[
-    str | None,
-    typer.Option(
-        "--wait", metavar="TIME", help="For a worker of Dask, while none is there  [default: 5m]"
-    ),
-]
 Part = Annotated[
     str | None, typer.Option("--shard", metavar="K/N", help="Only part K of N; see merge")
 ]
-Restart = Annotated[bool, typer.Option("--restart", help="Begin anew, whatever is there")]
 Force = Annotated[bool, typer.Option("--force", help="Go on even if the disk is small")]
 DepfilePath = Annotated[
     Path | None, typer.Option("--depfile", metavar="FILE", help="Write the files read, for Make")
@@ -151,7 +136,7 @@ def sweep(
 def _place(
     executor: ExecutorName, jobs: int | None, scheduler: str | None, wait: str | None
 ) -> "Place":
-    from dpgcli.api.sweep import Place
+    from dpgcli.api.place import Place
 
     limit = None if wait is None else seconds("--wait", wait)
     return Place(executor.value, jobs, scheduler, limit)

@@ -10,7 +10,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.files.access import writing
 from dpgcli.files.design_spec import write_spec
 from dpgcli.files.goal_file import GoalFile
-from dpgcli.files.output import Mark, check_outputs, is_own, sole_use
+from dpgcli.files.output import Mark, check_outputs, is_own
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import Spec, canonical_json
 from dpgcli.files.scene_metadata import scene_metadata
@@ -24,9 +24,11 @@ NamedTable = tuple[str, tuple[Column, ...], Columns]
 
 
 def check_folder(folder: Path, given: GoalFile) -> None:
-    """Raise OutputError or UsageError for a folder that tables cannot go into, before the work."""
-    with sole_use(folder):
-        check_outputs(given.files, *((folder / name, Mark.TABLE) for name in (BEST, TRACE)))
+    """Raise OutputError or UsageError for a folder that tables cannot go into, before the work.
+
+    Whoever calls has the folder to himself, here and below.
+    """
+    check_outputs(given.files, *((folder / name, Mark.TABLE) for name in (BEST, TRACE)))
 
 
 def write_designs(
@@ -42,22 +44,21 @@ def write_designs(
     """
     own = {folder / f"design_{number}.yaml": spec for number, spec in enumerate(specs, start=1)}
     marked = [*((folder / name, Mark.TABLE) for name, *_ in tables), *((p, Mark.SPEC) for p in own)]
-    with sole_use(folder):
-        check_outputs(given.files, *marked)
-        metadata = {
-            "dpg.schema_version": str(SCHEMA_VERSION),
-            "dpg.goal": json.dumps(given.said, sort_keys=True),
-            **scene_metadata(first, canonical_json(specs[0])),
-            **trust_metadata(first.trusts, first.warnings),
-            "dpg.versions": versions(),
-        }
-        for name, columns, rows in tables:
-            described = with_bases(schema(columns), metadata)
-            write_table(folder / name, described, [record_batch(columns, rows)], metadata)
-        for number, (path, spec) in enumerate(own.items(), start=1):
-            write_spec(path, spec, f"design {number} of {tables[0][0]}")
-        with writing(folder):
-            for path in folder.iterdir():
-                is_old = SPEC_NAME.fullmatch(path.name) and path not in own
-                if is_old and path.is_file() and is_own(path, Mark.SPEC):
-                    path.unlink()
+    check_outputs(given.files, *marked)
+    metadata = {
+        "dpg.schema_version": str(SCHEMA_VERSION),
+        "dpg.goal": json.dumps(given.said, sort_keys=True),
+        **scene_metadata(first, canonical_json(specs[0])),
+        **trust_metadata(first.trusts, first.warnings),
+        "dpg.versions": versions(),
+    }
+    for name, columns, rows in tables:
+        described = with_bases(schema(columns), metadata)
+        write_table(folder / name, described, [record_batch(columns, rows)], metadata)
+    for number, (path, spec) in enumerate(own.items(), start=1):
+        write_spec(path, spec, f"design {number} of {tables[0][0]}")
+    with writing(folder):
+        for path in folder.iterdir():
+            is_old = SPEC_NAME.fullmatch(path.name) and path not in own
+            if is_old and path.is_file() and is_own(path, Mark.SPEC):
+                path.unlink()

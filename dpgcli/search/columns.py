@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from dpgcli.actuation.transition_table import REACHABLE
 from dpgcli.design.dimensions import Design
 from dpgcli.design.lines import units_by_line
 from dpgcli.design.outputs import Output
 from dpgcli.mechanics.terms import LOAD
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
-from dpgcli.states.columns import Column, Kind
+from dpgcli.states.columns import REACHABLE, Column, Kind
 from dpgcli.states.quantities import Quantity, declared
 from dpgcli.sweeps.evaluation import DesignEvaluation
-from dpgcli.sweeps.grasps import grasp_columns
 from dpgcli.sweeps.metrics import METRICS
 
 KINDS = ("bistable", "wall", "hinge", "bar", LOAD)
@@ -42,6 +40,8 @@ def body_columns(base: Design) -> dict[str, Column]:
     """Those of states with the base's body in their way, by name; none without one."""
     if base.body is None:
         return {}
+    from dpgcli.sweeps.grasps import grasp_columns
+
     has_friction = base.friction is not None
     every = grasp_columns(is_pair=bool(base.gripper), has_friction=has_friction)
     return {column.name: column for column in every if column.kind in NUMBERS}

@@ -129,13 +129,13 @@ class Goal:
 
     def listed(self) -> dict[str, Array]:
         """The same, as values by key, (choice,)."""
-        every = np.array([*product(*self.lists.values())], float)
-        return dict(zip(self.lists, every.reshape(-1, len(self.lists)).T, strict=True))
+        sizes = [len(values) for values in self.lists.values()]
+        return self.choice_at(np.indices(sizes).reshape(len(sizes), self.n_choices))
 
     def choice_at(self, places: Indices) -> dict[str, Array]:
         """Values by key of choices at places in the lists, (list, choice)."""
         pairs = zip(self.lists.items(), places, strict=True)
-        return {key: np.array(values, float)[place] for (key, values), place in pairs}
+        return {key: np.array(values)[place] for (key, values), place in pairs}
 
     def told(self, objectives: Array) -> dict[str, Array]:
         """Objectives (objective, design), all to be least, as they are, by name."""

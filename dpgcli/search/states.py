@@ -7,13 +7,10 @@ body as `grasp`, under pressure as `transitions`.
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dpgcli.actuation.directions import Directions
-from dpgcli.actuation.graph import are_states
-from dpgcli.actuation.transition_table import REACHABLE
-from dpgcli.actuation.transitions import Departure, first_flips
 from dpgcli.arrays import Array, Codes, Columns, Flags, Indices
 from dpgcli.design.dimensions import Design
 from dpgcli.design.resolve import resolve
@@ -22,6 +19,7 @@ from dpgcli.mechanics.terms import chain_potential
 from dpgcli.search.columns import KINDS, Direction, body_columns, directions
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
+from dpgcli.states.columns import REACHABLE
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.quantities import declared
 from dpgcli.states.rows import RowRequest, solved_rows
@@ -29,7 +27,9 @@ from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 from dpgcli.sweeps.designs import placement, units_of, with_body
 from dpgcli.sweeps.evaluation import reasons_against_bodies
-from dpgcli.sweeps.pressures import PressedDesigns
+
+if TYPE_CHECKING:
+    from dpgcli.sweeps.pressures import PressedDesigns
 
 
 def columns_of_states(design: Design, codes: Codes, names: Collection[str]) -> Columns:
@@ -98,6 +98,8 @@ class _States:
         ways = {name: way for name, way in directions(self.design).items() if name in names}
         if not ways and REACHABLE.name not in names:
             return {}
+        from dpgcli.sweeps.pressures import PressedDesigns
+
         assert self.scene.pressure is not None, "the base has it"
         found = PressedDesigns(self.units, self.scene.pressure, self.codes.shape[1])
         columns = {name: self._left_at(found, way, is_stable) for name, way in ways.items()}
@@ -105,8 +107,12 @@ class _States:
             columns[REACHABLE.name] = found.reached.is_reached[self.owner, self.code.astype(int)]
         return columns
 
-    def _left_at(self, found: PressedDesigns, way: Direction, is_stable: Flags) -> Array:
+    def _left_at(self, found: "PressedDesigns", way: Direction, is_stable: Flags) -> Array:
         """The pressures (MPa) at which states are left that way; NaN where they are not."""
+        from dpgcli.actuation.directions import Directions
+        from dpgcli.actuation.graph import are_states
+        from dpgcli.actuation.transitions import Departure, first_flips
+
         lanes = np.flatnonzero(is_stable)
         lanes = lanes[are_states(found.pressed, self.owner[lanes], self.code[lanes])]
         line, sign = (np.full(len(lanes), value) for value in way)

@@ -46,3 +46,12 @@ class Column:
     group: Group = Group.STATES
     kind: Kind = Kind.NUMBER
     outputs: tuple[Output, ...] = field(default=(), kw_only=True)
+
+
+REACHABLE = Column(
+    "reachable",
+    "",
+    "whether pulses lead to it from rest",
+    kind=Kind.FLAG,
+    outputs=(Output.PRESSURES,),
+)  # of states under pressure

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import dpgcli as dpg
-from dpgcli.api import inverse_design as module
+from dpgcli.api import reached as module
 from dpgcli.errors import NothingSelectedError, SpecError, UsageError
 from dpgcli.files.design_spec import spec_text
 from dpgcli.files.yaml_file import read_document
@@ -55,9 +55,9 @@ def test_a_number_that_is_not_predicts_is_a_bug(
 ) -> None:
     monkeypatch.setattr(module, "AGREEMENT", 0.0)
     told = np.array([1.0])
-    module._check_agreement(told, told)
+    module.check_agreement(told, told)
     with pytest.raises(AssertionError, match="predict finds the same"):
-        module._check_agreement(told, told + 2e-16 * np.array([2.0]))
+        module.check_agreement(told, told + 2e-16 * np.array([2.0]))
 
 
 def test_tables_and_specs_in_a_folder(goal: Callable[..., Goal], tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array, Columns, Indices
-from dpgcli.search import targets as module
+from dpgcli.search import states as module
 from dpgcli.search.descent import Residuals, descend
 from dpgcli.search.goal import Goal
 from dpgcli.search.targets import TargetEvaluation

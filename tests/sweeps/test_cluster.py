@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from dpgcli.api.sweep import Place
+from dpgcli.api.place import Place
 from dpgcli.errors import NoWorkerError, UsageError
 from dpgcli.sweeps import cluster
 from dpgcli.sweeps.cluster import WorkerWatch, check_address, dask_cluster

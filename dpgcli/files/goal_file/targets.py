@@ -18,7 +18,6 @@ from dpgcli.search.goal import OF_TIP, TIP, Target, suffix_of
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import select
 from dpgcli.sweeps.extent import MOST_PRESSED
-from dpgcli.sweeps.grasps import grasp_columns
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.text import KeyPath, quoted
 
@@ -82,6 +81,8 @@ class TargetReader:
 
     def _lacking(self, quantity: str) -> str:
         """Which section the base would need for a quantity to be there."""
+        from dpgcli.sweeps.grasps import grasp_columns
+
         with_gripper = replace(self.base, gripper={"base_spacing_mm": np.ones(1)})
         with_pressure = replace(self.base, pressure=self.base.pressure or GivenPressure())
         of_body = {c.name for c in grasp_columns(is_pair=True, has_friction=True)}
