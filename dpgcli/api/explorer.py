@@ -25,13 +25,15 @@ from dpgcli.reports.explorer.shapes import (
     NO_STATES,
     NO_TABLE,
     NOT_HERE,
+    TOO_LONG,
     DesignStates,
     Shapes,
 )
-from dpgcli.reports.outlines import notes, sizes
+from dpgcli.reports.outlines import around_body, notes, sizes
 from dpgcli.reports.summary import N_UNITS, DesignSpace
 from dpgcli.studies.sweep import DESIGNS, STATES
 
+WITHOUT_BODY = "as they are without the body: dpg grasp draws them on it"
 TIPS = ("status", "tip_x_mm", "tip_y_mm", "tip_angle_rad", "energy_mJ")
 
 
@@ -47,7 +49,11 @@ def explored(folder: Path, space: DesignSpace) -> Explored:
         keys = source.keys
     shapes = _shapes(folder / STATES, space, keys, base.design, rows)
     is_gripper = base.gripper is not None
-    shapes.notes = [*notes(scene_of(base)), *(["one finger, in its own frame"] * is_gripper)]
+    shapes.notes = [
+        *notes(scene_of(base)),
+        *(["one finger, in its own frame"] * is_gripper),
+        *([WITHOUT_BODY] * (base.design.body is not None)),
+    ]
     return Explored(rows, best, keys, base.model_dump(exclude_none=True), shapes)
 
 
@@ -56,7 +62,8 @@ def _best(source: RowSource, row: int, metrics: list[str]) -> BestDesign:
     scene = scene_of(checked(source.design(row).document))
     n_units = scene.finger.n_units
     states = drawn(scene, ("0" * n_units, "1" * n_units))
-    return BestDesign(row, metrics, [state for state in states if state.fingers])
+    body = None if scene.body is None else around_body(scene.body)
+    return BestDesign(row, metrics, [state for state in states if state.fingers], body)
 
 
 def _shapes(
@@ -75,6 +82,9 @@ def _shapes(
         shapes.reasons = dict.fromkeys(rows[~usable].tolist(), NO_STATES)
         owner = source.columns(["design"])["design"]
         units = space.designs[N_UNITS]
+        shapes.reasons |= dict.fromkeys(
+            rows[usable & (units[rows] > MOST_UNITS)].tolist(), TOO_LONG
+        )
         chosen = _chosen(rows[usable], units, [*best_rows(space)])
         for n_units in distinct(units[chosen]).tolist():
             own = chosen[units[chosen] == n_units]

@@ -17,11 +17,10 @@ from dpgcli.api.inputs import (
     spec_document,
 )
 from dpgcli.design.scene import Scene
-from dpgcli.errors import SpecError, UsageError
+from dpgcli.errors import UsageError
 from dpgcli.files.frames import frame_of
 from dpgcli.files.goal_file import GoalFile, goal_in, goal_of, read_goal
 from dpgcli.files.kind import FileKind, kind_of
-from dpgcli.files.places import Location, located
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in, sweep_of
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
@@ -60,16 +59,6 @@ mean finger?)
     if kind is FileKind.SPEC:
         return scene_input_in(document, path, texts)
     return (sweep_of if kind is FileKind.SWEEP else goal_of)(document, path, texts)
-
-
-def scene_or_sweep(given: SpecInput, settings: Settings = ()) -> SceneInput | Sweep:
-    """The same, of a spec or a sweep alone. Raises SpecError for a goal."""
-    found = any_input(given, settings)
-    if isinstance(found, GoalFile):
-        place = Location(str(given) if isinstance(given, str | Path) else "spec")
-        what = "a spec or a sweep", "a goal", "dpg design takes it"
-        raise SpecError((located(place, "targets", *what),))
-    return found
 
 
 def sweep_input(sweep: SweepInput, settings: Settings = ()) -> Sweep:

@@ -107,7 +107,7 @@ class InverseDesignResult:
 
     @property
     def _tables(self) -> GoalTables:
-        return GoalTables(self.given.goal)
+        return GoalTables(self.given.goal, self.searched.is_stopped)
 
     def save(self, folder: str | Path) -> None:
         """Write the designs, the trace and a spec for each design into a folder.

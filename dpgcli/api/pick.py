@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 KEPT = ("dpg.schema_version", "dpg.law", "dpg.versions", "dpg.base", "dpg.trust", "dpg.warnings")
 PICK = "dpg.pick"
 ALL, DEFAULT = "all", "default"
+EXCLUDED = "it does not meet the sweep's constraints"
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,28 @@ def pick(
     with opened_rows(source, has_states=states) as rows:
         asked = question(conditions, *objectives, top, rows.numbers)
         shown = _shown(rows, asked, [name.strip() for name in names if name.strip()])
-        return _picked(rows, asked, shown, tables_beside(source), strict=strict)
+        why = () if design is None else _why_not(rows, design)
+        return _picked(rows, asked, shown, tables_beside(source), why, strict=strict)
+
+
+def _why_not(source: RowSource, design: int) -> tuple[str, ...]:
+    """Why a design is not chosen among, in words, if it is not; states say nothing of that.
+
+    Raises UsageError for one that is not there.
+    """
+    numbers = source.columns(["design"])["design"]
+    places = np.flatnonzero(numbers == design)
+    if not len(places):
+        has = f"{numbers.min()} to {numbers.max()}" if len(numbers) else "none"
+        raise UsageError(Field("design"), f" {design}: {source.name} has {has}")
+    if source.has_states:
+        return ()
+    row = source.rows(places[:1], ("status", "reason", "n_stable"))
+    status, reason, n_stable = (row[name][0].item() for name in row)
+    if n_stable > 0 and status != "excluded":
+        return ()
+    words = EXCLUDED if status == "excluded" else reason or "no stable state"
+    return (f"design {design} is {status}: {words}",)
 
 
 def _shown(source: RowSource, asked: Question, names: Sequence[str]) -> list[str]:
@@ -147,6 +169,7 @@ def _picked(
     asked: Question,
     shown: Sequence[str],
     files: tuple[Path, ...],
+    why: tuple[str, ...],
     *,
     strict: bool,
 ) -> PickResult:
@@ -157,7 +180,7 @@ def _picked(
     found = selected(columns, is_usable, asked)
     lines = (first_line, *found.lines(source.what))
     if not len(found.places):
-        raise NothingSelectedError("\n".join(("nothing selected", *lines)))
+        raise NothingSelectedError("\n".join(("nothing selected", *why, *lines)))
     warnings = warnings_of(asked, columns, source.trusts)
     if strict:
         check_undoubted(source.trusts, warnings)

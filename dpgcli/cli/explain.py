@@ -1,4 +1,4 @@
-"""`dpg explain`: what a spec or a sweep comes to, before any work."""
+"""`dpg explain`: what a spec, a sweep or a goal comes to, before any work."""
 
 from collections.abc import Iterator
 from enum import StrEnum
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 SpecOrSweep = Annotated[
-    Path, typer.Argument(metavar="SPEC", help="YAML spec or sweep; - reads standard input")
+    Path, typer.Argument(metavar="SPEC", help="YAML spec, sweep or goal; - reads standard input")
 ]
 
 
@@ -54,12 +54,12 @@ def explain(
         PlanFormat, typer.Option("--format", help="How to print the plan")
     ] = PlanFormat.TEXT,
 ) -> None:
-    """Say what predict or sweep will do, and leave out, and why."""
+    """Say what predict, sweep or design will do, and leave out, and why."""
     from dpgcli.api.explain import plan_of
-    from dpgcli.api.given import scene_or_sweep
+    from dpgcli.api.given import any_input
     from dpgcli.states.plan import Plan
 
-    given = scene_or_sweep(spec, settings or ())
+    given = any_input(spec, settings or ())
     request = request_of(
         patterns, columns, nodes, uncertainty, formulation, tolerance, target_error
     )
@@ -67,10 +67,17 @@ def explain(
     is_json = printed_as is PlanFormat.JSON
     if isinstance(made, Plan):
         _print(facts(made) if is_json else _lines(str(spec), made))
-    else:
+        return
+    from dpgcli.studies.plan import SweepPlan
+
+    if isinstance(made, SweepPlan):
         from dpgcli.cli import sweep_plan
 
         _print(sweep_plan.facts(made) if is_json else sweep_plan.lines(str(spec), made))
+    else:
+        from dpgcli.cli import goal_plan
+
+        _print(goal_plan.facts(made) if is_json else goal_plan.lines(str(spec), made))
 
 
 def _print(said: dict[str, Any] | list[str]) -> None:

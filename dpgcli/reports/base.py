@@ -26,7 +26,7 @@ def base_lines(metadata: Mapping[str, str]) -> Iterator[str]:
     if not base:
         return
     values = ", ".join(
-        f"{key.removeprefix('finger.').removeprefix('geometry.')} {value:g}"
+        f"{key.removeprefix('finger.').removeprefix('geometry.')} {value}"
         for key, value in _numbers(base)
     )
     yield f"Base spec: {metadata.get(BASE, 'unnamed')} ({values})."
@@ -60,10 +60,12 @@ def _names(base: Mapping[str, Any]) -> Iterator[str]:
             yield str(part.get("file") or "unnamed")
 
 
-def _numbers(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, float]]:
-    """Numbers by dotted key, calibrations left out."""
+def _numbers(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Numbers by dotted key, as text, and short lists of them; calibrations left out."""
     for key, value in section.items():
         if isinstance(value, dict) and key != "calibration":
             yield from _numbers(value, f"{prefix}{key}.")
         elif isinstance(value, int | float):
-            yield f"{prefix}{key}", value
+            yield f"{prefix}{key}", f"{value:g}"
+        elif isinstance(value, list) and all(isinstance(part, int | float) for part in value):
+            yield f"{prefix}{key}", "/".join(f"{part:g}" for part in value)

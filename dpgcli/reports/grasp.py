@@ -7,14 +7,21 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
-from dpgcli.design.bodies import Body, Disc, Jaws
+from dpgcli.design.bodies import Body, Jaws
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped
 from dpgcli.grasping.table import Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
 from dpgcli.reports.fingers import EDGE, MEASURE, WORD, draw_finger, handles, set_window
-from dpgcli.reports.outlines import FingerShape, Points, Profile, finger_shape, notes
+from dpgcli.reports.outlines import (
+    FingerShape,
+    Points,
+    Profile,
+    around_body,
+    finger_shape,
+    notes,
+)
 from dpgcli.reports.panels import PanelGrid, Window
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
@@ -69,12 +76,7 @@ def _moved(found: Grasps, row: int) -> Array:
 
 def _body(found: Grasps, row: int) -> Points:
     """Points around the body."""
-    body, moved = found.body, complex(*_moved(found, row))
-    if isinstance(body, Disc):
-        turn = np.linspace(0.0, 2.0 * np.pi, 121)
-        circle: Points = complex(*body.center) + body.radius * np.exp(1j * turn) + moved
-        return circle
-    return _complex(body.corners) + moved
+    return np.asarray(around_body(found.body) + complex(*_moved(found, row)))
 
 
 def _draw_body(axes: Any, body: Body, around: Points) -> None:

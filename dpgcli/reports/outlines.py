@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.geometry import REFERENCE
 from dpgcli.design.scene import Chambers, Scene
 from dpgcli.mechanics.finger import STUDY
@@ -114,6 +115,20 @@ def notes(scene: Scene) -> list[str]:
 
 def _known(values: Array, otherwise: Array) -> Array:
     return np.where(np.isnan(values), otherwise, values)
+
+
+def around_body(body: Body) -> Points:
+    """Points around a body where it is placed, mm; of jaws the ends of both plates.
+
+    >>> around_body(Disc(np.array([40.0, 0.0]), 20.0))[[0, 30]].round(9).tolist()
+    [(60+0j), (40+20j)]
+    """
+    if isinstance(body, Disc):
+        turn = np.linspace(0.0, 2.0 * np.pi, 121)
+        circle: Points = complex(*body.center) + body.radius * np.exp(1j * turn)
+        return circle
+    x, y = body.corners
+    return np.asarray(x + 1j * y)
 
 
 @dataclass(frozen=True)

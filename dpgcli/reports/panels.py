@@ -35,10 +35,10 @@ class Window:
     top: float
 
     @classmethod
-    def around(cls, states: Sequence[DrawnState]) -> "Window | None":
-        """A window around all shapes; None if there are none."""
+    def around(cls, states: Sequence[DrawnState], others: Sequence[Points] = ()) -> "Window | None":
+        """A window around all shapes, and other points with them; None if there are no shapes."""
         points = [finger.points for state in states for finger in state.fingers]
-        return cls.of(np.concatenate(points)) if points else None
+        return cls.of(np.concatenate([*points, *others])) if points else None
 
     @classmethod
     def of(cls, points: Points) -> "Window":

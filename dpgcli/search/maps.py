@@ -17,7 +17,7 @@ from dpgcli.search.columns import evaluation_of
 from dpgcli.search.goal import Goal, Range
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.sweeps.evaluation import VALUE_OF, DesignStatus
-from dpgcli.sweeps.expressions import Expression, margins
+from dpgcli.sweeps.expressions import Expression, keeps_unit, margins
 from dpgcli.sweeps.metrics import METRICS
 
 DIFFERENCE = 1e-4  # of a range, either way
@@ -74,6 +74,12 @@ class MapEvaluation:
         wanted = self.names if names is None else names
         found = map_columns(self.goal.base, wanted, values) if wanted else {}
         return self.keys(values) | found
+
+    def unit(self, margin: Expression) -> str:
+        """The unit of a margin; none where its parts are of several, or no sum."""
+        known = {metric.name: metric.unit for metric in METRICS}
+        units = {known.get(name, unit_of(name)) for name in margin.names}
+        return units.pop() if len(units) == 1 and keeps_unit(margin) else ""
 
     def margins(self, columns: Mapping[str, Array], n_designs: int) -> Array:
         """How far smooth constraints are from their limits, (margin, design)."""

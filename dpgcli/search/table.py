@@ -24,6 +24,9 @@ MEETS = Column(
     "meets_all", "", "each target is met within its tolerance, constraints hold", kind=Kind.FLAG
 )
 ACTIVE = Column("active", "", "bounds and constraints that hold it back", kind=Kind.TEXT)
+FINISHED = Column(
+    "finished", "", "whether its search ended by itself; no: a limit ended it", kind=Kind.FLAG
+)
 DTYPES: Mapping[Kind, type] = {Kind.COUNT: np.int64, Kind.FLAG: np.bool_}
 PLACE = (
     Column("search", "", "number of the search", kind=Kind.COUNT),
@@ -53,9 +56,10 @@ class Reached:
 
 @dataclass(frozen=True)
 class GoalTables:
-    """The columns and rows of a goal's tables."""
+    """The columns and rows of a goal's tables; `is_stopped` where limits ended searches."""
 
     goal: Goal
+    is_stopped: bool = False
 
     @cached_property
     def quantities(self) -> Mapping[str, Column]:
@@ -108,7 +112,7 @@ class GoalTables:
         """The columns of the designs found."""
         misfit = (MISFIT,) if self.goal.targets else ()
         own = (DESIGN, *self.value_columns, *self.map_columns, *misfit, MEETS)
-        return (*own, *self._of_targets(), ACTIVE)
+        return (*own, *self._of_targets(), ACTIVE, *((FINISHED,) if self.is_stopped else ()))
 
     def _of_targets(self) -> Iterator[Column]:
         for number, target in enumerate(self.goal.targets, start=1):
@@ -148,7 +152,7 @@ class GoalTables:
             rows[next(told).name] = misses[:, place]
         standings = [self.standing(designs, place) for place in range(n)]
         rows["active"] = np.array([each.active for each in standings], np.str_)
-        return rows
+        return rows | ({"finished": designs.are_finished} if self.is_stopped else {})
 
     def standing(self, designs: Designs, place: int) -> Standing:
         """How one of the designs stands."""

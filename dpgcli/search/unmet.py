@@ -79,7 +79,7 @@ class Standing:
                 yield f"{wish.name} is missed by {wish.amount(wish.lack)}, tolerance {tolerance}"
         for wish in wishes[len(self.goal.targets) :]:
             if not wish.is_met:
-                by = f": it lacks {wish.lack:.4g}" if wish.lack > 0.0 else ""
+                by = f": it lacks {wish.amount(wish.lack)}" if wish.lack > 0.0 else ""
                 yield f"{wish.name} does not hold{by}"
         in_the_way = [line for wish in unmet for line in self._in_the_way(wish)]
         yield from in_the_way
@@ -111,13 +111,15 @@ class Standing:
         for rule, holds in zip(self.goal.constraints, self.design.hold[:, 0], strict=True):
             own = [margin for margin in margins(rule) if margin.text in every]
             found = [float(np.asarray(margin(known)).ravel()[0]) for margin in own]
-            lack, way = np.nan, np.zeros(len(self.goal.ranges))
+            lack, way, least = np.nan, np.zeros(len(self.goal.ranges)), 0
             if own:
                 least = int(np.argmin(found))
                 lack, way = -found[least], -slopes[every[own[least].text]]
             sizes = [abs(float(np.asarray(known[name]).ravel()[0])) for name in rule.names]
-            is_active = bool(holds) and abs(lack) <= ON_LIMIT * max([1e-12, *sizes])
-            yield Wish(rule.text, float(lack), "", way, bool(holds), is_active)
+            sizes.append(float(np.abs(way).sum()))  # from end to end of the ranges
+            is_active = bool(holds) and abs(lack) <= ON_LIMIT * max(sizes)
+            unit = maps.unit(own[least]) if own else ""
+            yield Wish(rule.text, float(lack), unit, way, bool(holds), is_active)
 
     def _bound(self, k: int) -> str:
         each, is_high = self.goal.ranges[k], self.design.points[k, 0] > 0.5

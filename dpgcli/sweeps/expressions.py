@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -159,25 +159,71 @@ def margins(rule: Expression) -> tuple[Expression, ...]:
     return tuple(expression(_with_digits(ast.unparse(node))) for node in found)
 
 
-def contradict(first: Expression, second: Expression) -> bool:
-    """Whether no number meets both, as far as each bounds one name by a number.
+class Bounds(NamedTuple):
+    """Between what numbers a name has to be; whether it may be these themselves."""
 
-    >>> contradict(expression("a > 2"), expression("a < 1")), contradict(*[expression("a > 2")] * 2)
-    (True, False)
-    >>> contradict(expression("a > 2"), expression("2 > a"))
-    True
+    low: float = -np.inf
+    high: float = np.inf
+    has_low: bool = True
+    has_high: bool = True
+
+    @property
+    def are_met(self) -> bool:
+        """Whether any number is between them."""
+        return self.low < self.high or (self.low == self.high and self.has_low and self.has_high)
+
+    def within(self, other: "Bounds") -> "Bounds":
+        """Those of what is within both."""
+        low, high = max(self.low, other.low), min(self.high, other.high)
+        has_low = all(each.has_low for each in (self, other) if each.low == low)
+        has_high = all(each.has_high for each in (self, other) if each.high == high)
+        return Bounds(low, high, has_low, has_high)
+
+
+def bounds(rule: Expression) -> tuple[str, Bounds] | None:
+    """The name that a comparison is about, and its bounds; None where these are not plain to see.
+
+    >>> bounds(expression("2 < a <= 4"))
+    ('a', Bounds(low=2.0, high=4.0, has_low=False, has_high=True))
+    >>> bounds(expression("a > 1 or a < 0")), bounds(expression("a * a > 1"))
+    (None, None)
     """
-    if first.names != second.names or len(first.names) != 1:
-        return False
-    (name,) = first.names
-    low, high = -np.inf, np.inf
-    for margin in (*margins(first), *margins(second)):
+    if len(rule.names) != 1:
+        return None
+    (name,) = rule.names
+    found, parts = Bounds(), margins(rule)
+    for margin in parts:
         at = [float(margin({name: x})) for x in (0.0, 1.0, 2.0)]
         slope = at[1] - at[0]
         if abs(slope) != 1.0 or at[2] - at[1] != slope:  # no bound of the name itself
-            return False
-        low, high = (max(low, -at[0]), high) if slope > 0.0 else (low, min(high, at[0]))
-    return bool(low > high or (low == high and not all(r({name: low}) for r in (first, second))))
+            return None
+        end = -at[0] / slope
+        own = Bounds(low=end) if slope > 0.0 else Bounds(high=end)
+        found = found.within(own)
+    ends = [bool(rule({name: end})) if np.isfinite(end) else True for end in found[:2]]
+    return (name, Bounds(found.low, found.high, *ends)) if parts else None
+
+
+def keeps_unit(rule: Expression) -> bool:
+    """Whether an expression of names of one unit has that unit: a sum of them, and of numbers.
+
+    >>> [keeps_unit(expression(text)) for text in ("a - 2 * b", "min(a, b) / 2", "a * b", "log(a)")]
+    [True, True, False, False]
+    """
+    return _keeps_unit(_body(_without_digits(rule.text)))
+
+
+def _keeps_unit(node: ast.expr) -> bool:
+    if _constant(node) is not None or _dotted(node):
+        return True
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+        first, second = node.left, node.right
+        is_times = isinstance(node.op, ast.Mult) and _constant(first) is not None
+        return (is_times or _constant(second) is not None) and all(map(_keeps_unit, _parts(node)))
+    is_sum = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)
+    is_same = isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not)
+    is_one_of = isinstance(node, ast.Call) and _dotted(node.func) in ("min", "max", "abs")
+    return (is_sum or is_same or is_one_of) and all(map(_keeps_unit, _parts(node)))
 
 
 def _margins(node: ast.expr) -> list[ast.expr]:

@@ -86,7 +86,9 @@ def goal_in(
         of_targets = TargetReader(reader, possible, base_spec.design)
         targets = [of_targets.target(*pair) for pair in enumerate(_listed(document, "targets"))]
         known = {} if base is None else numbers_of(base.data)
-        of_maps = MapReader(reader, base_spec.design, known)
+        ends = {each.key: (each.low, each.high) for each in ranges}
+        ends |= {key: (min(values), max(values)) for key, values in lists.items()}
+        of_maps = MapReader(reader, base_spec.design, known, ends)
         constraints = of_maps.constraints(_listed(document, "constraints"))
         objectives = of_maps.objectives(
             _listed(document, "minimize"), _listed(document, "maximize")

@@ -10,7 +10,7 @@ import numpy as np
 from dpgcli.arrays import Array, Indices, distinct
 from dpgcli.files.scene_file import spelled
 from dpgcli.reports.explorer.shapes import NO_BASE, Shapes, rounded
-from dpgcli.reports.outlines import DrawnState
+from dpgcli.reports.outlines import DrawnState, Points
 from dpgcli.reports.summary import METRICS, DesignSpace, extremes, varies
 from dpgcli.text import printable, shortened
 
@@ -24,11 +24,15 @@ BEST = {True: "largest", False: "nearest zero"}
 
 @dataclass(frozen=True)
 class BestDesign:
-    """A design that is the best by some metrics, in the row of a table, and states of it."""
+    """A design that is the best by some metrics, in the row of a table, and states of it.
+
+    `body` are points around the body that its fingers meet, none without one.
+    """
 
     row: int
     metrics: Sequence[str]
     states: Sequence[DrawnState]
+    body: Points | None = None
 
 
 @dataclass(frozen=True)

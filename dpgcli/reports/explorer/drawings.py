@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from dpgcli.reports.explorer.content import BestDesign
-from dpgcli.reports.outlines import DrawnState, FingerShape, Points
+from dpgcli.reports.outlines import FingerShape, Points
 from dpgcli.reports.panels import Window
 from dpgcli.reports.summary import DesignSpace
 from dpgcli.text import printable
@@ -15,17 +15,19 @@ LEGEND = (
     "Each design is the best by what stands below it. Outlined at rest, filled with all units "
     "inverted; all at one scale. The thick line is the limiting layer."
 )
+OF_BODY = " Dashed: the body; the fingers are as they are without it."
 
 
 def best_designs(space: DesignSpace, best: Sequence[BestDesign], rows: Sequence[int]) -> str:
     """Figures of the best designs; `rows` are those that the explorer knows."""
-    window = Window.around([state for design in best for state in design.states])
+    bodies = [design.body for design in best if design.body is not None]
+    window = Window.around([state for design in best for state in design.states], bodies)
     if window is None:
         return ""
     figures = "\n".join(
         _figure(space, design, window, rows.index(design.row)) for design in best if design.states
     )
-    return f'<p>{LEGEND}</p>\n<div class="shapes">\n{figures}\n</div>\n'
+    return f'<p>{LEGEND}{OF_BODY if bodies else ""}</p>\n<div class="shapes">\n{figures}\n</div>\n'
 
 
 def _figure(space: DesignSpace, design: BestDesign, window: Window, place: int) -> str:
@@ -39,15 +41,17 @@ def _figure(space: DesignSpace, design: BestDesign, window: Window, place: int) 
     at = ", ".join(f"{name} {value}" for name, value in values)
     button = f'<button type="button" data-row="{place}" hidden>Explore design {number}</button>'
     caption = f"<strong>Design {number}</strong>: {_text(best)}<br>{_text(at)}<br>{button}"
-    drawing = "\n".join(_svg(design.states, window, said))
+    drawing = "\n".join(_svg(design, window, said))
     return f"<figure>\n{drawing}\n<figcaption>{caption}</figcaption>\n</figure>"
 
 
-def _svg(states: Sequence[DrawnState], window: Window, said: str) -> Iterator[str]:
+def _svg(design: BestDesign, window: Window, said: str) -> Iterator[str]:
     box = (window.left, -window.top, *window.size)
     shape = " ".join(f"{value:.3f}" for value in box)
     yield f'<svg viewBox="{shape}" role="img" aria-label="{_text(said)}">'
-    for state in states:
+    if design.body is not None:
+        yield f'<polygon class="body" points="{_points(design.body)}"/>'
+    for state in design.states:
         for finger in state.fingers:
             yield from _straight(finger) if not finger.are_inverted.any() else _filled(finger)
     yield "</svg>"

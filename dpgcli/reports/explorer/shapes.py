@@ -22,6 +22,9 @@ NOT_COMPOSED = (
     "draws them."
 )
 NOT_HERE = "No states are drawn: this page has those of other designs only."
+TOO_LONG = (
+    f"No states are drawn: a page has those of up to {MOST_UNITS} units. `dpg predict` draws some."
+)
 NO_TABLE = "No states are drawn: there is no states.parquet of this sweep beside the table."
 NO_BASE = "No states are drawn: the table does not say what its designs are made from."
 NOTE = (
