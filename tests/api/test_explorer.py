@@ -10,10 +10,13 @@ import pyarrow.parquet as pq
 import pytest
 
 import dpgcli as dpg
-from dpgcli.api.explorer import explored
+from dpgcli.api import explorer as module
+from dpgcli.api.explorer import WITHOUT_BODY, explored
 from dpgcli.api.report import space_in
+from dpgcli.reports.base import base_lines
 from dpgcli.reports.explorer import shapes as reasons
 from dpgcli.reports.explorer.content import content
+from dpgcli.reports.explorer.drawings import best_designs
 
 ROOT = Path(dpg.__file__).parent.parent
 HEIGHT = "finger.geometry.dome_height_mm"
@@ -123,6 +126,28 @@ def test_a_gripper_is_drawn_as_one_finger(tmp_path: Path) -> None:
     shapes = data_of(folder)["shapes"]
     assert "one finger, in its own frame" in shapes["note"]
     assert why(folder)[1:] == [None, None]
+
+
+def test_the_body_is_drawn_and_states_are_without_it(tmp_path: Path) -> None:
+    """A disc is drawn around its place, and the base spec that is shown has it, too."""
+    folder = swept(tmp_path, "finger.units=2", base="gripper_and_can")
+    space = space_in(folder)
+    shown = explored(folder, space)
+    best = shown.best[0]
+    assert best.body is not None
+    assert np.abs(best.body - 40.0) == pytest.approx(20.0)
+    assert any(WITHOUT_BODY in note for note in shown.shapes.notes)
+    drawn = best_designs(space, shown.best, shown.rows.tolist())
+    assert drawn.count('<polygon class="body"') == len(shown.best)
+    assert "Dashed: the body" in drawn
+    assert any("object.at_mm 40/0" in line for line in base_lines(space.metadata))
+
+
+def test_long_fingers_are_not_drawn_and_that_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MOST_UNITS", 2)
+    assert set(why(swept(tmp_path))[1:]) == {reasons.TOO_LONG}
 
 
 def test_the_same_tables_give_the_same_page(tmp_path: Path) -> None:

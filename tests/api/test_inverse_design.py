@@ -218,6 +218,28 @@ def test_goals_are_validated_and_other_commands_name_the_right_one(
 ) -> None:
     assert dpg.validate(goal()) == ()
     assert [p.key for p in dpg.validate(goal(minimize=["mass_g"]))] == ["minimize.0"]
-    for call in (dpg.explain, dpg.predict):
-        with pytest.raises(SpecError):
-            call(goal())
+    with pytest.raises(SpecError):
+        dpg.predict(goal())
+
+
+def test_goals_are_explained(goal: Callable[..., Goal]) -> None:
+    """How each column is followed, what is tried, and nothing solved."""
+    opening = {"pattern": "11*", "quantity": "opening_1_mm", "value": 3.4, "tolerance_mm": 0.1}
+    given = goal(constraints=["n_stable >= 4"])
+    given["targets"].append(opening)
+    plan = dpg.explain(given)
+    assert plan.slopes == {
+        "tip_x_mm": "exact", "tip_y_mm": "exact", "opening_1_mm": "differences", "n_stable": "none"
+    }  # fmt: skip
+    assert (plan.n_choices, plan.n_starts, plan.most_states) == (1, 32, 4)
+    assert plan.are_all_tried
+    many = dpg.explain(goal(vary={STROKE: [2.5 + k / 1000 for k in range(1001)]}))
+    assert not many.are_all_tried and many.n_starts == 1
+    with pytest.raises(UsageError, match="are for specs: sweeps and goals have"):
+        dpg.explain(given, patterns="11*")
+
+
+def test_which_searches_a_limit_ended_is_said(goal: Callable[..., Goal]) -> None:
+    found = dpg.inverse_design(goal(), evaluations=1)
+    assert not found.table["finished"].any()
+    assert "finished" not in dpg.inverse_design(goal()).table.names

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import dpgcli as dpg
+from dpgcli.errors import NothingSelectedError, UsageError
 
 STROKE = "finger.lattice.stroke_mm"
 SPACE: list[dict[str, Any]] = [
@@ -94,6 +95,22 @@ def test_nothing_left_says_why(swept: Any) -> None:
     excluded = swept.designs.to_pandas().assign(status="excluded")
     with pytest.raises(dpg.NothingSelectedError, match="0 with stable states, 8 excluded"):
         dpg.pick(excluded)
+
+
+def test_a_design_that_is_not_chosen_says_why(folder: Path) -> None:
+    """One that is not there with the numbers that are, an invalid one with its problem."""
+    space = [{"key": STROKE, "values": [2.0, 3.0]}, {"key": "finger.units", "values": [0, 2]}]
+    sweep = {"base": "study.yaml", "space": space, "constraints": ["stroke_mm > 2.5"]}
+    dpg.sweep(sweep, "out", **SERIAL)
+    for states, numbers in ((False, "0 to 3"), (True, "3 to 3")):
+        with pytest.raises(UsageError, match=f"^design 999: .* has {numbers}$"):
+            dpg.pick("out", design=999, states=states)
+    with pytest.raises(NothingSelectedError, match="design 0 is excluded: it does not meet the sw"):
+        dpg.pick("out", design=0)
+    with pytest.raises(NothingSelectedError, match=r"design 2 is invalid: finger\.units: expected"):
+        dpg.pick("out", design=2)
+    with pytest.raises(NothingSelectedError, match=r"^nothing selected\n4 designs"):
+        dpg.pick("out", "n_stable > 99", design=3)
 
 
 def test_saved_rows_are_not_put_over_what_they_come_from(swept: Any) -> None:

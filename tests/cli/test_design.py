@@ -108,10 +108,36 @@ def test_validate_takes_goals_and_others_say_which_command_does(
 ) -> None:
     name = goal("[36, -16]")
     assert run("validate", name).stdout == f"{name}: ok\n"
-    for command in ("predict", "explain"):
-        done = run(command, name)
-        assert done.returncode == 2
-        assert "a goal (dpg design takes it)" in done.stderr
+    done = run("predict", name)
+    assert done.returncode == 2
+    assert "a goal (dpg design takes it)" in done.stderr
     done = run("validate", goal("[36]", "bad.yaml"))
     assert done.returncode == 2
     assert "bad.yaml:6:" in done.stdout
+
+
+def test_explain_says_how_a_goal_is_searched_for(run: Run, goal: Callable[[str], str]) -> None:
+    done = run("explain", goal("[36, -16]"))
+    assert done.returncode == 0
+    for said in (
+        "goal.yaml: a goal around three_unit.yaml",
+        "finger.geometry.dome_height_mm               4.5 … 7.5",
+        "target 1     tip of 11*: 36, -16 ± 0.5",
+        "tip_x_mm: exact slopes",
+        "32 starts, without limits",
+        "2 states of a design at most",
+    ):
+        assert said in done.stdout
+    facts = json.loads(run("explain", "goal.yaml", "--format", "json").stdout)
+    assert facts["ranges"]["finger.geometry.unit_separation_mm"] == [2.0, 4.0]
+    assert facts["slopes"] == {"tip_x_mm": "exact", "tip_y_mm": "exact"}
+
+
+def test_processes_and_where_they_are(run: Run, goal: Callable[[str], str]) -> None:
+    name = goal("[36, -16]")
+    done = run("design", name, "-o", "found", "-j", "2", "-q")
+    assert done.returncode == 0, done.stderr
+    assert run("design", name, "-q").stdout == done.stdout
+    done = run("design", name, "--executor", "dask")
+    assert done.returncode == 2
+    assert "--executor dask and --scheduler tcp://host:port go together" in done.stderr

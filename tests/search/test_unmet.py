@@ -72,3 +72,22 @@ def test_nothing_is_said_where_all_is_met(goal: Make) -> None:
 def test_active_constraints_are_named(goal: Make) -> None:
     made = goal(TWO + "constraints: [min_barrier_mJ > 1]\nminimize: [dome_height_mm]")
     assert standing(made).active == "unit_separation_mm >= 2.5, min_barrier_mJ > 1"
+
+
+def test_what_constraints_lack_has_their_unit(goal: Make) -> None:
+    lines = (
+        "constraints: [min_barrier_mJ > 100, dome_height_mm - unit_separation_mm > 40, "
+        "reach_min_mm * dome_height_mm > 1.0e+6]\n"
+    )
+    said = "\n".join(standing(goal(TWO + lines)).lines())
+    assert re.search(r"min_barrier_mJ > 100 does not hold: it lacks [\d.]+ mJ$", said, re.M)
+    assert re.search(r"unit_separation_mm > 40 does not hold: it lacks [\d.]+ mm$", said, re.M)
+    assert re.search(r"1000000.0 does not hold: it lacks [\d.e+]+$|6 does not hold: it lacks", said)
+
+
+def test_a_constraint_at_zero_is_active_at_its_limit(goal: Make) -> None:
+    """Where what it is about is as good as nothing, its own size says nothing."""
+    rule = "reach_min_mm - 62 > 0"
+    assert standing(goal(TWO + f"constraints: [{rule}]\nminimize: [reach_min_mm]")).active == rule
+    made = goal(TWO + "constraints: [dome_height_mm - 6.5 <= 0]\nmaximize: [dome_height_mm]")
+    assert "dome_height_mm - 6.5 <= 0" in standing(made).active
