@@ -14,6 +14,7 @@ EXAMPLES = {
     "explain": (
         "dpg explain finger.yaml",
         "dpg explain sweep.yaml",
+        "dpg explain goal.yaml",
         "dpg explain finger.yaml --columns default,stiffness --target-error 0.01mm",
     ),
     "sweep": (
@@ -36,6 +37,7 @@ EXAMPLES = {
         "dpg design goal.yaml",
         "dpg design goal.yaml --output found --seed 2",
         "dpg design goal.yaml --evaluations 5000 --format csv > designs.csv",
+        "dpg design goal.yaml --output found --jobs 2",
     ),
     "bench": (
         "dpg bench finger.yaml",

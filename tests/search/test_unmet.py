@@ -87,7 +87,6 @@ def test_what_constraints_lack_has_their_unit(goal: Make) -> None:
 
 def test_a_constraint_at_zero_is_active_at_its_limit(goal: Make) -> None:
     """Where what it is about is as good as nothing, its own size says nothing."""
-    rule = "reach_min_mm - 62 > 0"
-    assert standing(goal(TWO + f"constraints: [{rule}]\nminimize: [reach_min_mm]")).active == rule
-    made = goal(TWO + "constraints: [dome_height_mm - 6.5 <= 0]\nmaximize: [dome_height_mm]")
-    assert "dome_height_mm - 6.5 <= 0" in standing(made).active
+    rule = "aperture_min_mm >= 0"
+    lines = TWO + f"constraints: [{rule}]\nminimize: [aperture_min_mm]"
+    assert standing(goal(lines, "finger.units=4", base="gripper")).active == rule
