@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
+MOST_PROCESSES = 4096  # more than any machine has cores
+
 
 @dataclass(frozen=True)
 class Cores:

@@ -19,7 +19,9 @@ from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
-from dpgcli.search.search import Limits, Searched, search
+from dpgcli.search.columns import body_columns, pressed_columns
+from dpgcli.search.goal import Goal
+from dpgcli.search.search import MOST_CHOICES, Limits, Searched, search
 from dpgcli.search.table import GoalTables, Reached
 from dpgcli.search.targets import reason_against
 from dpgcli.search.unmet import how_slopes_are_found
@@ -103,6 +105,8 @@ class InverseDesignResult:
         )
         empty = f", {found.n_empty:,} of them without such states" if found.n_empty else ""
         yield f"{tried}{empty}{'; stopped by the limit' if found.is_stopped else ''}"
+        if goal.n_choices > MOST_CHOICES:
+            yield f"a population found which of {goal.n_choices:,} combinations to search for"
         yield from how_slopes_are_found(goal) if goal.ranges else ()
 
     @property
@@ -245,7 +249,12 @@ def found_for(
         workplace = held.enter_context(place.workplace(say))
         study = SearchStudy(given, ends.seed, limits, workplace, folder)
         study.begin(restart=restart)
-        found = _result(given, search(given.goal, ends.seed, limits, study.run))
+        searched = search(given.goal, ends.seed, limits, study.run)
+        try:
+            found = _result(given, searched)
+        except NothingSelectedError:  # with which nobody goes on
+            study.store.drop()
+            raise
         if output is not None:
             found._write(output)
         study.store.drop()
@@ -258,6 +267,8 @@ def _result(given: GoalFile, searched: Searched) -> InverseDesignResult:
     if not len(best):
         patterns = ", ".join(dict.fromkeys(t.pattern for t in given.goal.of_states))
         n, of = counted(searched.n_starts, "start"), f" of {patterns}" if patterns else ""
+        if names := _not_of_all_states(given.goal):
+            of += f" that have {enumerated(names)}"
         why = reason_against(given.goal)
         because = f": {why}" if why else ""
         raise NothingSelectedError(f"none of {n} is a finger with certified states{of}{because}")
@@ -268,6 +279,12 @@ def _result(given: GoalFile, searched: Searched) -> InverseDesignResult:
     specs = tuple(design_spec(given.base_document, own) for own in designs)
     found = tuple(reached(given.goal, spec, best, k) for k, spec in enumerate(specs))
     return InverseDesignResult(given, searched, specs, found)
+
+
+def _not_of_all_states(goal: Goal) -> list[str]:
+    """Quantities of targets that certified states may have none of: with a body, under pressure."""
+    some = body_columns(goal.base).keys() | pressed_columns(goal.base).keys()
+    return [*dict.fromkeys(t.quantity for t in goal.of_states if t.quantity in some)]
 
 
 def _plain(key: str, value: Any) -> float | int:

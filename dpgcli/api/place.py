@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dpgcli.api.inputs import check_numbers, check_texts, check_whole
-from dpgcli.cores import cores
+from dpgcli.cores import MOST_PROCESSES, cores
 from dpgcli.errors import Field, UsageError
 from dpgcli.text import quoted
 
@@ -41,8 +41,9 @@ class Place:
         dask, scheduler = Field("executor"), Field("scheduler")
         if self.executor not in EXECUTORS:
             raise UsageError(dask, f" {quoted(self.executor)}: expected {', '.join(EXECUTORS)}")
-        if self.jobs is not None and self.jobs < 1:
-            raise UsageError(Field("jobs"), f" {self.jobs}: expected 1 process or more")
+        if self.jobs is not None and not 1 <= self.jobs <= MOST_PROCESSES:
+            expected = f"expected 1 process or more, {MOST_PROCESSES:,} at most"
+            raise UsageError(Field("jobs"), f" {self.jobs}: {expected}")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
         if self.scheduler is not None:

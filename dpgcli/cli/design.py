@@ -8,7 +8,6 @@ import typer
 
 from dpgcli.cli.exits import ExitCode, Terminated, say_warnings
 from dpgcli.cli.options import (
-    MOST_PROCESSES,
     ExecutorName,
     Quiet,
     Restart,
@@ -22,6 +21,7 @@ from dpgcli.cli.options import (
 from dpgcli.cli.printing import Format, print_rows
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
+from dpgcli.cores import MOST_PROCESSES
 
 GoalPath = Annotated[
     Path, typer.Argument(metavar="GOAL", help="YAML file of a goal; - reads standard input")

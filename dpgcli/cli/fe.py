@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dpgcli.cli.commands import add_command
-from dpgcli.cli.options import MOST_PROCESSES, Patterns, Quiet, Settings, SpecPath
+from dpgcli.cli.options import Patterns, Quiet, Settings, SpecPath
 from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import put, say
+from dpgcli.cores import MOST_PROCESSES
 
 if TYPE_CHECKING:
     from dpgcli.calibration.fe.hinge import HingeChambers

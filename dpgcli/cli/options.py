@@ -51,7 +51,6 @@ Tolerance = Annotated[
 
 
 LONG = 30.0  # s of one core: what takes longer is said before
-MOST_PROCESSES = 4096  # more than any machine has cores
 MICRO = ("um", "\u00b5m", "\u03bcm")  # the micro sign and the Greek letter
 POWERS = {"": 0, "mm": 0, **dict.fromkeys(MICRO, -3), "nm": -6, "m": 3}  # of ten, in mm
 TargetError = Annotated[

@@ -15,7 +15,6 @@ from dpgcli.cli.check import append_summary, code_of, print_verdicts
 from dpgcli.cli.depfile import Depfile, depfile_text
 from dpgcli.cli.exits import ExitCode, Terminated, check_failed, say_warnings
 from dpgcli.cli.options import (
-    MOST_PROCESSES,
     ExecutorName,
     MaxFailed,
     Quiet,
@@ -33,7 +32,7 @@ from dpgcli.cli.options import (
 from dpgcli.cli.progress import ProgressLine
 from dpgcli.cli.streams import put, say
 from dpgcli.cli.validate import ProblemFormat
-from dpgcli.cores import cores
+from dpgcli.cores import MOST_PROCESSES, cores
 
 if TYPE_CHECKING:
     from dpgcli.api.place import Place

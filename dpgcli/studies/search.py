@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.errors import Field, UsageError, WorkplaceError
-from dpgcli.files.access import writing
+from dpgcli.files.access import reading, writing
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.parts import FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import canonical, canonical_json
@@ -126,7 +126,7 @@ class SearchStudy:
                     file.write(result.value)
         kept = self._kept()
         for number in numbered:
-            yield unpacked(kept[number].read_bytes()) if number in kept else None
+            yield _read(kept[number]) if number in kept else None
 
     def _kept(self) -> dict[int, Path]:
         """The files of parts that are there, by number."""
@@ -180,6 +180,12 @@ def unpacked(content: bytes) -> Found:
         known["are_finished"],
     )
     return Found(designs, trace, *(int(known[name]) for name in COUNTS))
+
+
+def _read(path: Path) -> Found:
+    with reading(path):
+        content = path.read_bytes()
+    return unpacked(content)
 
 
 def _under(name: str, known: Mapping[str, Any]) -> dict[str, Any]:

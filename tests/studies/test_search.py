@@ -9,7 +9,7 @@ import pytest
 
 import dpgcli as dpg
 from dpgcli.api.given import goal_input
-from dpgcli.errors import UsageError, WorkplaceError
+from dpgcli.errors import NothingSelectedError, UsageError, WorkplaceError
 from dpgcli.search import search as module
 from dpgcli.search.part import Clock, Found, Part, searched_part
 from dpgcli.search.search import Limits, Task, search
@@ -168,3 +168,12 @@ def test_limits_go_on_with_other_starts_and_are_shared(goal: dict[str, Any]) -> 
     assert [part.stream for parts in asked for part in parts] == numbers
     assert {part.evaluations for part in asked[0]} == {80}
     assert asked[1][0].evaluations is not None and asked[1][0].evaluations < 80
+
+
+def test_what_nobody_can_go_on_with_is_not_kept(goal: dict[str, Any], tmp_path: Path) -> None:
+    """Where no start is a finger, another goal may go into the folder."""
+    hinge = {"finger.lattice.hinge_stiffness_N_mm_per_rad": {"from": 1000.0, "to": 2000.0}}
+    with pytest.raises(NothingSelectedError):
+        dpg.inverse_design({**goal, "vary": hinge}, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert dpg.inverse_design(goal, tmp_path / "out").specs

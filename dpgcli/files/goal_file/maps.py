@@ -141,11 +141,8 @@ def _contradict(name: str, own: Bounds, other: str, theirs: Bounds) -> bool:
         ((other, theirs), (name, own)),
     ):
         if (low, high) in ORDERED:
-            return (
-                not Bounds(low=least.low, has_low=least.has_low)
-                .within(Bounds(high=most.high, has_high=most.has_high))
-                .are_met
-            )
+            between = Bounds(least.low, most.high, least.has_low, most.has_high)
+            return not between.are_met
     return False
 
 
