@@ -95,7 +95,7 @@ def test_affinity_counts() -> None:
 def test_a_sweep_takes_the_cores_that_it_may_use(
     monkeypatch: pytest.MonkeyPatch, usable: int, name: str
 ) -> None:
-    monkeypatch.setattr("dpgcli.api.sweep.cores", lambda: Cores(64, 64, float(usable)))
+    monkeypatch.setattr("dpgcli.api.place.cores", lambda: Cores(64, 64, float(usable)))
     with Place().workplace(lambda _: None) as found:
         assert (found.name, found.n_workers) == (name, usable)
     with Place(jobs=2).workplace(lambda _: None) as found:

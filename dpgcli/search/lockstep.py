@@ -60,8 +60,8 @@ def in_lockstep(
             asked.put((number, None))
 
     with ThreadPoolExecutor(max(n_searches, 1)) as pool:
-        running = [pool.submit(run, number) for number in range(n_searches)]
-        try:
+        try:  # a signal may come while threads are started, too
+            running = [pool.submit(run, number) for number in range(n_searches)]
             _answer_all(askers, asked, evaluate)
         except BaseException:
             for asker in askers:  # so that no thread waits for good

@@ -1,6 +1,8 @@
 """Optima under constraints: known fronts and optima, rules without slopes, many in lockstep."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,6 +106,24 @@ def test_what_goes_wrong_in_a_batch_or_a_search_ends_all() -> None:
         in_lockstep(run, 3, lambda _, numbers: [0.0] * len(numbers))
     with pytest.raises(ZeroDivisionError):
         in_lockstep(lambda _, ask: ask(np.zeros(1)), 3, lambda *_: [1.0 / 0.0])
+
+
+def test_whoever_is_stopped_while_searches_begin_waits_for_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As by Ctrl-C: those that have begun would wait for their answers without end."""
+    submit, begun = ThreadPoolExecutor.submit, []
+
+    def stopping(self: ThreadPoolExecutor, *arguments: Any) -> Any:
+        begun.append(arguments[-1])
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        return submit(self, *arguments)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        in_lockstep(lambda _, ask: ask(np.zeros(1)), 4, lambda _, numbers: [0.0] * len(numbers))
+    assert begun == [0, 1, 2]
 
 
 def test_margins_and_slopes_of_maps_are_those_of_sweeps(goal: Make) -> None:
