@@ -26,7 +26,7 @@ from dpgcli.files.trust import with_bases
 from dpgcli.states.columns import Column
 from dpgcli.sweeps.choice import Question, check_undoubted, question, selected, warnings_of
 from dpgcli.sweeps.gate import counts_of
-from dpgcli.text import counted
+from dpgcli.text import counted, printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -200,7 +200,8 @@ def _usable(source: RowSource, columns: Columns) -> tuple[Flags, str]:
         is_usable = np.asarray((columns["n_stable"] > 0) & (status != "excluded"), bool)
         left, with_what = status, "with stable states"
     others = Counter(left[~is_usable].tolist())
-    rest = "".join(f", {n:,} {name}" for name, n in sorted(others.items()))
+    named = ((printable(name) or "without a status", n) for name, n in sorted(others.items()))
+    rest = "".join(f", {n:,} {name}" for name, n in named)
     return is_usable, f"{counted(len(status), source.what)}: {is_usable.sum():,} {with_what}{rest}"
 
 

@@ -23,10 +23,14 @@ from dpgcli.files.parts import BASE
 from dpgcli.files.scene_file.settings import changed
 from dpgcli.files.table_reader import (
     NEEDED,
+    NUMBERS,
+    TEXT,
+    WHOLE,
+    check_kinds,
+    check_names,
+    column_of,
     is_number,
     is_text,
-    numbers_in,
-    texts_in,
     trusts_of,
     undamaged_file,
     with_dictionaries,
@@ -38,7 +42,7 @@ from dpgcli.sweeps.evaluation import VALUE_OF
 from dpgcli.text import printable
 
 STATES = Field("states")
-OF_STATES = ("design", "pattern", "status")
+OF_STATES = {"design": WHOLE, "pattern": TEXT, "status": TEXT}
 KINDS = {"b": Kind.FLAG, "i": Kind.COUNT, "f": Kind.NUMBER}  # by the kind of NumPy's type
 
 
@@ -55,6 +59,11 @@ class RowSource:
     def what(self) -> str:
         """What a row is."""
         return "state" if self.has_states else "design"
+
+    @property
+    def needed(self) -> dict[str, str]:
+        """The columns that it has to have, and what they hold."""
+        return OF_STATES if self.has_states else NEEDED
 
     @property
     def schema(self) -> Any:
@@ -98,7 +107,7 @@ class RowSource:
         return {name: text.removeprefix(VALUE_OF) for name, text in begun.items()}
 
     def columns(self, names: Sequence[str]) -> Columns:
-        """Whole columns, as numbers or texts. Raises UsageError for what is neither."""
+        """Whole columns, as numbers or texts. Raises UsageError for what is not as it should."""
         if self.stream is None:
             return self._plain(self.table.select([*names]))
         return self._plain(with_dictionaries(self.stream, self.table, [*names]))
@@ -145,12 +154,14 @@ class RowSource:
         return DesignRow(self.name, row["design"], values, self.metadata)
 
     def _plain(self, table: Any) -> Columns:
-        found = {name: _values(table.column(name)) for name in table.column_names}
-        for name, column in found.items():
-            if column is None:
-                kind = table.column(name).type
-                raise UsageError(f"{self.name}: column {name}: expected numbers, found {kind}")
-        return {name: column for name, column in found.items() if column is not None}
+        names = table.column_names
+        return {name: self._plain_column(name, table.column(name)) for name in names}
+
+    def _plain_column(self, name: str, column: Any) -> NDArray[Any]:
+        """Numbers, truths or texts."""
+        kind = self.needed.get(name, TEXT if is_text(column.type) else NUMBERS)
+        found = column_of(self.name, name, column, kind)
+        return found == 1 if pa.types.is_boolean(column.type) and kind == NUMBERS else found
 
 
 @dataclass(frozen=True)
@@ -196,27 +207,12 @@ def opened_rows(source: Path | Any, *, has_states: bool) -> Iterator[RowSource]:
 
 
 def _checked(source: RowSource) -> RowSource:
-    names, what = source.schema.names, f"{source.what}s"
-    needed = OF_STATES if source.has_states else NEEDED
-    if not source.has_states and {*OF_STATES} <= {*names}:
-        raise UsageError(f"{source.name} is a table of states: choose among them with ", STATES)
-    if missing := [name for name in needed if name not in names]:
-        raise UsageError(
-            f"{source.name} is no table of {what}: no column {', '.join(missing)}; "
-            f"dpg sweep writes one, {what}.parquet"
-        )
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        found = f"{', '.join(twice)} again"
-        raise UsageError(f"{source.name}: expected each column once, found {found}")
+    name, schema = source.name, source.schema
+    if not source.has_states and {*OF_STATES} <= {*schema.names}:
+        raise UsageError(f"{name} is a table of states: choose among them with ", STATES)
+    check_names(name, schema, f"{source.what}s", source.needed)
+    check_kinds(name, schema, dict.fromkeys(source.swept, NUMBERS) | source.needed)
     return source
-
-
-def _values(column: Any) -> NDArray[Any] | None:
-    """Numbers, truths or texts; None where it has none of these."""
-    if is_text(column.type):
-        return texts_in(column)
-    found = numbers_in(column)
-    return found == 1 if found is not None and pa.types.is_boolean(column.type) else found
 
 
 def _texts_of(described: Any) -> dict[str, str]:

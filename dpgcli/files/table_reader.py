@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -23,8 +23,14 @@ from dpgcli.files.trust import outputs_of, trusts_in
 from dpgcli.sweeps.metrics import METRICS
 
 TEXTS = ("calibration", "status", "reason", "accuracy_level", "reachable_patterns")
-COUNTS = ("design", "n_stable")
-NEEDED = ("design", "calibration", "status", "reason", "n_stable")
+TEXT, WHOLE, NUMBERS = "text", "whole numbers", "numbers"
+NEEDED = {
+    "design": WHOLE,
+    "calibration": TEXT,
+    "status": TEXT,
+    "reason": TEXT,
+    "n_stable": WHOLE,
+}
 OTHERS = {*NEEDED, *TEXTS, "error_bound_mm", *(metric.name for metric in METRICS)}  # not swept
 MOST_FACTS = 2**26  # bytes
 DAMAGED = (
@@ -182,25 +188,38 @@ def _readable(source: str, described: Any) -> list[str]:
 
     Raises UsageError for what is no table of designs.
     """
+    check_names(source, described, "designs", NEEDED)
+    swept = swept_in(described)
+    check_kinds(source, described, dict.fromkeys(swept, NUMBERS) | NEEDED)
+    names = _in_our_order(described.names, swept)
+    return [name for name in names if _may_hold(described.field(name).type, _kind(name))]
+
+
+def check_names(source: str, described: Any, what: str, needed: Iterable[str]) -> None:
+    """Raise UsageError where a schema lacks columns that it needs, or has some twice."""
     names = described.names
-    if missing := [name for name in NEEDED if name not in names]:
+    if missing := [name for name in needed if name not in names]:
         raise UsageError(
-            f"{source} is no table of designs: no column {', '.join(missing)}; "
-            "dpg sweep writes one, designs.parquet"
+            f"{source} is no table of {what}: no column {', '.join(missing)}; "
+            f"dpg sweep writes one, {what}.parquet"
         )
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
-    swept = swept_in(described)
-    kept = []
-    for field in (described.field(name) for name in _in_our_order(names, swept)):
-        is_readable = is_number(field.type)
-        if field.name in TEXTS:  # empty ones come back from CSV as numbers, or as nothing
-            is_readable |= is_text(field.type) or pa.types.is_null(field.type)
-        if is_readable:
-            kept.append(field.name)
-        elif field.name in (*NEEDED, *swept):
-            raise _wrong_type(source, field.name, field.type)
-    return kept
+
+
+def check_kinds(source: str, described: Any, kinds: Mapping[str, str]) -> None:
+    """Raise UsageError where a column is of a type that cannot hold what it should."""
+    for name, kind in kinds.items():
+        found = described.field(name).type
+        if not _may_hold(found, kind):
+            raise _wrong_type(source, name, kind, found)
+
+
+def _may_hold(kind: Any, wanted: str) -> bool:
+    """Whether a type may hold values: empty texts come back from CSV as numbers, or as nothing."""
+    if wanted == TEXT and (is_text(kind) or pa.types.is_null(kind)):
+        return True
+    return is_number(kind)
 
 
 def swept_in(described: Any) -> list[str]:
@@ -236,11 +255,19 @@ def is_text(kind: Any) -> bool:
 
 
 def _kind(name: str) -> str:
-    return "text" if name in TEXTS else "whole numbers" if name in COUNTS else "numbers"
+    return NEEDED.get(name, TEXT if name in TEXTS else NUMBERS)
 
 
-def _wrong_type(source: str, name: str, kind: Any) -> UsageError:
-    return UsageError(f"{source}: column {name}: expected {_kind(name)}, found {kind}")
+def _wrong_type(source: str, name: str, kind: str, found: Any) -> UsageError:
+    return UsageError(f"{source}: column {name}: expected {kind}, found {found}")
+
+
+def column_of(source: str, name: str, column: Any, kind: str) -> NDArray[Any]:
+    """The values of a column that has to be there, of a kind. Raises UsageError for others."""
+    plain = READERS[kind](column)
+    if plain is None:
+        raise _wrong_type(source, name, kind, column.type)
+    return plain
 
 
 def _plain(source: str, table: Any) -> Columns:
@@ -250,11 +277,10 @@ def _plain(source: str, table: Any) -> Columns:
     columns: Columns = {}
     for name in names:
         column = table.column(name)
-        plain = READERS[_kind(name)](column)
-        if plain is not None:
+        if name in (*NEEDED, *swept):
+            columns[name] = column_of(source, name, column, _kind(name))
+        elif (plain := READERS[_kind(name)](column)) is not None:
             columns[name] = plain
-        elif name in (*NEEDED, *swept):
-            raise _wrong_type(source, name, column.type)
     return columns
 
 
@@ -315,7 +341,7 @@ def _unboxed(column: Any) -> NDArray[Any]:
     return np.concatenate([empty, *map(np.from_dlpack, column.chunks)])
 
 
-READERS = {"text": texts_in, "whole numbers": _whole, "numbers": numbers_in}
+READERS = {TEXT: texts_in, WHOLE: _whole, NUMBERS: numbers_in}
 
 
 def _facts(path: Path) -> dict[str, Any]:

@@ -3,16 +3,20 @@
 import logging
 import re
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from socket import getaddrinfo
 from threading import Thread
 from time import monotonic, sleep
-from typing import Any
+from traceback import format_exc
+from typing import Any, ParamSpec, TypeVar
 
 from dpgcli.errors import Field, Message, NoWorkerError, UsageError
-from dpgcli.sweeps.executors import GO_ON, PERIOD, Backend
+from dpgcli.sweeps.executors import GO_ON, PERIOD, TRIALS, Backend
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 PATIENCE = 10  # s, for an answer of the scheduler
 SILENCE = 10  # s after which a word is said
@@ -103,7 +107,7 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Ba
         opened.pop_all()  # whoever has the workers closes it
     return Backend(
         name,
-        lambda _: client.get_executor(pure=False),
+        lambda _: ClusterExecutor(client),
         n_workers,
         is_local=False,
         broken=(BrokenExecutor, KilledWorker),
@@ -112,6 +116,62 @@ def dask_cluster(scheduler: str, limit: float, say: Callable[[str], None]) -> Ba
         watch=watch,
         close=client.close,
     )
+
+
+class ClusterExecutor(Executor):
+    """The workers of a client of Dask; what is wrong with them is told from errors of the work.
+
+    Work is done or raises, and both come back as results: whatever Dask itself raises is of its
+    workers. One that closes, as batch systems have it, may still be sent a task, and says
+    RuntimeError; Dask tries another, and if none takes it, workers are broken. (Dask's own
+    executor hands this out as if it came from the work, and what is lost as worse.)
+    """
+
+    def __init__(self, client: Any) -> None:
+        self.client = client
+
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        """Send work to some worker."""
+        try:
+            asked = self.client.submit(_done, fn, args, kwargs, pure=False, retries=TRIALS)
+        except Exception as error:
+            if self.client.status in ("closing", "closed"):  # it had lost its scheduler
+                raise CancelledError(str(error)) from error
+            raise
+        future: Future[R] = Future()
+        future.add_done_callback(lambda _: asked.release())
+        self.client.loop.add_callback(_pass_on, asked, future)
+        return future
+
+
+def _done(
+    work: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> tuple[R | None, Exception | None]:
+    """In a worker: what work returns, or raises."""
+    try:
+        return work(*args, **kwargs), None
+    except Exception as error:
+        error.add_note(f"in a worker:\n{format_exc()}")  # which is all that is left of it here
+        return None, error
+
+
+async def _pass_on(asked: Any, future: Future[Any]) -> None:
+    """Wait for Dask's future, and let another have what comes of it."""
+    value, error = None, None
+    try:
+        value, error = await asked
+    except CancelledError:
+        future.cancel()
+    except RuntimeError as closing:
+        error = BrokenExecutor(str(closing))
+    except Exception as other:
+        error = other
+    if not future.set_running_or_notify_cancel():
+        return
+    if error is None:
+        future.set_result(value)
+    else:
+        future.set_exception(error)
 
 
 def _check_reachable(scheduler: str) -> None:

@@ -19,7 +19,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
@@ -173,6 +173,7 @@ class Runner(Generic[T]):
                     why = str(error) or type(error).__name__
                     said = f"{self.workplace.name}: workers do not start ({why}). {GO_ON}"
                     raise WorkplaceError(said) from error
+                sleep(PERIOD)  # until a worker that is closing has gone
             else:
                 return
 

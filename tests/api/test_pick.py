@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import dpgcli as dpg
@@ -138,3 +140,74 @@ def test_rows_come_in_order_from_all_groups_of_a_file(swept: Any) -> None:
     some = dpg.pick("groups.parquet", "n_units == 3", minimize="reach_min_mm", columns="all")
     expected = frame[frame.n_units == 3].sort_values("reach_min_mm", kind="stable")
     pd.testing.assert_frame_equal(some.to_pandas(), expected.reset_index(drop=True))
+
+
+def with_column(table: Any, name: str, values: Any) -> Any:
+    """An Arrow table, without what it says of itself, with other values in a column."""
+    arrow = table.to_arrow().replace_schema_metadata(None)
+    return arrow.set_column(arrow.schema.get_field_index(name), name, values)
+
+
+NOT_WHOLE = {
+    "strings": pa.array(["3"] * 8),
+    "large strings": pa.array(["\x1b[2J\r\n"] * 8, pa.large_string()),
+    "strings with gaps": pa.array(["1", None] * 4),
+    "dictionary": pa.array(["3"] * 8).dictionary_encode(),
+    "fractions": pa.array([0.5] * 8),
+    "gaps": pa.array([1, None] * 4),
+}
+NOT_TEXT = {"numbers": pa.array([1.0] * 8), "flags": pa.array([True] * 8)}
+WRONG = [
+    *((name, kind) for name in ("design", "n_stable") for kind in NOT_WHOLE),
+    *(("status", kind) for kind in NOT_TEXT),
+]
+
+
+@pytest.mark.parametrize(("name", "kind"), WRONG)
+def test_a_column_of_another_type_is_named_as_by_check(swept: Any, name: str, kind: str) -> None:
+    """Whoever reads the table, wherever it is."""
+    table = with_column(swept.designs, name, {**NOT_WHOLE, **NOT_TEXT}[kind])
+    said = f"column {name}: expected {'text' if name == 'status' else 'whole numbers'}, found "
+    pq.write_table(table, "out/designs.parquet")
+    readers = [
+        lambda: dpg.check(table, "reach_max_mm > 0"),
+        lambda: dpg.pick(table, columns="all"),
+        lambda: dpg.pick("out", columns="all", maximize="reach_max_mm"),
+    ]
+    if name == "design":
+        readers.append(lambda: dpg.predict("out", design=3))
+    for read in readers:
+        with pytest.raises(dpg.UsageError, match=said) as refused:
+            read()
+        assert str(refused.value).isprintable()
+
+
+def test_swept_values_that_are_text_are_named(swept: Any) -> None:
+    arrow = swept.designs.to_arrow()
+    place = arrow.schema.get_field_index("units")
+    field = arrow.schema.field(place).with_type(pa.string())
+    table = arrow.set_column(place, field, pa.array(["two"] * 8))
+    with pytest.raises(dpg.UsageError, match="column units: expected numbers, found string"):
+        dpg.pick(table)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "kind"),
+    [
+        ("design", pa.array(["3"] * 48), "whole numbers"),
+        ("status", pa.array([1.0] * 48), "text"),
+        ("pattern", pa.array([11] * 48), "text"),
+    ],
+)
+def test_a_column_of_states_of_another_type_is_named(
+    swept: Any, name: str, values: Any, kind: str
+) -> None:
+    table = with_column(swept.states, name, values)
+    with pytest.raises(dpg.UsageError, match=f"column {name}: expected {kind}, found "):
+        dpg.pick(table, states=True, columns="all")
+
+
+def test_states_that_are_none_of_ours_are_counted_in_one_line(swept: Any) -> None:
+    status = pa.array(["stable", "\x1b[2J\r\n", None, ""] * 12)
+    found = dpg.pick(with_column(swept.states, "status", status), states=True, top=1)
+    assert found.lines[0] == r"48 states: 12 stable, 24 without a status, 12 \x1b[2J\r\n"

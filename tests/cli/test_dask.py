@@ -98,14 +98,14 @@ def tables(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_killed", [0, 1])
-def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, n_killed: int) -> None:
-    """Also when a worker is killed on the way."""
+@pytest.mark.parametrize("end", [0, signal.SIGKILL, signal.SIGTERM])
+def test_the_bytes_of_a_serial_run(cluster: Cluster, sweep: Path, end: int) -> None:
+    """Also when a worker is killed on the way, or closed, as batch systems have it."""
     address, workers = cluster
     process = start(sweep, *on_dask(address))
-    if n_killed:
+    if end:
         until(lambda: list((sweep / "out").rglob("*.part")))
-        workers[0].kill()
+        workers[0].send_signal(end)
     assert process.communicate(timeout=60) == ("", "")
     assert process.returncode == ExitCode.DONE
     serial = start(sweep, "-o", "serial", "--executor", "serial")
@@ -160,19 +160,57 @@ def test_a_lost_scheduler_ends_the_sweep_with_a_message(cluster: Cluster, sweep:
 
 
 @pytest.mark.slow
-def test_lost_workers_are_said_and_waited_for(cluster: Cluster, sweep: Path) -> None:
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
+def test_lost_workers_are_said_and_waited_for(cluster: Cluster, sweep: Path, end: int) -> None:
     """Not for ever; what was done is kept."""
     address, workers = cluster
     process = start(sweep, *on_dask(address), "--wait", "12s")
     until(lambda: list((sweep / "out").rglob("*.part")))
     for worker in workers:
-        worker.kill()
+        worker.send_signal(end)
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (ExitCode.FAILED_CASES, "")
     first, second = errors.splitlines()
     assert first.endswith(f"{address}: no worker answers; waiting 12 s for one (--wait)")
     assert re.search(r"no worker for 1\d s \(--wait\)\. What is done is kept", second)
     assert list((sweep / "out").rglob("*.part"))
+
+
+LOCAL = """
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(**options) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        input()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attempt", range(3))
+def test_a_cluster_that_closes_in_an_orderly_way(sweep: Path, attempt: int) -> None:
+    """Its workers refuse what they are still sent: they are none any more, whoever is first."""
+    (sweep / "sweep.yaml").write_text(SWEEP.replace("to: 3, count: 30", "to: 3, count: 3000"))
+    (sweep / "local.py").write_text(LOCAL)
+    pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE)
+    command = (sys.executable, "local.py")
+    local = subprocess.Popen(command, cwd=sweep, text=True, stderr=subprocess.DEVNULL, **pipes)
+    try:
+        assert local.stdout is not None
+        process = start(sweep, *on_dask(local.stdout.readline().strip()), "--wait", "3s")
+        until(lambda: list((sweep / "out").rglob("*.part")))
+        time.sleep(0.1 * attempt)
+        local.communicate("\n", timeout=60)
+        output, errors = process.communicate(timeout=60)
+        assert process.returncode in (ExitCode.USAGE, ExitCode.FAILED_CASES), errors
+        assert output == ""
+        assert re.search(r"(is lost|no worker for [0-9]+ s \(--wait\))\. What is done is", errors)
+        assert len(errors.splitlines()) <= 2, errors
+        assert list((sweep / "out").rglob("*.part"))
+    finally:
+        local.kill()
+        local.wait()
 
 
 BARE = (

@@ -1,13 +1,21 @@
 """Waiting for the workers of a cluster: a word in time, an end in time, and never too early."""
 
+import asyncio
 import time
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, CancelledError
+from functools import partial
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from dpgcli.api.place import Place
 from dpgcli.errors import NoWorkerError, UsageError
-from dpgcli.sweeps import cluster
-from dpgcli.sweeps.cluster import WorkerWatch, check_address, dask_cluster
+from dpgcli.sweeps import cluster, executors
+from dpgcli.sweeps.cluster import ClusterExecutor, WorkerWatch, check_address, dask_cluster
+from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
 
 
 class Scene:
@@ -156,3 +164,122 @@ def test_a_client_is_closed_however_it_ends(
         assert not client.is_closed
         raise RuntimeError
     assert client.is_closed
+
+
+class Work:
+    """A future of Dask: what is asked of a worker is done here, or `closing` is raised instead."""
+
+    def __init__(self, work: Any, closing: BaseException | None) -> None:
+        self.work, self.closing, self.is_released = work, closing, False
+
+    def __await__(self) -> Iterator[None]:
+        yield from asyncio.sleep(0).__await__()
+        if self.closing is not None:
+            raise self.closing
+        return self.work()
+
+    def release(self) -> None:
+        self.is_released = True
+
+
+class Workers:
+    """A client of Dask; `closing` are what it raises of the first tasks, None where they go on."""
+
+    def __init__(self, running: asyncio.AbstractEventLoop) -> None:
+        self.closing, self.asked, self.status = (
+            list[BaseException | None](),
+            list[Work](),
+            "running",
+        )
+
+        def call(function: Any, *arguments: Any) -> None:
+            asyncio.run_coroutine_threadsafe(function(*arguments), running)
+
+        self.loop: Any = SimpleNamespace(add_callback=call)
+
+    def submit(self, function: Any, *arguments: Any, pure: bool, retries: int) -> Work:
+        if self.status == "closed":
+            raise OSError("Client is closed")
+        assert not pure
+        assert retries > 1, "another worker may be sound"
+        work = Work(partial(function, *arguments), self.closing.pop(0) if self.closing else None)
+        self.asked.append(work)
+        return work
+
+
+@pytest.fixture
+def client() -> Iterator[Workers]:
+    running = asyncio.new_event_loop()
+    thread = Thread(target=running.run_forever)
+    thread.start()
+    yield Workers(running)
+    running.call_soon_threadsafe(running.stop)
+    thread.join()
+    running.close()
+
+
+CLOSING = "cannot schedule new futures after shutdown"
+
+
+def squares(chunk: Chunk) -> list[int]:
+    return [case**2 for case in range(chunk.start, chunk.stop)]
+
+
+def refused() -> None:
+    raise RuntimeError(CLOSING)
+
+
+def test_work_is_done_by_dask_and_let_go(client: Workers) -> None:
+    assert ClusterExecutor(client).submit(pow, 2, 5).result(timeout=10) == 32
+    assert client.asked[0].is_released
+
+
+def test_errors_of_the_work_are_no_errors_of_workers(client: Workers) -> None:
+    """Though they read like those of one that closes; where they came from is kept."""
+    with pytest.raises(RuntimeError, match=CLOSING) as raised:
+        ClusterExecutor(client).submit(refused).result(timeout=10)
+    assert not isinstance(raised.value, BrokenExecutor)
+    assert "in refused" in raised.value.__notes__[0]
+
+
+@pytest.mark.parametrize(
+    ("raised", "seen"),
+    [
+        (RuntimeError(CLOSING), BrokenExecutor),
+        (CancelledError("scheduler-connection-lost"), CancelledError),
+        (ModuleNotFoundError("dpgcli"), ModuleNotFoundError),
+    ],
+)
+def test_errors_of_dask(client: Workers, raised: Exception, seen: type[Exception]) -> None:
+    """A worker that closes is a broken one; what nobody has any more is lost."""
+    client.closing.append(raised)
+    with pytest.raises(seen):
+        ClusterExecutor(client).submit(pow, 2, 5).result(timeout=10)
+
+
+def test_a_client_that_is_closed_has_lost_its_cluster(client: Workers) -> None:
+    client.status = "closed"
+    with pytest.raises(CancelledError, match="Client is closed"):
+        ClusterExecutor(client).submit(pow, 2, 5)
+
+
+def test_what_is_called_off_is_let_go(client: Workers) -> None:
+    client.loop.add_callback = lambda *_: None  # it will never be done
+    future = ClusterExecutor(client).submit(pow, 2, 5)
+    assert future.cancel()
+    assert client.asked[0].is_released
+
+
+def test_what_a_worker_had_that_closed_is_done_by_others(
+    client: Workers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While all are closing a little time is left to them."""
+    slept = list[float]()
+    monkeypatch.setattr(executors, "sleep", slept.append)
+    client.closing += [None, *[RuntimeError(CLOSING)] * 3]
+    workplace = Backend("Dask", lambda _: ClusterExecutor(client), 1, is_local=False)
+    runner = Runner(workplace, squares, lambda chunk: (chunk,))
+    values = {found.chunk.start: found.value for found in runner.run(chunked([(0, 4)], 2))}
+    assert values == {0: [0, 1], 2: [4, 9]}
+    assert runner.deaths == [Chunk(2, 4)]
+    assert slept == [executors.PERIOD] * 2

@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dpgcli.errors import WorkplaceError
+from dpgcli.sweeps import executors
 from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked, serial
 from dpgcli.sweeps.pool import _own_temporary_folder, process_pool, processes
 
@@ -151,8 +152,11 @@ def test_a_few_cases_that_all_kill_are_failures(deadly: Any, tmp_path: Path) -> 
     assert results(runner, chunked([(0, 3)], 2)) == dict.fromkeys(range(3))
 
 
-def test_a_worker_that_dies_as_it_is_tried_is_tried_again(deadly: Any, tmp_path: Path) -> None:
+def test_a_worker_that_dies_as_it_is_tried_is_tried_again(
+    deadly: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Whatever kills workers from outside may hit that one, too."""
+    monkeypatch.setattr(executors, "PERIOD", 0.01)
     opened = []
 
     def fragile(n_workers: int) -> ProcessPoolExecutor:
@@ -166,7 +170,11 @@ def test_a_worker_that_dies_as_it_is_tried_is_tried_again(deadly: Any, tmp_path:
     assert opened[:4] == [2, 1, 1, 1]
 
 
-def test_workers_that_do_not_start(deadly: Any, tmp_path: Path) -> None:
+def test_workers_that_do_not_start(
+    deadly: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(executors, "PERIOD", 0.01)
+
     def broken(n_workers: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(n_workers, get_context("forkserver"), initializer=deadly.dies)
 
