@@ -55,6 +55,7 @@ def actuate(
     quiet: Quiet = False,
 ) -> None:
     """Follow a finger through pressures: what snaps and resets, and when."""
+    from dpgcli.actuation.costs import history_announced
     from dpgcli.api.actuate import followed
     from dpgcli.api.histories import history_input
     from dpgcli.api.pressure import pressed_input
@@ -70,6 +71,9 @@ def actuate(
     history = history_input(pressure, given.pressure)
     sources = (*given.given.files, *history.files)
     check_outputs(sources, (output, Mark.TABLE), (plot, Mark.FIGURE))
+    expected = history_announced(given.pressed, history.history.pressure, cycles)
+    if expected and not quiet:
+        say(expected)
     try:
         with under_way("following the finger", quiet=quiet):
             found = followed(given, history, start, cycles, unstable=unstable)

@@ -9,6 +9,7 @@ import typer
 from dpgcli.cli.exits import say_warnings
 from dpgcli.cli.options import DesignNumber, Quiet, Strict, TableFile, check_table_name
 from dpgcli.cli.printing import Format, print_rows
+from dpgcli.cli.progress import under_way
 from dpgcli.cli.streams import say
 
 Source = Annotated[
@@ -65,17 +66,18 @@ def pick(
     check_table_name(output)
     files = tables_beside(table_of(source, has_states=states))
     check_outputs(files, (output, Mark.TABLE), (spec, Mark.SPEC))
-    found = face.pick(
-        source,
-        where or (),
-        minimize=minimize or (),
-        maximize=maximize or (),
-        top=top,
-        design=design,
-        states=states,
-        columns=columns,
-        strict=strict,
-    )
+    with under_way("choosing", quiet=quiet):
+        found = face.pick(
+            source,
+            where or (),
+            minimize=minimize or (),
+            maximize=maximize or (),
+            top=top,
+            design=design,
+            states=states,
+            columns=columns,
+            strict=strict,
+        )
     say_warnings(found.warnings)
     if printed_as is not None or output is None:
         print_rows(found.columns, found.rows, printed_as or Format.TABLE)

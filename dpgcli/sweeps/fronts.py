@@ -6,8 +6,8 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 
-AT_ONCE = 2**22  # pairs that are compared
-ROWS_AT_ONCE = 2**11
+AT_ONCE = 2**16  # pairs that are compared rather than halved
+PLANE = 2  # columns in which one pass in order finds what is below
 
 
 def on_front(values: Array) -> Flags:
@@ -19,8 +19,10 @@ def on_front(values: Array) -> Flags:
     >>> on_front(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 3.0], [1.0, 3.0]])).tolist()
     [True, True, False, True]
 
-    Rows are taken in lexicographic order, in which none is dominated by a later one: each has to
-    be compared with the front so far alone (Kung, Luccio and Preparata, J. ACM 22, 1975, 469).
+    Rows are taken in lexicographic order, in which none is dominated by a later one, and halved:
+    what the front of the first half leaves of the second is asked for its own. Of n rows with
+    k > 2 objectives that takes a time of n log(n)^(k - 2), also where all are on the front
+    (Kung, Luccio and Preparata, J. ACM 22, 1975, 469).
     """
     order = np.lexsort(values.T[::-1])
     ordered = values[order]
@@ -43,26 +45,39 @@ def _least_yet(column: Array) -> Flags:
 
 def _undominated(rows: Array) -> Flags:
     """Which rows have no earlier one that is nowhere larger."""
-    found = np.ones(len(rows), bool)
-    front = np.empty((0, rows.shape[1]))
-    for first in range(0, len(rows), ROWS_AT_ONCE):
-        block = rows[first : first + ROWS_AT_ONCE]
-        place = np.flatnonzero(~_have_one_below(block, front))
-        place = place[~np.triu(_are_below(block[place], block[place]), 1).any(axis=0)]
-        found[first : first + len(block)] = False
-        found[first + place] = True
-        front = np.concatenate([front, block[place]])
+    if len(rows) ** 2 <= AT_ONCE:
+        return np.asarray(~np.triu(_are_below(rows, rows), 1).any(axis=0))
+    middle = len(rows) // 2
+    first, rest = rows[:middle], rows[middle:]
+    found = np.zeros(len(rows), bool)
+    found[:middle] = _undominated(first)
+    left = np.flatnonzero(~_have_one_below(rest, first[found[:middle]]))
+    found[middle + left] = _undominated(rest[left])
     return found
 
 
 def _have_one_below(rows: Array, front: Array) -> Flags:
-    """Which rows have one of the front that is nowhere larger."""
-    found = np.zeros(len(rows), bool)
-    step = max(1, AT_ONCE // max(1, len(rows)))
-    for first in range(0, len(front), step):
-        left = np.flatnonzero(~found)
-        found[left] = _are_below(front[first : first + step], rows[left]).any(axis=0)
-    return found
+    """Which rows have one of the front that is nowhere larger.
+
+    Halves by the first column: in it the lower one is below the higher, and never the other way.
+    """
+    if len(rows) * len(front) <= AT_ONCE:
+        return np.asarray(_are_below(front, rows).any(axis=0))
+    n_front, both = len(front), np.concatenate([front, rows])
+    order = np.argsort(both[:, 0], kind="stable")  # of equal ones those of the front are first
+    found = np.zeros(len(both), bool)
+    if both.shape[1] == PLANE:
+        seen = np.where(order < n_front, both[order, 1], np.nan)
+        found[order] = np.fmin.accumulate(seen) <= both[order, 1]
+        return found[n_front:]
+    low, high = np.split(order, [len(order) // 2])
+    lower, low_rows = low[low < n_front], low[low >= n_front]
+    higher, high_rows = high[high < n_front], high[high >= n_front]
+    found[low_rows] = _have_one_below(both[low_rows], both[lower])
+    found[high_rows] = _have_one_below(both[high_rows, 1:], both[lower, 1:])
+    left = high_rows[~found[high_rows]]
+    found[left] = _have_one_below(both[left], both[higher])
+    return found[n_front:]
 
 
 def _are_below(rows: Array, others: Array) -> Flags:

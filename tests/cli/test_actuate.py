@@ -167,6 +167,20 @@ def test_a_finger_that_folds_ends_with_what_happened_before(
     assert not list(folder.glob("path.*"))
 
 
+@pytest.mark.parametrize(("to", "is_long"), [(0.01, False), (0.15, True)])
+def test_a_history_that_may_take_long_is_said_so_before(
+    call: Any, folder: Path, graded: str, monkeypatch: pytest.MonkeyPatch, to: float, is_long: bool
+) -> None:
+    """20 steps back and forth, over a threshold or far from one."""
+    monkeypatch.setattr("dpgcli.actuation.costs.LONG", 1.0)
+    (folder / "long.csv").write_text("A\n" + f"0\n{to}\n" * 10)
+    arguments = ("actuate", graded, "--pressure", "long.csv", "--format", "csv")
+    found = call(*arguments)
+    assert found.stderr.startswith("20 steps of pressure: 0 to 1 s\n") is is_long
+    assert "steps of pressure" not in found.stdout
+    assert call(*arguments, "-q").stderr == ""
+
+
 def test_a_reader_that_stops_early_is_no_error(folder: Path, graded: str, start: Any) -> None:
     process = start("actuate", graded, "--pressure", "0:0.2:-0.1:0", "--cycles", "5000",
                     "--format", "csv", "-q")  # fmt: skip

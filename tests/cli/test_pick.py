@@ -1,6 +1,7 @@
 """`dpg pick` and `dpg predict --design`: what is chosen, said and written, and exit codes."""
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
+from dpgcli.sweeps.fronts import on_front
 
 Call = Callable[..., Any]
 SWEEP = """\
@@ -192,3 +194,17 @@ def test_the_same_bytes_each_time(call: Call, out: str, folder: Path) -> None:
         call("pick", out, *options, "-o", f"{name}.parquet", "--spec", f"{name}.yaml")
     for kind in ("parquet", "yaml"):
         assert (folder / f"a.{kind}").read_bytes() == (folder / f"b.{kind}").read_bytes()
+
+
+def test_choosing_that_takes_long_says_so(
+    call: Call, out: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(values: Any) -> Any:
+        time.sleep(0.3)
+        return on_front(values)
+
+    monkeypatch.setattr("dpgcli.cli.progress.ELAPSED_PERIOD", 0.05)
+    monkeypatch.setattr("dpgcli.sweeps.choice.on_front", slow)
+    objectives = ("--minimize", "reach_min_mm", "--maximize", "reach_max_mm")
+    assert "choosing, 0 s\n" in call("pick", out, *objectives).stderr
+    assert "choosing" not in call("pick", out, *objectives, "-q").stderr
