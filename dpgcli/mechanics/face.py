@@ -15,7 +15,7 @@ derivation).
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -40,27 +40,37 @@ class FaceShape(NamedTuple):
 
     def pulled(self, forces: Array) -> Array:
         """Σ f · ∂F over nodes, (row, cell, batch), for forces f (2, node, cell, batch)."""
-        turned = np.stack((self.nodes[1], -self.nodes[0]))
-        beyond = _summed_from_behind(forces)[:, self.first]
-        moment = _summed_from_behind(total(forces * turned[:, :, None]))[self.first]
-        along = total(beyond * self.origin[:, :, None])
-        pivot = np.stack((self.origin[1], -self.origin[0]))[:, :, None]
-        by_corner = moment - total(beyond * pivot)
+        x, y = self.nodes[:, :, None]
+        turning = forces[0] * y - forces[1] * x
+        from_x, from_y = (_summed_from_behind(part)[self.first] for part in forces)
+        moment = _summed_from_behind(turning)[self.first]
+        at_x, at_y = self.origin[:, :, None]
+        by_corner: Array = moment - (from_x * at_y - from_y * at_x)
+        along = from_x * at_x + from_y * at_y
         return np.where(self.is_corner[:, None, None], by_corner, along)
 
     def bent(self, forces: Array) -> Array:
         """Σ f · ∂²F over nodes, (row, row, batch), for forces f (2, node, batch)."""
-        turned = np.stack((-forces[1], forces[0]))  # f · R v = (Rᵀ f) · v
+        turned = np.empty_like(forces)  # f · R v = (Rᵀ f) · v
+        np.negative(forces[1], out=turned[0])
+        turned[1] = forces[0]
         by_later = self.pulled(turned[:, :, None])[:, 0]
-        rows = np.arange(len(self.first))
-        earlier, later = np.minimum.outer(rows, rows), np.maximum.outer(rows, rows)
-        return np.where(self.is_corner[earlier][..., None], by_later[later], 0.0)
+        earlier, later = _pairs(len(self.first))
+        result = by_later[later]
+        result[~self.is_corner[earlier]] = 0.0
+        return result
 
 
 def _summed_from_behind(values: Array) -> Array:
-    """Σ over nodes from each one on: of (2, node, …) or (node, …), nodes before cells."""
-    axis = values.ndim - 3
-    return np.flip(np.cumsum(np.flip(values, axis), axis), axis)
+    """Σ over nodes from each one on, (node, …)."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+
+
+@cache  # the same few for every batch
+def _pairs(n_rows: int) -> tuple[Indices, Indices]:
+    """The earlier and the later of two rows, (row, row)."""
+    rows = np.arange(n_rows)
+    return np.minimum.outer(rows, rows), np.maximum.outer(rows, rows)
 
 
 @dataclass(frozen=True)

@@ -200,27 +200,32 @@ def _one_at(place: Indices, first: Flags) -> Flags:
 
 def nearest(shape: FaceShape, centers: Array) -> Nearest:
     """The nearest places of all sides of a face to points (2, point, batch)."""
-    start, side = shape.nodes[:, None, :-1], np.diff(shape.nodes, axis=1)[:, None]
-    length = np.sqrt(total(side * side))
-    along = side / length
-    inwards = np.stack((along[1], -along[0]))
-    away = centers[:, :, None] - start
-    raw = total(away * along) / length
-    place = _followed(raw)
-    n = raw.shape[1]
-    share = np.clip(raw, 0.0, 1.0)
-    is_corner = (raw <= 0.0) | (raw >= 1.0)
-    off_line = total(away * inwards)
-    to_corner = away - share * length * along
-    distance = np.sqrt(total(to_corner * to_corner))
-    side_numbers = np.arange(n)[None, :, None]
-    is_end = ((raw < 0.0) & (side_numbers == 0)) | ((raw > 1.0) & (side_numbers == n - 1))
-    sign = np.where((off_line < 0.0) & ~is_end, -1.0, 1.0)
+    start = shape.nodes[:, None, :-1]
+    side_x, side_y = shape.nodes[:, None, 1:] - start
+    length = np.sqrt(side_x * side_x + side_y * side_y)
+    along_x, along_y = side_x / length, side_y / length
+    away_x, away_y = centers[:, :, None] - start
+    raw = (away_x * along_x + away_y * along_y) / length
+    place, n = _followed(raw), raw.shape[1]
+    share = np.minimum(np.maximum(raw, 0.0), 1.0)
+    is_corner = share != raw
+    is_corner |= (raw == 0.0) | (raw == 1.0)
+    off_line = away_x * along_y - away_y * along_x
+    reach = share * length
+    corner_x, corner_y = away_x - reach * along_x, away_y - reach * along_y
+    distance = np.sqrt(corner_x * corner_x + corner_y * corner_y)
+    is_behind = off_line < 0.0
+    is_behind[:, 0] &= raw[:, 0] >= 0.0
+    is_behind[:, n - 1] &= raw[:, n - 1] <= 1.0
+    sign = np.where(is_behind, -1.0, 1.0)
     signed = np.where(is_corner, sign * distance, off_line)
-    safe = np.where(distance > 0.0, distance, 1.0)
-    outwards = np.where(distance > 0.0, sign * to_corner / safe, inwards)
-    normal = np.where(is_corner, outwards, inwards)
-    tangent = np.stack((-normal[1], normal[0]))
+    is_apart = is_corner & (distance > 0.0)
+    outwards = sign / np.where(is_apart, distance, 1.0)
+    normal, tangent = np.empty((2, 2, *raw.shape))
+    normal[0] = np.where(is_apart, outwards * corner_x, along_y)
+    normal[1] = np.where(is_apart, outwards * corner_y, -along_x)
+    np.negative(normal[1], out=tangent[0])
+    tangent[1] = normal[0]
     length = np.broadcast_to(length, raw.shape)
     return Nearest(place, share, signed, normal, tangent, length, is_corner)
 
@@ -236,10 +241,9 @@ def _followed(raw: Array) -> Indices:
     target[:, 1:] = np.where(raw[:, 1:] <= 0.0, numbers[:, :-1], target[:, 1:])
     onwards = (raw[:, :-1] >= 1.0) & (raw[:, 1:] > 0.0)
     target[:, :-1] = np.where(onwards, numbers[:, 1:], target[:, :-1])
-    place = target
-    for _ in range(n - 1):
-        place = np.take_along_axis(target, place, axis=1)
-    return place
+    for _ in range((n - 1).bit_length()):  # twice as far each time
+        target = np.take_along_axis(target, target, axis=1)
+    return target
 
 
 class _Moves(NamedTuple):
@@ -267,9 +271,15 @@ def _turned(shape: FaceShape, near: Nearest, cells: Indices) -> tuple[Array, Arr
     share, length = (v.reshape(-1, batch)[cells] for v in (near.share, near.length))
     is_corner = near.is_corner.reshape(-1, batch)[cells]
     turn = np.where(is_corner, 0.0, 1.0 / length) * normal
-    start = np.concatenate((turn, (share - 1.0) * along), axis=1)
-    end = np.concatenate((-turn, -share * along), axis=1)
-    pulled = shape.pulled(_at_ends(start, end, np.tile(cells % n, 2), n))
+    forces, sides, number = (
+        np.zeros((2, n + 1, 2 * len(cells), batch)),
+        cells % n,
+        np.arange(len(cells)),
+    )
+    forces[:, sides, number], forces[:, sides + 1, number] = turn, -turn
+    number = number + len(cells)
+    forces[:, sides, number], forces[:, sides + 1, number] = (share - 1.0) * along, -share * along
+    pulled = shape.pulled(forces)
     return pulled[:, : len(cells)], pulled[:, len(cells) :]
 
 
@@ -287,13 +297,15 @@ def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array
     batch = force.shape[1]
     result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
     distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
-    safe = np.where(distance != 0.0, distance, 1.0)
-    around = np.where(is_corner & (distance != 0.0), force / safe, 0.0)
     cells = np.flatnonzero(force.any(axis=1))
     turn, slide = _turned(shape, near, cells)
-    for place, cell in enumerate(cells):
-        w, tau, f = turn[:, place], slide[:, place], force[cell]
-        mixed = (f * w)[:, None] * tau
-        result += mixed + np.swapaxes(mixed, 0, 1)
-        result += (around[cell] * tau)[:, None] * tau - (f * distance[cell] * w)[:, None] * w
+    for place, cell in enumerate(cells):  # of sides w (τ − ½ g w)ᵀ F and its mirror image
+        w, tau, f, g = turn[:, place], slide[:, place], force[cell], distance[cell]
+        mixed = w[:, None] * (f * tau - (0.5 * f * g) * w)
+        result += mixed
+        result += np.swapaxes(mixed, 0, 1)
+        is_around = is_corner[cell] & (g != 0.0)
+        if is_around.any():
+            around = np.where(is_around, f / np.where(is_around, g, 1.0), 0.0)
+            result += (around * tau)[:, None] * tau
     return result
