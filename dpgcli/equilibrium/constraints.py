@@ -171,7 +171,8 @@ class Slack:
 class Multiplied:
     """The constraints that have multipliers: by `cells` (multiplier, batch), −1 for none.
 
-    There are as many multipliers as the lane with most active constraints needs, at least one.
+    There are as many multipliers as the lane with most active constraints needs, and at least as
+    many as are asked for, if there are so many constraints.
 
     >>> own = Multiplied.of(np.array([[False, True], [True, False], [True, False]]))
     >>> own.cells.tolist(), own.spread(np.array([[5.0, 6.0], [7.0, 0.0]]), 3).tolist()
@@ -181,9 +182,9 @@ class Multiplied:
     cells: Indices
 
     @classmethod
-    def of(cls, active: Flags) -> Self:
+    def of(cls, active: Flags, least: int = 1) -> Self:
         """Those that are active, (cell, batch)."""
-        n = max(1, int(active.sum(axis=0).max(initial=0)))
+        n = max(1, least, int(active.sum(axis=0).max(initial=0)))
         first = np.argsort(~active, axis=0, kind="stable")[:n]
         return cls(np.where(np.take_along_axis(active, first, axis=0), first, -1))
 

@@ -6,23 +6,41 @@ through a fold (Rheinboldt, Numerical Analysis of Parametrized Nonlinear Equatio
 the spring is ours).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
-from dpgcli.equilibrium.contracts import Coordinates, Measured, WideMeasured
-from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along, spread
+from dpgcli.equilibrium.contracts import Coordinates, Measured, Row, WideMeasured
+from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, along, spread
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap: what is left to go
+CROSSED = 1e-11  # of what margins are measured by: as near Newton comes to an event
+STRAYING, SHRINKING = 0.05, 0.25  # of the step cap; of a step: what guesses are good for
+ASTRAY, GROWING = 1e-2, 0.8  # of the step cap: longer steps have to shrink to so much each
+SLIGHT = 1e-4  # mm: by so much scalars move where margins are told to change
 COMPACTING_SHARE = 0.25  # of ended lanes: from it on, dropping them pays for the copy
 MAX_CORRECTIONS = 8
 
 
+class Ways(NamedTuple):
+    """What is asked of points on a way, (batch,): those that are rough are a step's rest away.
+
+    A point is where the margin of the cell `meeting` vanishes, unless that is −1.
+    """
+
+    is_rough: Flags
+    meeting: Indices
+
+
 class Corrected(NamedTuple):
-    """Points on paths, with derivatives there; `is_fine` says which belong to a stable path."""
+    """Points on paths, with derivatives there; `is_fine` says which belong to a stable path.
+
+    `astray` is 1 for guesses as good as they should be, and more for others: how far Newton first
+    went from there, or how little its steps shrank.
+    """
 
     coordinates: Array
     load: Array
@@ -30,6 +48,7 @@ class Corrected(NamedTuple):
     loaded: Measured | WideMeasured
     along_load: Array  # −H'⁻¹ ∂g/∂λ
     by_hold: Array  # H'⁻¹ ∇q
+    astray: Array
     is_fine: Flags
 
 
@@ -44,6 +63,8 @@ class _Points(NamedTuple):
     chosen: Flags
     stiffness: Array
     target: Array
+    is_rough: Flags
+    meeting: Indices
 
     def only(self, lanes: Indices) -> "_Points":
         """Some lanes."""
@@ -61,6 +82,7 @@ class _Look(NamedTuple):
     is_stable: Flags
     step: Array
     change: Array
+    length: Array  # of the step, in step caps
 
 
 @in_lanes
@@ -71,63 +93,177 @@ def corrected(
     cell: Indices,
     target: Array,
     depth: int,
-    fewest: int = 0,
+    ways: Ways | None = None,
 ) -> Corrected:
     """Solve g(x, λ) = 0 with q of a cell at its target, or with λ as it is where `cell` is −1.
 
-    By so many steps at the `fewest`: each squares what is left, and loads at folds need more digits
-    than the balance does. Lanes that have ended are put aside where they are many.
+    On `ways` points that are not rough take at least one step, which squares what is left: loads at
+    folds need more digits than the balance does; and what does not come nearer is given up. Lanes
+    that have ended are put aside where they are many.
     """
     n, lanes, own = len(load), np.arange(len(load)), family
     chosen = np.arange(family.followed.n_cells)[:, None] == cell
     stiffness = np.where(chosen, np.broadcast_to(family.stiffness, chosen.shape), 0.0)
-    here = _Points(guess, load, chosen, stiffness, np.where(cell >= 0, target, 0.0))
-    coordinates, by_load, by_hold = np.zeros((3, *guess.shape))
-    loads, is_fine = np.zeros(n), np.zeros(n, bool)
+    asked = ways or Ways(np.zeros(n, bool), np.full(n, -1))
+    here = _Points(guess, load, chosen, stiffness, np.where(cell >= 0, target, 0.0), *asked)
+    before, are_done = np.full(n, np.inf), np.zeros(n, bool)
+    found: Corrected | None = None
+    astray = before
     for count in range(MAX_CORRECTIONS + 1):
         look = _look(own, here, depth)
-        ended = (look.is_there & (count >= fewest)) | (count == MAX_CORRECTIONS)
-        rest = np.flatnonzero(~ended)
-        is_crowded = ended.mean() > COMPACTING_SHARE
-        if is_crowded:
-            done = lanes[ended]
-            coordinates[:, done], loads[done] = here.coordinates[:, ended], here.load[ended]
-            by_load[:, done], by_hold[:, done] = look.along_load[:, ended], look.by_hold[:, ended]
-            is_fine[done] = (look.is_there & look.is_stable)[ended]
-        if not len(rest):
-            break
-        step, change = np.where(ended, 0.0, look.step), np.where(ended, 0.0, look.change)
+        if not count:
+            astray = look.length / STRAYING
+        elif count == 1:
+            far = np.where(look.length > SETTLED_STEP, look.length / before / SHRINKING, 0.0)
+            astray[lanes] = np.maximum(astray[lanes], far)
+        is_there = look.is_there & ((count > 0) | (ways is None))
+        is_near = here.is_rough & (look.length <= SETTLED_STEP)
+        is_lost = np.full(len(lanes), count == MAX_CORRECTIONS)
+        if ways is not None:
+            is_lost |= ~(look.length <= np.maximum(GROWING * before, ASTRAY))
+        stays, ends = are_done | is_there | is_lost, is_there | is_near | is_lost
+        step, change = np.where(stays, 0.0, look.step), np.where(stays, 0.0, look.change)
         moved = own.coordinates.moved(here.coordinates, step)
         here = here._replace(coordinates=moved, load=here.load + change)
-        if is_crowded:
+        newly = np.flatnonzero(ends & ~are_done)
+        if len(newly):
+            there = _at(own, here, look, step, is_there | is_near)
+            found = found or cast("Corrected", _room(there, n))
+            _put(found, there, lanes[newly], newly)
+        are_done = are_done | ends
+        rest, before = np.flatnonzero(~are_done), look.length
+        if not len(rest):
+            break
+        if are_done.mean() > COMPACTING_SHARE:
             lanes, own, here = lanes[rest], own.take_lanes(rest), here.only(rest)
-    both = look.measured, look.loaded
-    if len(lanes) < n:
-        loaded, measured = family.looked_at(coordinates)
-        both = measured, loaded
-    return Corrected(coordinates, loads, *both, by_load, by_hold, is_fine)
+            before, are_done = before[rest], are_done[rest]
+    assert found is not None, "in the end all lanes have ended"
+    return found._replace(astray=astray)
+
+
+def _at(
+    family: LoadedPotential[Coordinates, LoadedLaw],
+    here: _Points,
+    look: _Look,
+    step: Array,
+    is_solved: Flags,
+) -> Corrected:
+    """What there is after a last step; derivatives are those before it."""
+    measured = loaded = _moved_along(family.followed.rows, look.measured, step)
+    if not family.is_by_load:
+        loaded = _moved_along(family.measure.rows, look.loaded, step)
+    derivatives, is_fine = (look.along_load, look.by_hold), is_solved & look.is_stable
+    return Corrected(
+        here.coordinates, here.load, measured, loaded, *derivatives, look.length, is_fine
+    )
+
+
+def _moved_along(
+    rows: tuple[Row, ...], measured: Measured | WideMeasured, step: Array
+) -> Measured | WideMeasured:
+    """The same measure after a small step, with its gradient only."""
+    value = measured.value + along(rows, measured, step) if step.any() else measured.value
+    if isinstance(measured, WideMeasured):
+        return measured._replace(value=value)
+    slopes = (np.broadcast_to(slope, value.shape) for slope in measured.gradient)
+    return Measured(value, tuple(slopes))
+
+
+def _room(part: Any, n: int) -> Any:
+    """Room for so many lanes of what has arrays by lane."""
+    if isinstance(part, np.ndarray):
+        return np.empty((*part.shape[:-1], n), part.dtype)
+    if isinstance(part, tuple):
+        parts = [_room(own, n) for own in part]
+        return type(part)(*parts) if hasattr(part, "_fields") else tuple(parts)
+    return part
+
+
+def _put(own: Any, others: Any, lanes: Indices, which: Indices) -> None:
+    """Put lanes of others where they belong."""
+    for part, other in zip(own, others, strict=True):
+        if isinstance(part, np.ndarray):
+            part[..., lanes] = other[..., which]
+        elif isinstance(part, tuple):
+            _put(part, other, lanes, which)
 
 
 def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth: int) -> _Look:
     coordinates, is_held = family.coordinates, here.chosen.any(axis=0)
     linear = family.linearized(here.coordinates, here.load, here.stiffness, here.target, depth)
-    measured, rows = linear.followed, family.followed.rows
+    measured, rows, gradient = linear.followed, family.followed.rows, linear.gradient
     away = np.where(here.chosen, measured.value - here.target, 0.0).sum(axis=0)
     factors = factorize(linear.hessian, family.column_depths)
     selector = spread(rows, measured, here.chosen.astype(float), here.coordinates)
-    sides = np.stack((-linear.gradient, -linear.rate, selector), axis=1)
+    sides = np.stack((-gradient, -linear.rate, selector), axis=1)
     by_residual, by_load, by_hold = np.moveaxis(_solved(factors, sides), 1, 0)
     change = (-away - total(selector * by_residual)) / total(selector * by_load)
     change = np.where(is_held, change, 0.0)
     step = by_residual + change * by_load
     scale = np.where(here.chosen, np.broadcast_to(family.scale, here.chosen.shape), 0.0).sum(axis=0)
-    residual = np.abs(linear.gradient / coordinates.gradient_scale).max(axis=0)
     is_held_there = np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
-    is_settled = np.abs(step / coordinates.step_cap).max(axis=0) <= SETTLED_STEP
-    is_there = np.asarray((residual <= TOLERANCE) & is_held_there & is_settled)
+    if (here.meeting >= 0).any():
+        meets, pull = here.meeting >= 0, here.stiffness.sum(axis=0) * away
+        found = _met(family, here, linear, selector, away, (by_residual, by_load, by_hold))
+        gradient = np.where(meets, gradient - pull * selector, gradient)
+        change, step = np.where(meets, found.change, change), np.where(meets, found.step, step)
+        is_held_there = np.where(meets, np.abs(found.margin) <= CROSSED, is_held_there)
+    residual = np.abs(gradient / coordinates.gradient_scale).max(axis=0)
+    length = np.abs(step / coordinates.step_cap).max(axis=0)
+    is_there = np.asarray((residual <= TOLERANCE) & is_held_there & (length <= SETTLED_STEP))
     n_positive = (factors.pivots > 0.0).sum(axis=0)
     is_stable = np.asarray(n_positive == coordinates.size - family.n_multipliers)
-    return _Look(measured, linear.loaded, by_load, by_hold, is_there, is_stable, step, change)
+    return _Look(
+        measured, linear.loaded, by_load, by_hold, is_there, is_stable, step, change, length
+    )
+
+
+class _Meeting(NamedTuple):
+    """A margin, and the step to where it vanishes, (batch,) and (size, batch)."""
+
+    margin: Array
+    step: Array
+    change: Array
+
+
+def _met(
+    family: LoadedPotential[Coordinates, LoadedLaw],
+    here: _Points,
+    linear: Linearized,
+    selector: Array,
+    away: Array,
+    solved: tuple[Array, Array, Array],
+) -> _Meeting:
+    """Newton's step to where the margins of cells vanish: q is free, and the load is.
+
+    With r, b and c = H'⁻¹ (−g', −∂g/∂λ, ∇q) and a spring of k it is r + δλ b + u c, so that
+    ∇q · δx = u/k − away; the other equation is that of the margin m, linear in a small step. Where
+    no cell is held u = 0.
+    """
+    by_residual, by_load, by_hold = solved
+    cell = np.maximum(here.meeting, 0), np.arange(len(away))
+    loaded, before = linear.loaded, family.law.margin(linear.loaded, here.load)
+    assert before is not None, "what is met has a margin"
+    margin = before[cell]
+
+    def rate(direction: Array, change: float) -> Array:
+        by_cell = along(family.measure.rows, loaded, direction)
+        share = SLIGHT / np.maximum(np.abs(by_cell).max(axis=0), max(change, TOLERANCE))
+        moved = loaded._replace(value=loaded.value + share * by_cell)
+        after = family.law.margin(moved, here.load + share * change)
+        assert after is not None, "it does"
+        return np.asarray((after[cell] - margin) / share)
+
+    by_target = total(selector * by_residual) + away
+    stiffness = here.stiffness.sum(axis=0)
+    is_held = stiffness > 0.0
+    a = np.where(is_held, 1.0 / np.where(is_held, stiffness, 1.0) - total(selector * by_hold), 1.0)
+    b, d, e = -total(selector * by_load), rate(by_hold, 0.0), rate(by_load, 1.0)
+    f = -margin - rate(by_residual, 0.0)
+    determinant = a * e - b * d
+    pull = np.where(is_held, by_target * e - b * f, 0.0) / determinant
+    change = (a * f - np.where(is_held, by_target, 0.0) * d) / determinant
+    return _Meeting(margin, by_residual + change * by_load + pull * by_hold, change)
 
 
 def _solved(factors: Factorization, sides: Array) -> Array:
