@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.equilibrium.banded import WIDE
 from dpgcli.equilibrium.constraints import (
     ActiveConstraints,
     AugmentedContact,
@@ -277,7 +278,7 @@ class Obstructed:
         """The Lagrangians of active contacts, (cell, batch), by the load."""
         own = self.potentials(inverted)
         frame = self.bare(inverted, np.zeros(1)).coordinates
-        gaps, multiplied = self.gaps(), Multiplied.of(active)
+        gaps, multiplied = self.gaps(), self._multiplied(active)
         system = Extended(frame, multiplied.n, self.large, self.stiffness)
         law = ActiveConstraints(
             active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
@@ -310,6 +311,10 @@ class Obstructed:
         scale, stiffness = (_with_row(values, value) for values, value in both)
         return every, scale, stiffness
 
+    def _multiplied(self, active: Flags) -> Multiplied:
+        """Multipliers of active contacts, so many that no batch decides how sums are ordered."""
+        return Multiplied.of(active, WIDE + 2 - self.n_own - self._n_motions)
+
     def _by_finger(self, values: Array) -> Array:
         """Values of each unit, (unit, …), for all fingers."""
         n = self.units.finger.n_units
@@ -339,12 +344,13 @@ class Obstructed:
 
     def stacked(self, shapes: ContactShapes) -> Array:
         """Coordinates and multipliers y = μ/σ of shapes."""
-        y = Multiplied.of(shapes.active).taken(shapes.push / self.stiffness)
+        y = self._multiplied(shapes.active).taken(shapes.push / self.stiffness)
         return np.concatenate((shapes.coordinates, y))
 
     def pushes(self, active: Flags, multipliers: Array) -> Array:
-        """The pushes of contacts, (cell, batch), that have these multipliers, N."""
-        return Multiplied.of(active).spread(multipliers * self.stiffness, len(active))
+        """The pushes of contacts, (cell, batch), that have these multipliers first, N."""
+        own = self._multiplied(active)
+        return own.spread(multipliers[: own.n] * self.stiffness, len(active))
 
     def without_rounding(self, push: Array) -> Array:
         """Pushes, (cell, batch), N, but for those that are rounding only: zero."""

@@ -68,6 +68,7 @@ def _relaxed(
         near.is_there[is_slipping] = False
         n_stuck = n_stuck + is_stuck
         goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1) & ~is_slipping
+        goes_on &= np.isfinite(there.relative_residual)
         if own.is_free:  # a body that nothing pushes after so many steps has left
             goes_on &= (pushed[: own.n_gaps] > 0.0).any(axis=0)
         found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))

@@ -111,11 +111,13 @@ class Placed:
         shapes = ContactShapes.joined([part.grown.shapes for part in parts])
         load = np.concatenate([part.grown.load for part in parts])
         sizes = [len(part.codes) for part in parts]
+        margins = [part.grown.margin for part in parts if part.grown.margin is not None]
+        margin = np.concatenate(margins) if margins else None
         resets = _resets_of([part.grown.resets for part in parts], sizes)
         return cls(
             np.concatenate([part.codes for part in parts]),
             replace(parts[0].own, depth=np.concatenate([part.own.depth for part in parts])),
-            Approach(shapes, load, resets),
+            Approach(shapes, load, resets, margin),
             np.concatenate([part.status for part in parts]),
         )
 
@@ -145,18 +147,31 @@ def placed(
     codes: Codes,
     way: Way = Way.PLACE,
     closing: Closing | None = None,
+    *,
+    with_margins: bool = False,
 ) -> Placed:
     """Let fingers in these states meet a body that grows at its place, or moves to it.
 
-    Then they close on it, if that is given. Raises ValueError for a scene without the thickness of
-    its layer.
+    Then they close on it, if that is given. Margins, if they are wanted, are sought in the same
+    batch where bodies grow and stay. Raises ValueError for a scene without the thickness of its
+    layer.
     """
     if scene.layer_thickness is None:
         raise ValueError("the face of a finger needs the thickness of its layer")
     thickness = np.reshape(scene.layer_thickness, -1)
     units = UnitSolutions.of(scene.finger)
     parts = [
-        met(units, formulate, thickness, body, frame, codes[some], way, closing)
+        met(
+            units,
+            formulate,
+            thickness,
+            body,
+            frame,
+            codes[some],
+            way,
+            closing,
+            with_margins=with_margins,
+        )
         for some in blocks(len(codes), scene.finger.n_units)
     ]
     return Placed.joined(parts)
@@ -171,6 +186,8 @@ def met(
     codes: Codes,
     way: Way = Way.PLACE,
     closing: Closing | None = None,
+    *,
+    with_margins: bool = False,
 ) -> Placed:
     """The same of units and layers of some thickness, mm, (1,) or (batch,).
 
@@ -183,7 +200,11 @@ def met(
     depth = np.maximum(body.inner_radius, -bare.gaps()(x).value.min(axis=0))
     own = replace(bare, depth=depth)
     is_stable = np.asarray(free.status == Status.STABLE)
-    came = (_inserted if way is Way.INSERT else _grown)(own, body, frame, x, pattern, is_stable)
+    if way is Way.INSERT:
+        came = _inserted(own, body, frame, x, pattern, is_stable)
+    else:
+        beyond = MARGIN_TO if with_margins and closing is None else None
+        came = _grown(own, x, pattern, is_stable, beyond)
     if closing is not None:
         own = with_reach(own)
         came = closed(own, came, closing)
@@ -192,19 +213,19 @@ def met(
 
 
 def _grown(
-    own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
+    own: Obstructed, x: Array, pattern: Flags, is_stable: Flags, beyond: float | None
 ) -> Approach:
     """How fingers in free states, coordinates (size, batch), meet a body that grows."""
     begin = np.zeros(x.shape[1])
     start = finished(own, x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
     start = replace(start, is_there=start.is_there & is_stable)
-    return approach(own, start, begin, begin + 1.0)
+    return approach(own, start, begin, begin + 1.0, beyond=beyond)
 
 
 def _inserted(
     own: Obstructed, body: Body, frame: FingerFrame, x: Array, pattern: Flags, is_stable: Flags
 ) -> Approach:
-    """The same of a body that comes in along −x, from beyond where the fingers could reach."""
+    """How they meet a body that comes in along −x, from beyond where the fingers could reach."""
     finger, begin = own.units.finger, np.zeros(x.shape[1])
     furthest = finger.straight_length + finger.segment_height[0] + own.thickness[0]
     from_there = np.maximum(furthest - body.nearest_x, 0.0)[None]
@@ -228,7 +249,7 @@ def described(
 ) -> tuple[Grasped, ...]:
     """What there is to say of fingers that have come to rest, of each; `status` is that before.
 
-    Margins, which take as long again as all else, are NaN unless they are wanted.
+    Margins that are not known take as long again as all else, and are NaN unless they are wanted.
     """
     shapes = own.relabeled(grown.shapes)
     potential = own.pressed(grown.shapes.inverted, grown.shapes.push, grown.load)
@@ -240,9 +261,11 @@ def described(
     for face, body in zip(own.faces, own.bodies, strict=True):
         is_cut = is_there & _is_entered(face.shape(shapes.coordinates).nodes, body)
         status = np.where(is_cut, np.uint8(Status.NOT_CONVERGED), status)
-    margin = np.full(len(status), np.nan)
+    margin, is_stable = np.full(len(status), np.nan), np.asarray(status == Status.STABLE)
     if with_margins:
-        margin = _margins(own, grown, np.asarray(status == Status.STABLE))
+        known = grown.margin
+        margin = _margins(own, grown, is_stable) if known is None else known
+        margin = np.where(is_stable, margin, np.nan)
     gaps = own.gaps()(shapes.coordinates).value
     n_before, found = 0, []
     for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):
@@ -294,7 +317,8 @@ def told(part: Placed) -> Grasped:
     for some in blocks(len(part.codes), part.own.units.finger.n_units):
         lanes = np.arange(some.start, some.stop)
         own, shapes = part.own.take_lanes(lanes), grown.shapes.take_lanes(lanes)
-        came = Approach(shapes, grown.load[some], ())
+        margin = None if grown.margin is None else grown.margin[some]
+        came = Approach(shapes, grown.load[some], (), margin)
         parts += described(own, [part.codes[some]], came, part.status[some])
     return replace(Grasped.joined(parts), resets=grown.resets)
 

@@ -108,15 +108,16 @@ def grasps(
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
     before, later = (None, closing) if gives_way(body) else (closing, None)
+    motion = motion_of(body, scene.held, seen_from)
     parts: list[Placed] = []
     for frame, codes in zip(seen_from, needed, strict=True):
         if parts and is_alike:
             parts.append(parts[0])
         else:
-            parts.append(placed(scene, formulate, body, frame, codes, way, before))
+            given = (scene, formulate, body, frame, codes, way, before)
+            parts.append(placed(*given, with_margins=motion is None))
     lanes = [np.searchsorted(all_, own) for all_, own in zip(needed, pairs, strict=True)]
     centers = np.repeat(body.center[:, None], len(pairs[0]), axis=1)
-    motion = motion_of(body, scene.held, seen_from)
     if motion is None:
         different = parts[:1] if is_alike else parts
         fingers = [told(part) for part in different] * (len(parts) // len(different))

@@ -189,8 +189,8 @@ def test_a_margin_that_was_not_found_is_not_infinite(
     """No reset on a way that could not be followed says nothing."""
     whole = grasp.approach
 
-    def lost(*args: Any, to_reset: bool = False) -> Any:
-        found = whole(*args, to_reset=to_reset)
+    def lost(*args: Any, to_reset: bool = False, **others: Any) -> Any:
+        found = whole(*args, to_reset=to_reset, **others)
         if to_reset:
             found.shapes.is_there[0] = False
         return found
@@ -199,3 +199,29 @@ def test_a_margin_that_was_not_found_is_not_infinite(
     found = on_disc(reference_finger(2), (200.0, -16.0), 5.0, ["00", "01"])
     assert found.status.tolist() == [Status.STABLE] * 2
     assert np.isnan(found.margin[0]) and found.margin[1] == np.inf
+
+
+def test_margins_in_one_batch_are_those_of_their_own_paths(reference_finger: Fingers) -> None:
+    """And what is told of the grasp is the same, bit for bit."""
+    scene = Scene(reference_finger(4), (), None, 1.5)
+    (frame,), disc = frames(None), Disc(np.array([36.0, -22.0]), np.array([16.0]))
+    states = np.arange(16).astype(np.uint64)
+    parts = [
+        placed(scene, chain_potential, disc, frame, states, with_margins=wanted)
+        for wanted in (False, True)
+    ]
+    alone, at_once = (
+        described(part.own, [part.codes], part.grown, part.status)[0] for part in parts
+    )
+    assert parts[0].grown.margin is None and parts[1].grown.margin is not None
+    is_finite = np.isfinite(alone.margin)
+    assert is_finite.any() and np.isinf(alone.margin).any()
+    assert (np.isfinite(at_once.margin) == is_finite).all()
+    assert at_once.margin[is_finite] == pytest.approx(alone.margin[is_finite], abs=1e-10)
+    assert (np.isinf(at_once.margin) == np.isinf(alone.margin)).all()
+    for name in ("status", "after", "push", "force", "gap"):
+        assert (getattr(at_once, name) == getattr(alone, name)).all()
+    told = [[(r.lanes.tolist(), r.load.tolist()) for r in f.resets] for f in (alone, at_once)]
+    assert sorted(lane for lanes, _ in told[0] for lane in lanes) == sorted(
+        lane for lanes, _ in told[1] for lane in lanes
+    )

@@ -1,14 +1,13 @@
 """Fingers about a growing disc: energy, limits, and what results must not depend on."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.equilibrium import path
+from dpgcli.equilibrium import corrector, path
 from dpgcli.grasping import approach as approaching
 from dpgcli.mechanics.finger import Finger
 
@@ -120,14 +119,59 @@ def test_steps_do_not_matter(
 ) -> None:
     finger = reference_finger(2, 1e4)
     coarse = grown(finger, *RESETS)
-    halved = partial(path.follow, largest_step=0.5 * path.LARGEST_STEP)
-    monkeypatch.setattr(approaching, "follow", halved)
+    monkeypatch.setattr(path, "LARGEST_STEP", 0.5 * path.LARGEST_STEP)
+    monkeypatch.setattr(path, "FIRST_STEP", 0.5 * path.FIRST_STEP)
+    monkeypatch.setattr(corrector, "STRAYING", 0.1 * corrector.STRAYING)
     fine = grown(finger, *RESETS)
     assert fine.shapes.coordinates == pytest.approx(coarse.shapes.coordinates, abs=1e-11)
     assert fine.shapes.push == pytest.approx(coarse.shapes.push, abs=1e-10)
     (one,), (other,) = coarse.came.resets, fine.came.resets
     assert one.load == pytest.approx(other.load, rel=1e-10)
     assert (one.flipped == other.flipped).all()
+
+
+def test_events_are_where_secants_find_them(
+    reference_finger: Fingers, grown: Grow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Contacts that close and open, each by Newton's steps or come near to from before."""
+    finger, patterns = reference_finger(3), ["010", "110", "111"]
+    by_newton = grown(finger, patterns, *TWO_SIDES[1:])
+    asked: list[bool] = []
+
+    def by_secants(walk: path.Walk, trial: Any, cell: Array, is_away: Array) -> Array:
+        asked.extend(cell >= 0)
+        return np.full(len(cell), path.BY_SECANTS)
+
+    monkeypatch.setattr(path, "_to_meet", by_secants)
+    found = grown(finger, patterns, *TWO_SIDES[1:])
+    assert any(asked)
+    assert found.shapes.coordinates == pytest.approx(by_newton.shapes.coordinates, abs=1e-11)
+    assert found.shapes.push == pytest.approx(by_newton.shapes.push, abs=1e-10)
+    resets = [[(r.lanes.tolist(), *r.load) for r in f.came.resets] for f in (found, by_newton)]
+    assert len(resets[0]) == len(resets[1])
+    for one, other in zip(*resets, strict=True):
+        assert one[0] == other[0] and one[1:] == pytest.approx(other[1:], rel=1e-10)
+
+
+@pytest.mark.parametrize("is_held", [True, False])
+def test_newton_meets_an_event(reference_finger: Fingers, begun: Grow, is_held: bool) -> None:
+    """From well before it, with a cell that is held or by the load: one that closes."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    half = approaching.approach(obstructed, start, np.zeros(1), np.array([0.2]))
+    shapes = obstructed.relabeled(half.shapes)
+    family, x = obstructed.family(shapes.inverted, shapes.active), obstructed.stacked(shapes)
+    depth, nobody = max(family.column_depths), np.array([-1])
+    first = path.follow(family, x, np.array([0.2]), np.array([1.0]))
+    assert first.outcome == path.PathEnd.EVENT
+    cell = np.array([0 if is_held and shapes.active.any() else -1])
+    target = family.followed(x).value[cell]
+    ways = corrector.Ways(np.zeros(1, bool), first.cell)
+    near = 0.9 * first.load + 0.1 * 0.2
+    guess = 0.9 * first.coordinates + 0.1 * x
+    found = corrector.corrected(family, guess, near, cell, target[0], depth, ways)
+    assert found.is_fine and nobody[0] == -1
+    assert found.load == pytest.approx(first.load, abs=1e-10)
+    assert abs(family.law.margin(found.loaded, found.load)[first.cell[0], 0]) < corrector.CROSSED
 
 
 def test_it_can_stop_halfway(reference_finger: Fingers, begun: Grow) -> None:
