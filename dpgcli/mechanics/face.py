@@ -5,6 +5,9 @@ thickness t inside B_k: F_k = B_k − (t/2)(−sin τ_k, cos τ_k). There is a s
 corners stay joined however the finger bends (our choice; for equal corner angles sides are parallel
 to the chords).
 
+Between fingers their ends count as well: `with_end` adds the side along the last strut from F_n to
+the dome axis, as long as the strut is at rest.
+
 A body that moves by q along D moves the finger by −q D as the body sees it: such coordinates are
 rows before all others, each like a chord's extension at the base.
 
@@ -79,15 +82,18 @@ class Face:
 
     `places` are the rows of a body's motions, if it has any, and of e, a and b of each unit among
     all coordinates (a, e, b in the order of the chain; rigid bars have no e). A body moves along
-    `directions`, (2, motion, 1 or batch), in the finger's frame.
+    `directions`, (2, motion, 1 or batch), in the finger's frame. `has_end` says whether the last
+    strut, of the `height` H at rest, is a side.
     """
 
     length: Array
     half_thickness: Array
+    height: Array
     n_units: int
     is_rigid: bool
     places: Indices
     directions: Array = field(default_factory=lambda: np.zeros((2, 0, 1)))
+    has_end: bool = False
 
     @classmethod
     def of(cls, coordinates: FingerCoordinates, thickness: Array) -> Self:
@@ -104,7 +110,17 @@ class Face:
         rows = coordinates.without_walls(np.arange(float(coordinates.size))[:, None]).astype(int)
         order = [0, 1] if finger.is_rigid else [1, 0, 2]
         places = rows.reshape(finger.n_units, -1)[:, order].ravel()
-        return cls(finger.segment_length, 0.5 * thickness, finger.n_units, finger.is_rigid, places)
+        lengths = finger.segment_length, 0.5 * thickness, finger.segment_height
+        return cls(*lengths, finger.n_units, finger.is_rigid, places)
+
+    def with_end(self) -> Self:
+        """The face, and the end of the finger behind it."""
+        return replace(self, has_end=True)
+
+    @property
+    def n_sides(self) -> int:
+        """One for each phalanx, and the end."""
+        return self.n_units + self.has_end
 
     def seen_from(self, directions: Array, places: Indices) -> Self:
         """As a body sees it that moves along `directions` by the coordinates at `places`."""
@@ -142,13 +158,17 @@ class Face:
         if n_motions:
             away = np.broadcast_to(-self.directions, (2, n_motions, coordinates.shape[1]))
             origin = np.concatenate((away, origin), axis=1)
-        return FaceShape(stations + self.half_thickness * inwards, *self._moves, origin)
+        nodes = stations + self.half_thickness * inwards
+        if self.has_end:
+            top = stations[:, -1:] - self.height[-1:] * inwards[:, -1:]
+            nodes = np.concatenate((nodes, top), axis=1)
+        return FaceShape(nodes, *self._moves, origin)
 
     def take_lanes(self, index: Indices) -> Self:
         """The faces of some lanes of the batch."""
-        parts = (self.length, self.half_thickness, self.directions)
-        length, half, directions = (take_lanes(part, index) for part in parts)
-        return replace(self, length=length, half_thickness=half, directions=directions)
+        parts = (self.length, self.half_thickness, self.height, self.directions)
+        length, half, height, along = (take_lanes(part, index) for part in parts)
+        return replace(self, length=length, half_thickness=half, height=height, directions=along)
 
 
 def _as_chain(chord: Array, near: Array, far: Array) -> Array:

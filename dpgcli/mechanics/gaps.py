@@ -12,7 +12,8 @@ turn of the side, and τ = t at c, −(1 − s) t at A and −s t at B, ∇²g =
 corner w is 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -50,6 +51,11 @@ class Touches(NamedTuple):
 
     places: Array
     directions: Array
+
+    @classmethod
+    def together(cls, parts: "Sequence[Touches]") -> "Touches":
+        """The cells of several, one after the other."""
+        return cls(*(np.concatenate(own, axis=1) for own in zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,7 @@ class FaceGaps:
         """g − r with its derivatives, (cell, batch)."""
         shape = self.face.shape(coordinates)
         near = nearest(shape, self.obstacle.points)
-        moves = _moves(shape, near)
+        moves = moves_of(shape, near)
         place, own, slope = self._at_points(near), self._own(near), moves.slope
         n_points = len(own)
         pushes = np.zeros((2, len(shape.nodes[0]), 0, coordinates.shape[1]))
@@ -104,14 +110,14 @@ class FaceGaps:
         value = np.take_along_axis(own, place, axis=0)
         gradient = np.take_along_axis(slope, place[None], axis=1)
         if self.first is not None:
-            is_told = _one_at(place, self.first)
+            is_told = one_at(place, self.first)
             value = np.where(is_told, value, FAR)
         gradient = np.where(value < FAR, gradient, 0.0)
 
         def bent(force: Array) -> Array:
             is_there = place[:, None] == np.arange(len(own))[:, None]
             by_place = total(np.where(is_there, force[:, None], 0.0))
-            result = _bent(shape, near, moves, by_place[:n_points])
+            result = bent_by(shape, near, moves, by_place[:n_points])
             if len(own) > n_points:
                 result += shape.bent(total(np.moveaxis(pushes * by_place[n_points:], 2, 0)))
             return result
@@ -165,12 +171,11 @@ class FaceGaps:
         from it, before it the body is behind the face, and the gap jumps.
         """
         nodes = self.face.shape(coordinates).nodes
-        side, away = nodes[:, -1:] - nodes[:, -2:-1], self.obstacle.points - nodes[:, -1:]
-        length = np.hypot(*side)
-        beyond = total(away * side) / length
-        is_behind = side[1] * away[0] < side[0] * away[1]
-        is_touched = np.hypot(*away) - self.obstacle.radii - bound <= LEVEL * length
-        return np.asarray(((np.abs(beyond) <= LEVEL * length) & is_behind & is_touched).any(axis=0))
+        return slipping(nodes, self.obstacle.points, self.obstacle.radii + bound)
+
+    def with_first(self, first: Flags | None) -> Self:
+        """The same, but only one gap at each place."""
+        return replace(self, first=first)
 
     def take_lanes(self, index: Indices) -> Self:
         """The same gaps for some lanes of the batch."""
@@ -178,6 +183,16 @@ class FaceGaps:
         reach = None if self.reach is None else take_lanes(self.reach, index)
         face, obstacle = self.face.take_lanes(index), self.obstacle.take_lanes(index)
         return type(self)(face, obstacle, first, reach)
+
+
+def slipping(nodes: Array, points: Array, radii: Array) -> Flags:
+    """Whether round bodies, (2, body, batch), slip over the end of a line of nodes, (batch,)."""
+    side, away = nodes[:, -1:] - nodes[:, -2:-1], points - nodes[:, -1:]
+    length = np.hypot(*side)
+    beyond = total(away * side) / length
+    is_behind = side[1] * away[0] < side[0] * away[1]
+    is_touched = np.hypot(*away) - radii <= LEVEL * length
+    return np.asarray(((np.abs(beyond) <= LEVEL * length) & is_behind & is_touched).any(axis=0))
 
 
 def _pushed(plates: PlateGaps) -> Array:
@@ -189,7 +204,7 @@ def _pushed(plates: PlateGaps) -> Array:
     return forces.reshape(2, n_nodes, -1, batch)
 
 
-def _one_at(place: Indices, first: Flags) -> Flags:
+def one_at(place: Indices, first: Flags) -> Flags:
     """One cell of each place: the lowest of the first ones there, or its own, (cell, batch)."""
     n = len(place)
     numbers = np.arange(n)[:, None]
@@ -198,7 +213,7 @@ def _one_at(place: Indices, first: Flags) -> Flags:
     return np.asarray(~is_before.any(axis=1))
 
 
-def nearest(shape: FaceShape, centers: Array) -> Nearest:
+def nearest(shape: FaceShape, centers: Array, *, has_end: bool = False) -> Nearest:
     """The nearest places of all sides of a face to points (2, point, batch)."""
     start = shape.nodes[:, None, :-1]
     side_x, side_y = shape.nodes[:, None, 1:] - start
@@ -211,6 +226,8 @@ def nearest(shape: FaceShape, centers: Array) -> Nearest:
     is_corner = share != raw
     is_corner |= (raw == 0.0) | (raw == 1.0)
     off_line = away_x * along_y - away_y * along_x
+    if has_end:
+        place = _around_end(place, off_line)
     reach = share * length
     corner_x, corner_y = away_x - reach * along_x, away_y - reach * along_y
     distance = np.sqrt(corner_x * corner_x + corner_y * corner_y)
@@ -246,7 +263,20 @@ def _followed(raw: Array) -> Indices:
     return target
 
 
-class _Moves(NamedTuple):
+def _around_end(place: Indices, off_line: Array) -> Indices:
+    """Places with those at the end, where a point that is behind two sides is behind the nearer.
+
+    The last side is about square to the one before: what is just in it is far behind the other.
+    """
+    last, before = off_line.shape[1] - 1, off_line.shape[1] - 2
+    by_face, by_end = off_line[:, before, None], off_line[:, last, None]
+    is_at_end = (place == before) & (by_face < 0.0) & (by_end > by_face)
+    is_at_face = (place == last) & (by_end < 0.0) & (by_face > by_end)
+    at_face = np.where(is_at_face, place[:, before, None], place)
+    return np.where(is_at_end, last, at_face)
+
+
+class Moves(NamedTuple):
     """∇g of every side and body by the coordinates, (row, cell, batch).
 
     `push` (2, node, cell, batch) are the forces on nodes of which it is made.
@@ -256,15 +286,16 @@ class _Moves(NamedTuple):
     push: Array
 
 
-def _moves(shape: FaceShape, near: Nearest) -> _Moves:
+def moves_of(shape: FaceShape, near: Nearest) -> Moves:
+    """How the gaps of all sides and points change as the face moves."""
     _, n_bodies, n, batch = near.normal.shape
     normal, share = near.normal.reshape(2, -1, batch), near.share.reshape(-1, batch)
     sides = np.tile(np.arange(n), n_bodies)
     push = _at_ends((share - 1.0) * normal, -share * normal, sides, n)
-    return _Moves(shape.pulled(push), push)
+    return Moves(shape.pulled(push), push)
 
 
-def _turned(shape: FaceShape, near: Nearest, cells: Indices) -> tuple[Array, Array]:
+def turns_of(shape: FaceShape, near: Nearest, cells: Indices) -> tuple[Array, Array]:
     """The w and the τ of some sides and bodies by the coordinates, (row, cell, batch)."""
     _, _, n, batch = near.normal.shape
     normal, along = (v.reshape(2, -1, batch)[:, cells] for v in (near.normal, near.along))
@@ -292,13 +323,13 @@ def _at_ends(start: Array, end: Array, sides: Indices, n_sides: int) -> Array:
     return forces
 
 
-def _bent(shape: FaceShape, near: Nearest, moves: _Moves, force: Array) -> Array:
+def bent_by(shape: FaceShape, near: Nearest, moves: Moves, force: Array) -> Array:
     """Σ F ∇²g over places, (row, row, batch), for forces (place, batch)."""
     batch = force.shape[1]
     result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
     distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
     cells = np.flatnonzero(force.any(axis=1))
-    turn, slide = _turned(shape, near, cells)
+    turn, slide = turns_of(shape, near, cells)
     for place, cell in enumerate(cells):  # of sides w (τ − ½ g w)ᵀ F and its mirror image
         w, tau, f, g = turn[:, place], slide[:, place], force[cell], distance[cell]
         mixed = w[:, None] * (f * tau - (0.5 * f * g) * w)
