@@ -1,5 +1,6 @@
 """Bodies as arguments: texts such as "disc:40", files, places; and which of them can be grasped."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -58,15 +59,19 @@ def with_body(
     """The same with the body of these arguments, or of its own.
 
     A text says what it is or names a file of the keys of `object`; `at` is its place, `settings`
-    are "object.key=value" texts. Raises UsageError for what is no body, SpecError for a wrong file.
+    are "object.key=value" texts. A gripper may go without. Raises UsageError for what is no body,
+    SpecError for a wrong file.
     """
     check_texts(object=said)
     scene, known = given.scene, given.scene.body
     place = None if at is None else np.array(point("at", at))
     if said is None:
+        if known is None and scene.gripper is not None and place is None:
+            return given
         if known is None:
             what = ": expected a body such as disc:40, here or as object in the spec"
-            raise UsageError(Field("object"), what)
+            hint = "" if scene.gripper is not None else "; two fingers, of a gripper, go without"
+            raise UsageError(Field("object"), what + hint)
         body = known if place is None else replace(known, center=place)
         return replace(given, scene=replace(scene, body=body))
     whole = _document(said)
@@ -128,18 +133,33 @@ def _of_text(said: str) -> dict[str, Any]:
     return {"jaws": {"gap_mm": gap, "height_mm": height}}
 
 
-def check_body(scene: Scene, body: Body) -> None:
-    """Raise UsageError where fingers cannot meet a body: no face, or one that begins in a base."""
+def check_body(scene: Scene, body: Body | None) -> None:
+    """Raise UsageError where fingers cannot meet a body, or each other: no face, or in a base."""
     if scene.layer_thickness is None:
         raise UsageError(
             "grasping needs finger.geometry.limiting_layer_thickness_mm: the face of a finger is "
             "half of it inside the lattice"
         )
+    if body is None:
+        _check_apart(scene)
+        return
     if begins_in_base(scene, body).any():
         raise UsageError(
             Field("at"),
             f" {body.center[0]:g},{body.center[1]:g}: {body.name} there begins in the base of a "
             "finger: move it along x, or take a smaller one",
+        )
+
+
+def _check_apart(scene: Scene) -> None:
+    """Raise UsageError for faces that are in each other at the bases."""
+    assert scene.gripper is not None and scene.layer_thickness is not None, "two faces"
+    spacing = float(scene.gripper.base_spacing)
+    least = float(scene.layer_thickness) * math.cos(float(scene.gripper.mounting_angle))
+    if spacing <= least:
+        raise UsageError(
+            f"gripper.base_spacing_mm: expected more than {least:g}, where the faces meet at the "
+            f"bases of the fingers, found {spacing:g}"
         )
 
 

@@ -87,8 +87,9 @@ class GraspResult:
         touches = int((rows["n_contacts"] > 0).sum())
         changed = int((is_there & (rows["pattern"] != rows["pattern_after"])).sum())
         n = len(is_there)
+        what = "with each other" if self.grasps.body is None else "with the body"
         yield (
-            f"of {counted(n, 'state')} {touches:,} in touch with the body, {changed:,} changed on "
+            f"of {counted(n, 'state')} {touches:,} in touch {what}, {changed:,} changed on "
             f"the way; worst penetration {_worst(rows['penetration_mm']):.2g} mm, worst residual "
             f"{_worst(rows['residual_N']):.2g} N"
         )
@@ -98,10 +99,13 @@ class GraspResult:
         if n_other := int(n - (is_there | is_let_go).sum()):
             yield f"{counted(n_other, 'state')} without an answer: see the column status"
         if "overlaps" in rows and rows["overlaps"].any():
+            where = "elsewhere than at faces and ends" if self.grasps.body is None else "each other"
             yield (
                 f"{counted(int(rows['overlaps'].sum()), 'state')} in which the fingers overlap "
-                "each other: their contact with each other is not in the model"
+                f"{where}: their contact there is not in the model"
             )
+        if self.grasps.body is None:
+            yield from self._mirrored_lines()
         if "tie" in rows and (n_tied := int((rows["tie"] != "").sum())):
             yield (
                 f"ties in {counted(n_tied, 'state')}: the model does not say which of the units "
@@ -113,6 +117,17 @@ class GraspResult:
         yield from force_lines(self.given.scene)
         if self.grasps.scene.friction is not None:
             yield from self._payload_lines(self.grasps.scene.friction)
+
+    def _mirrored_lines(self) -> Iterator[str]:
+        """What is taken of two fingers in one state."""
+        is_alike = np.array(["/" not in text for text in self.rows["pattern"]], bool)
+        if n_reset := int((is_alike & (self.rows["resets"] != "")).sum()):
+            yield (
+                f"{counted(n_reset, 'mirrored pair')} reset together: which finger goes first the "
+                "model does not say, and one alone may end in another state"
+            )
+        if n_aside := int((is_alike & (self.rows["status"] == Status.MARGINAL)).sum()):
+            yield f"{counted(n_aside, 'mirrored pair')} giving way to one side: marginal"
 
     def _payload_lines(self, friction: Friction) -> Iterator[str]:
         """What payloads rest on, the largest, and which states do not bear the weight."""
@@ -158,8 +173,10 @@ class GraspResult:
         table = path_of("path", path)
         check_outputs(self.given.files, (table, Mark.TABLE))
         scene = self.grasps.scene
-        told = told_of(self.grasps.body, scene.held, scene.friction)
-        chosen = {"object": told, "approach": self.way.value}
+        chosen: dict[str, Any] = {"approach": "together"}
+        if (body := self.grasps.body) is not None:
+            told = told_of(body, scene.held, scene.friction)
+            chosen = {"object": told, "approach": self.way.value}
         if (closing := self.grasps.closing) is not None:
             chosen |= told_history(closing.pressure, closing.history)
         write_scene_rows(table_path(table), scene, self.given.json, self.columns, self.rows, chosen)
@@ -195,13 +212,14 @@ def grasp(
     pressure: "PressureInput | None" = None,
     settings: Settings = (),
 ) -> GraspResult:
-    """What the fingers of a spec do with a body in their way.
+    """What the fingers of a spec do with a body in their way, or two without one with each other.
 
     `object` is such as "disc:40", a disc of 40 mm, "jaws:30x40", two plates of 40 mm with a gap of
     30 mm, or the name of a YAML file; `at` is its place (mm) in the gripper's frame. They are those
     of the spec's `object` unless given; beside an `object` settings such as object.held are its.
-    Patterns are globs such as "111*", or a pair of them for the upper and the lower finger,
-    "111*/11100"; with `both` every pattern meets every other.
+    Without either the bases of a gripper come together until its fingers touch. Patterns are globs
+    such as "111*", or a pair of them for the upper and the lower finger, "111*/11100"; with `both`
+    every pattern meets every other.
     With the `approach` "place" the body grows from nothing at its place, with "insert" it comes in
     along −x from beyond the fingers, and with "close" the fingers then go through pressures, as
     `actuate` takes them, until there is none; in the end the body is let go of, if the spec says
@@ -258,7 +276,9 @@ def grasp_of(
 ) -> GraspResult:
     """The same, of a scene with a body that was read before."""
     scene = given.scene
-    assert scene.body is not None, "a scene with a body"
+    if scene.body is None and way is not Way.PLACE:
+        what = f" {way} goes with a body: expected an "
+        raise UsageError(Field("approach"), what, Field("object"), " such as disc:40")
     check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
     check_work(work_of(scene, pairs, way, closing))
@@ -273,8 +293,10 @@ def work_of(
     """What pairs of states will take."""
     n_ramps = 0 if closing is None else len(closing.history.pressure)
     n_states = sum(len(distinct(codes)) for codes in pairs)
-    assert scene.body is not None, "a scene with a body"
     sizes = n_states, len(pairs[0]), scene.finger.n_units, len(pairs)
+    if scene.body is None:
+        n_pairs = int((pairs[0] != pairs[-1]).sum())
+        return Work(*sizes, False, n_pairs=n_pairs, effort=effort(scene, None))
     has_friction = scene.friction is not None
     return Work(*sizes, is_moving(scene), way, n_ramps, has_friction, effort(scene, scene.body))
 

@@ -70,6 +70,7 @@ EXAMPLES = {
         "dpg grasp gripper.yaml --object disc:40 --at 40,0 --pattern 111* --plot grasps.svg",
         "dpg grasp gripper.yaml --object disc:40 --at 40,5 --pattern 11111/11100",
         "dpg grasp gripper.yaml --object disc:40 --at 40,0 --approach close --pressure 0:0.16:0",
+        "dpg grasp gripper.yaml --pattern 110* --pattern 11111/01111 --plot meeting.svg",
     ),
     "pulses": (
         "dpg pulses finger.yaml --to 111",

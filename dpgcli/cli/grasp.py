@@ -31,7 +31,11 @@ if TYPE_CHECKING:
 
 Body = Annotated[
     str | None,
-    typer.Option("--object", metavar="BODY", help="Body: disc:40, jaws:30x40 or a YAML file"),
+    typer.Option(
+        "--object",
+        metavar="BODY",
+        help="Body: disc:40, jaws:30x40 or a YAML file; without one two fingers meet",
+    ),
 ]
 Place = Annotated[
     str | None,
@@ -86,7 +90,7 @@ def grasp(
     plot: Plot = None,
     quiet: Quiet = False,
 ) -> None:
-    """Let fingers close on a body: contacts, forces, and which units reset."""
+    """Let fingers close on a body, or on each other: contacts, forces, and which units reset."""
     from dpgcli.api.bodies import own_settings, with_body
     from dpgcli.api.grasp import (
         check_drawable,

@@ -52,8 +52,7 @@ def _are_folded(own: Obstructed, shapes: ContactShapes) -> Flags:
 
 def with_reach(own: Obstructed) -> Obstructed:
     """Fingers that may close in front of bodies: they touch nothing that is behind their domes."""
-    height = own.units.finger.segment_height.max(axis=0)
-    return replace(own, reach=height + 0.5 * own.thickness[0])
+    return replace(own, reach=own.behind)
 
 
 def event_text(told: Reset, place: int, lines: Pressure) -> str:

@@ -35,6 +35,7 @@ from dpgcli.grasping.shapes import ContactShapes, Motion, Ramp
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
+from dpgcli.mechanics.mirror import Axis, Heights, NodeGaps, OfNodes, Touching
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.mechanics.sticking import Sticking
@@ -52,8 +53,10 @@ class Obstructed:
     """Fingers with bodies in their way: one design and body, or one for each lane.
 
     There are as many fingers to a lane as there are `bodies`: what the body is in the frame of
-    each. Arrays by unit and by cell are those of the first finger, then of the next; coordinates
-    are interleaved (`equilibrium.joined`), those of the body's `motion` behind them.
+    each, or the axis that a finger and its mirror image meet in. Without bodies there are two that
+    meet each other: their frames are mirror images in the `axis`. Arrays by unit and by cell are
+    those of the first finger, then of the next; coordinates are interleaved (`equilibrium.joined`),
+    those of the body's `motion` behind them.
 
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm. A `ramp` changes the
@@ -65,17 +68,18 @@ class Obstructed:
     units: UnitSolutions
     formulate: Formulate
     thickness: Array
-    bodies: tuple[Obstacle, ...]
+    bodies: tuple[Obstacle | Axis, ...]
     depth: Array
     motion: Motion | None = None
     ramp: Ramp | None = None
     reach: Array | None = None
     sticking: tuple[Sticking, ...] = ()
+    axis: Axis | None = None
 
     @property
     def n_fingers(self) -> int:
         """Fingers to a lane."""
-        return len(self.bodies)
+        return len(self.bodies) or 2
 
     @property
     def stiffness(self) -> Array:
@@ -99,7 +103,7 @@ class Obstructed:
         units = self.units.take_lanes(index)
         sticking = tuple(place.take_lanes(index) for place in self.sticking)
         bare = Obstructed(units, self.formulate, thickness, bodies, depth, motion, ramp, reach)
-        return replace(bare, sticking=sticking)
+        return replace(bare, sticking=sticking, axis=self.axis and self.axis.take_lanes(index))
 
     def of_finger(self, values: Array, finger: int) -> Array:
         """What belongs to a finger of coordinates (size, …)."""
@@ -123,17 +127,47 @@ class Obstructed:
             faces.append(face)
         return tuple(faces)
 
+    @cached_property
+    def contacts(self) -> tuple[FaceGaps | Heights | NodeGaps, ...]:
+        """The gaps of each finger to its body; without bodies those between the two fingers."""
+        if self.axis is None:
+            pairs = zip(self.faces, self.bodies, strict=True)
+            return tuple(
+                Heights(face.with_end(), body)
+                if isinstance(body, Axis)
+                else FaceGaps(face, body, reach=self.reach)
+                for face, body in pairs
+            )
+        upper, lower = (face.with_end() for face in self.faces)
+        told = self.axis, self.n_own + self._n_motions, self.behind
+        return NodeGaps(upper, lower, *told, True), NodeGaps(lower, upper, *told, False)
+
+    @property
+    def behind(self) -> Array:
+        """How far behind the face the domes reach, mm, (1 or batch,)."""
+        height = self.units.finger.segment_height.max(axis=0)
+        return np.asarray(height + 0.5 * self.thickness[0])
+
+    def seen_by(self, finger: int) -> Iterator[tuple[slice, Touching]]:
+        """The cells that a finger has a part in, and what it touches there."""
+        n_before = 0
+        for number, gaps in enumerate(self.contacts):
+            cells = slice(n_before, n_before + gaps.n_cells)
+            if number == finger:
+                yield cells, gaps
+            elif isinstance(gaps, NodeGaps):
+                yield cells, OfNodes(gaps)
+            n_before = cells.stop
+
     def gaps(self, first: Flags | None = None) -> WideMeasure:
         """Gaps to the bodies in full; at each place only one, if it is said which come first.
 
         Behind them what is prescribed: motions, and places that stick.
         """
         gaps: list[WideMeasure] = []
-        for face, body in zip(self.faces, self.bodies, strict=True):
-            bare = FaceGaps(face, body)
+        for bare in self.contacts:
             n = sum(measure.n_cells for measure in gaps)
-            own = None if first is None else first[n : n + bare.n_cells]
-            gaps.append(replace(bare, first=own, reach=self.reach))
+            gaps.append(bare.with_first(None if first is None else first[n : n + bare.n_cells]))
         if self.motion is None and len(gaps) == 1:
             return gaps[0]
         return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
@@ -141,8 +175,8 @@ class Obstructed:
     def each(self, push: Array) -> Iterator[tuple[FaceGaps, Array]]:
         """The gaps of each finger, and what belongs to them of pushes (cell, …)."""
         n_before = 0
-        for face, body in zip(self.faces, self.bodies, strict=True):
-            gaps = FaceGaps(face, body, reach=self.reach)
+        for gaps in self.contacts:
+            assert isinstance(gaps, FaceGaps), "a body"
             yield gaps, push[n_before : n_before + gaps.n_cells]
             n_before += gaps.n_cells
 
@@ -173,8 +207,7 @@ class Obstructed:
     @cached_property
     def n_gaps(self) -> int:
         """Cells that are gaps."""
-        pairs = zip(self.faces, self.bodies, strict=True)
-        return sum(FaceGaps(face, body).n_cells for face, body in pairs)
+        return sum(gaps.n_cells for gaps in self.contacts)
 
     @cached_property
     def are_kept(self) -> Flags:
@@ -201,10 +234,9 @@ class Obstructed:
             return None
         n_lanes = max(place.friction.shape[1] for place in self.sticking)
         limits, n_before = np.zeros((len(self.sticking), len(self.are_kept), n_lanes)), 0
-        for finger, (place, face) in enumerate(zip(self.sticking, self.faces, strict=True)):
-            n = FaceGaps(face, self.bodies[finger]).n_cells
-            limits[finger, n_before : n_before + n] = place.friction
-            n_before += n
+        for finger, (place, gaps) in enumerate(zip(self.sticking, self.contacts, strict=True)):
+            limits[finger, n_before : n_before + gaps.n_cells] = place.friction
+            n_before += gaps.n_cells
         return limits
 
     def bound(self, load: Array) -> Array:
@@ -359,9 +391,11 @@ class Obstructed:
 
     def are_slipping(self, coordinates: Array, load: Array) -> Flags:
         """Whether the end of a finger slips over the body, (batch,)."""
-        pairs, bound = zip(self.faces, self.bodies, strict=True), (load - 1.0) * self.depth
-        slips = [FaceGaps(face, body).are_slipping(coordinates, bound) for face, body in pairs]
-        return np.asarray(np.any(slips, axis=0))
+        bound, slips = (load - 1.0) * self.depth, np.zeros(len(load), bool)
+        for gaps in self.contacts:
+            if not isinstance(gaps, Heights):
+                slips |= gaps.are_slipping(coordinates, bound)
+        return slips
 
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are in their inverted wells, (unit, batch)."""

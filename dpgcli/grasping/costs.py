@@ -14,6 +14,7 @@ STATE_SECONDS = {Way.PLACE: 1.5e-4, Way.CLOSE: 1.5e-4, Way.INSERT: 7.5e-4}
 RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
+PAIR_SECONDS = 3.5e-3  # of two fingers in different states that come together
 JAW_SECONDS = 0.03  # of a state at all apertures
 BODIES = {Disc: 1.0, Jaws: 2.0, Polygon: 8.0}  # times as long: a polygon's corners take most
 CURVE = 10.0  # times as long with a calibration's curve
@@ -21,11 +22,16 @@ WITHOUT_MARGINS = 0.5
 START_SECONDS, ROW_SECONDS = 1.0, 3e-5
 LIBRARY_BYTES = 2**26
 KEPT_BYTES, ROW_BYTES = 200, 180  # of a finger and of a row, times the number of units
+PAIR_BYTES = 800  # of a pair, times the square of its units: what is kept
+PAIR_LANE = 2500  # the same while it is worked on, times their third power
 
 
 @dataclass(frozen=True)
 class Work:
-    """Seconds and bytes of so many rows, of states of the upper and the lower finger."""
+    """Seconds and bytes of so many rows, of states of the upper and the lower finger.
+
+    Without a body `n_pairs` of the rows are those of different states.
+    """
 
     n_states: int
     n_rows: int
@@ -36,6 +42,7 @@ class Work:
     n_ramps: int = 0
     has_friction: bool = False
     effort: float = 1.0  # times that of a disc and the published law
+    n_pairs: int = 0
 
     @property
     def seconds(self) -> float:
@@ -49,7 +56,7 @@ class Work:
         one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
         placed = self.n_states * one * square
         pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
-        met = placed + let_go + pulled
+        met = placed + let_go + pulled + self.n_pairs * PAIR_SECONDS * square
         return START_SECONDS + self.effort * met + self.n_rows * ROW_SECONDS
 
     @property
@@ -61,14 +68,19 @@ class Work:
         """
         block = min(self.n_states * LANE * self.n_units**2, BLOCK)
         n_kept = self.n_fingers * (self.n_rows if self.is_moving else self.n_states)
+        of_pairs = self.n_pairs * PAIR_BYTES * self.n_units**2
+        block += min(self.n_pairs * PAIR_LANE * self.n_units**3, BLOCK)
         return (
-            LIBRARY_BYTES + block + self.n_units * (KEPT_BYTES * n_kept + ROW_BYTES * self.n_rows)
+            LIBRARY_BYTES
+            + block
+            + of_pairs
+            + self.n_units * (KEPT_BYTES * n_kept + ROW_BYTES * self.n_rows)
         )
 
 
-def effort(scene: Scene, body: Body) -> float:
-    """How many times as long a body takes as a disc does with the published law."""
-    return BODIES[type(body)] * _of_law(scene)
+def effort(scene: Scene, body: Body | None) -> float:
+    """How many times as long a body, or none, takes as a disc does with the published law."""
+    return (1.0 if body is None else BODIES[type(body)]) * _of_law(scene)
 
 
 def is_moving(scene: Scene) -> bool:

@@ -62,7 +62,7 @@ def _relaxed(
         near = finished(own, there.coordinates, inverted[:, lanes], pushed, load[lanes])
         away = np.abs(near.coordinates - there.coordinates) / potential.coordinates.step_cap
         is_near = near.is_there & (away.max(axis=0) <= SHORT_STEP)
-        is_stuck = there.relative_residual > STUCK
+        is_stuck = ~(there.relative_residual <= STUCK)
         is_slipping = is_stuck & ~is_near & own.are_slipping(there.coordinates, load[lanes])
         near.coordinates[:, is_slipping] = there.coordinates[:, is_slipping]
         near.is_there[is_slipping] = False

@@ -8,6 +8,7 @@ import shapely
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.scene import Gripper, Scene
+from dpgcli.mechanics.mirror import Axis
 from dpgcli.mechanics.obstacle import Obstacle
 
 
@@ -51,6 +52,12 @@ class FingerFrame(NamedTuple):
         """A point of the finger's frame, (2, …), in the gripper's."""
         x, y = self.outside(point)
         return np.stack((x, y + self.side * self.offset))
+
+    @property
+    def axis(self) -> Axis:
+        """The axis of the gripper in the finger's frame."""
+        normal = self.along(np.array([0.0, float(self.side)]))
+        return Axis(normal.reshape(2, -1), np.reshape(self.offset, -1).astype(float))
 
     def obstacle(self, body: Body) -> Obstacle:
         """What a body is to the finger."""

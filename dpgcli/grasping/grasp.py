@@ -20,7 +20,8 @@ from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
-from dpgcli.mechanics.gaps import FaceGaps, Touches
+from dpgcli.mechanics.gaps import Touches
+from dpgcli.mechanics.mirror import Axis
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
@@ -204,7 +205,7 @@ def met(
         came = _inserted(own, body, frame, x, pattern, is_stable)
     else:
         beyond = MARGIN_TO if with_margins and closing is None else None
-        came = _grown(own, x, pattern, is_stable, beyond)
+        came = grown(own, x, pattern, is_stable, beyond)
     if closing is not None:
         own = with_reach(own)
         came = closed(own, came, closing)
@@ -212,10 +213,10 @@ def met(
     return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
 
 
-def _grown(
+def grown(
     own: Obstructed, x: Array, pattern: Flags, is_stable: Flags, beyond: float | None
 ) -> Approach:
-    """How fingers in free states, coordinates (size, batch), meet a body that grows."""
+    """How fingers in free states, coordinates (size, batch), meet what grows in their way."""
     begin = np.zeros(x.shape[1])
     start = finished(own, x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
     start = replace(start, is_there=start.is_there & is_stable)
@@ -258,7 +259,7 @@ def described(
     is_there = status == Status.STABLE
     worst = np.max([state.status for state in settled], axis=0)
     status = np.where(is_there, worst, status)
-    for face, body in zip(own.faces, own.bodies, strict=True):
+    for face, body in zip(own.faces, own.bodies, strict=False):
         is_cut = is_there & _is_entered(face.shape(shapes.coordinates).nodes, body)
         status = np.where(is_cut, np.uint8(Status.NOT_CONVERGED), status)
     margin, is_stable = np.full(len(status), np.nan), np.asarray(status == Status.STABLE)
@@ -267,12 +268,11 @@ def described(
         margin = _margins(own, grown, is_stable) if known is None else known
         margin = np.where(is_stable, margin, np.nan)
     gaps = own.gaps()(shapes.coordinates).value
-    n_before, found = 0, []
-    for finger, (state, face, body) in enumerate(zip(settled, own.faces, own.bodies, strict=True)):
-        bare = FaceGaps(face, body)
-        touches = bare.touches(shapes.coordinates)
-        cells = slice(n_before, n_before + bare.n_cells)
-        push, n_before = own.without_rounding(shapes.push[cells]), cells.stop
+    found = []
+    for finger, state in enumerate(settled):
+        cells, seen = zip(*own.seen_by(finger), strict=True)
+        touches = Touches.together([part.touches(shapes.coordinates) for part in seen])
+        push = own.without_rounding(np.concatenate([shapes.push[part] for part in cells]))
         rows = slice(finger, own.n_own, own.n_fingers)
         mine = own.of_finger(shapes.coordinates, finger)
         found.append(
@@ -282,9 +282,9 @@ def described(
                 status=status,
                 push=push,
                 touches=touches,
-                phalanges=bare.phalanges,
+                phalanges=np.concatenate([part.phalanges for part in seen]),
                 force=total(np.moveaxis(touches.directions * push, 1, 0)),
-                gap=gaps[cells].min(axis=0),
+                gap=np.min([gaps[part].min(axis=0) for part in cells], axis=0),
                 margin=margin,
                 residual=there.residual,
                 error=tip(state, with_compliance=False, whole=there, rows=rows).error,
@@ -296,14 +296,14 @@ def described(
     return tuple(found)
 
 
-def _is_entered(nodes: Array, body: Obstacle) -> Flags:
+def _is_entered(nodes: Array, body: Obstacle | Axis) -> Flags:
     """Whether a face, nodes (2, node, batch), runs into a polygon: one whose gaps do not tell.
 
     Lanes that are lost have no nodes, and run into nothing.
     """
     enters = np.zeros(nodes.shape[2], bool)
     lanes = np.flatnonzero(np.isfinite(nodes).all(axis=(0, 1)))
-    if len(body.plates) and len(lanes):
+    if isinstance(body, Obstacle) and len(body.plates) and len(lanes):
         area = shapely.polygons(body.take_lanes(lanes).points.transpose(2, 1, 0))
         inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
         faces = shapely.linestrings(nodes[..., lanes].transpose(2, 1, 0))

@@ -18,6 +18,7 @@ from dpgcli.grasping.grasp import Grasped, Placed, blocks, placed, told
 from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
+from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
@@ -34,9 +35,14 @@ COLUMNS = (
     Column("resets", "", "units that left their wells, at which share of the load", kind=Kind.TEXT),
     Column("events", "", "units that snapped and reset, at which pressure", kind=Kind.TEXT),
     Column("tie", "", "units whose threshold is the same within 1e-6", kind=Kind.TEXT),
-    Column("n_contacts", "", "places that touch the body", kind=Kind.COUNT),
-    Column("touching", "", "phalanges that touch it, from the base", kind=Kind.TEXT),
-    Column("finger_force_x_N", "N", "force of the upper finger on the body", outputs=FORCES),
+    Column("n_contacts", "", "places that touch the body, or each other", kind=Kind.COUNT),
+    Column("touching", "", "phalanges that touch there, from the base", kind=Kind.TEXT),
+    Column(
+        "finger_force_x_N",
+        "N",
+        "force of the upper finger on the body, or on the lower finger",
+        outputs=FORCES,
+    ),
     Column("finger_force_y_N", "N", "the same along y", outputs=FORCES),
     Column("squeeze_N", "N", "closing force between the two fingers", outputs=FORCES),
     Column("max_contact_N", "N", "largest force at one place", outputs=FORCES),
@@ -55,12 +61,13 @@ COLUMNS = (
     Column("object_x_mm", "mm", "x of the body's reference point"),
     Column("object_y_mm", "mm", "y of the body's reference point"),
     Column("jaw_gap_mm", "mm", "aperture of the jaws"),
-    Column("penetration_mm", "mm", "largest depth of the body in a face"),
+    Column("penetration_mm", "mm", "largest depth of the body, or a finger, in a face"),
     Column("margin", "", "how much more of the load before a next unit resets", outputs=FORCES),
     Column("residual_N", "N", "largest force out of balance"),
     Column("numerical_error_mm", "mm", "error of the tip by solving the equations"),
 )
 JAW_GAP = "jaw_gap_mm"
+OF_BODIES = ("object_x_mm", "object_y_mm")
 OF_CLOSING = ("events", "tie")
 OF_FRICTION = ("payload_N", "fails_first")
 OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
@@ -72,11 +79,12 @@ class Grasps:
 
     `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
     is, and by so much jaws have `opened`, (row,), mm. `closing` is how they closed, if they did;
-    `borne` are columns of what friction bears, if there is any.
+    `borne` are columns of what friction bears, if there is any. Without a body fingers touch each
+    other.
     """
 
     scene: Scene
-    body: Body
+    body: Body | None
     frames: tuple[FingerFrame, ...]
     fingers: tuple[Grasped, ...]
     pairs: NDArray[np.int64]
@@ -93,17 +101,23 @@ class Grasps:
 def grasps(
     scene: Scene,
     formulate: Formulate,
-    body: Body,
+    body: Body | None,
     pairs: Sequence[Codes],
     way: Way = Way.PLACE,
     closing: Closing | None = None,
 ) -> Grasps:
     """Pairs of states, (row,) each for the upper and the lower finger, against a body.
 
-    Fingers that close do so while the body is kept in its place; jaws that give way do. Of a finger
-    alone one. Where the body is on the axis a state is solved once for both fingers.
+    Without one they come together until they touch each other. Fingers that close do so while the
+    body is kept in its place; jaws that give way do. Of a finger alone one. Where the body is on
+    the axis a state is solved once for both fingers.
     """
     seen_from = frames(scene.gripper)
+    if body is None:
+        from dpgcli.grasping.meeting import meeting
+
+        nowhere = np.full((2, len(pairs[0])), np.nan)
+        return Grasps(scene, None, seen_from, *meeting(scene, formulate, pairs), nowhere)
     is_alike = bool(body.is_mirrored) and len(seen_from) > 1
     shared = distinct(np.concatenate(list(pairs)))
     needed = [shared if is_alike else distinct(codes) for codes in pairs]
@@ -142,7 +156,7 @@ def _with_payload(
 ) -> Grasps:
     """With what friction bears, if there is any."""
     scene = found.scene
-    if scene.friction is None:
+    if scene.friction is None or found.body is None:
         return found
     from dpgcli.grasping.pull import Pulled, borne
 
@@ -158,6 +172,8 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
     left_out = set() if scene.gripper is not None else set(OF_PAIRS)
     if not isinstance(scene.body, Jaws):
         left_out.add(JAW_GAP)
+    if scene.body is None:
+        left_out.update(OF_BODIES)
     if closing is None:
         left_out.update(OF_CLOSING)
     if scene.friction is None:
@@ -193,6 +209,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
         frame.outside(own["force"]) for frame, own in zip(found.frames, of_fingers, strict=True)
     ]
     touches = [own["push"] > 0.0 for own in of_fingers]
+    counted = touches[:1] if found.body is None else touches  # a place of two fingers is one
 
     def known(values: Array) -> Array:
         return np.where(is_there, values + 0.0, np.nan)  # no negative zero
@@ -202,7 +219,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
         "pattern": _joined([_texts(own["code"], n_units) for own in of_fingers]),
         "status": status,
         "pattern_after": _joined([_texts(own["after"], n_units) for own in of_fingers], is_there),
-        "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in touches), 0),
+        "n_contacts": np.where(is_there, sum(t.sum(axis=0) for t in counted), 0),
         "touching": _joined(
             [_touching(t, f) for t, f in zip(touches, found.fingers, strict=True)], is_there
         ),
@@ -244,8 +261,10 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
         halves.append(place_in_gripper(found.scene.gripper, thickness, nodes).aperture)
     overlaps = np.zeros(len(is_there), bool)
     upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
-    overlaps[is_there] = shapely.intersects(upper, lower)
-    return {"aperture_mm": np.where(is_there, 0.5 * sum(halves), np.nan), "overlaps": overlaps}
+    within = shapely.buffer(upper, -SLIGHT, join_style="mitre")  # fingers that touch do not
+    overlaps[is_there] = shapely.intersects(within, lower)
+    aperture = _rounded(0.5 * np.sum(halves, axis=0), found.scene.finger.straight_length)
+    return {"aperture_mm": np.where(is_there, aperture, np.nan), "overlaps": overlaps}
 
 
 def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> NDArray[np.object_]:

@@ -1,6 +1,7 @@
 """Figures of grasps: fingers on a body with the forces on it, a panel for each state."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,8 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     window = Window.of(np.concatenate([*bodies, *drawn]))
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
     grid = PanelGrid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
-    said = [*notes(found.scene), _said(largest)]
-    foot = Foot(said, _handles, grid.page[0] > WIDE)
+    said = [*notes(found.scene), _said(largest, found.body)]
+    foot = Foot(said, partial(_handles, found.body), grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
     text = "\n".join(_described(rows, row) for row in range(n))
     with figure_to(path, *grid.page, "Grasps", text, layout=None) as figure:
@@ -55,7 +56,8 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
             axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)
             axes.set_title(_title(rows, row), fontsize=TITLE_SIZE, pad=3.0)
-            _draw_body(axes, found.body, bodies[row])
+            if found.body is not None:
+                _draw_body(axes, found.body, bodies[row])
             for finger in fingers:
                 draw_finger(axes, finger, POINTS / scale)
             status = Status(rows["status"][row])
@@ -69,13 +71,17 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
 
 
 def _moved(found: Grasps, row: int) -> Array:
-    """By how much the body has moved, (2,); not at all, if there is no answer."""
+    """By how much the body has moved, (2,); not at all, if there is no answer, or no body."""
+    if found.body is None:
+        return np.zeros(2)
     moved = found.centers[:, row] - found.body.center
     return np.asarray(np.where(np.isnan(moved), 0.0, moved))
 
 
 def _body(found: Grasps, row: int) -> Points:
-    """Points around the body."""
+    """Points around the body; none without one."""
+    if found.body is None:
+        return np.zeros(0, complex)
     return np.asarray(around_body(found.body) + complex(*_moved(found, row)))
 
 
@@ -137,21 +143,20 @@ def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
             axes.annotate("", end, start, arrowprops=arrow, zorder=5)
 
 
-def _handles() -> list[Any]:
+def _handles(body: Body | None) -> list[Any]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     of_fingers = [handle for handle in handles(is_gripper=False) if handle.get_label() != "tip"]
-    return [
-        *of_fingers,
-        Patch(facecolor=BODY, edgecolor=EDGE, lw=0.7, label="body"),
-        Line2D([], [], color=MEASURE, marker=">", lw=1.1, ms=5, label="force on the body"),
-    ]
+    patch = Patch(facecolor=BODY, edgecolor=EDGE, lw=0.7, label="body")
+    label = "force on the other finger" if body is None else "force on the body"
+    arrow = Line2D([], [], color=MEASURE, marker=">", lw=1.1, ms=5, label=label)
+    return [*of_fingers, *(() if body is None else (patch,)), arrow]
 
 
-def _said(largest: float) -> str:
+def _said(largest: float, body: Body | None) -> str:
     if largest == 0.0:
-        return "no finger touches the body"
+        return f"no finger touches the {'other' if body is None else 'body'}"
     return f"arrows are to scale: the longest is {largest:.3g} N"
 
 

@@ -127,7 +127,7 @@ def test_a_finger_alone_has_no_columns_of_pairs(call: Any, folder: Path, gripper
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "--object: expected a body such as disc:40, here or as object in the spec"),
+        (("--at", "40,0"), "--object: expected a body such as disc:40, here or as object in the"),
         (("--object", "disc:40"), "--at: expected the place of the body in mm, such as 40,0"),
         (("--object", "can:40", "--at", "40,0"), "--object can:40: expected disc and its diameter"),
         (("--object", "disc:-4", "--at", "40,0"), "--object disc:-4: expected disc"),
