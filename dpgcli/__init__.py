@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from dpgcli.api.predict import predict
     from dpgcli.api.pulses import pulses
     from dpgcli.api.report import report
+    from dpgcli.api.routine import routine
     from dpgcli.api.stress import stress
     from dpgcli.api.sweep import merge, sweep
     from dpgcli.api.transitions import transitions
@@ -83,6 +84,7 @@ __all__ = [
     "pulses",
     "read_calibration",
     "report",
+    "routine",
     "stress",
     "sweep",
     "transitions",
@@ -112,6 +114,7 @@ _HOMES = {
     "pulses": "api.pulses",
     "read_calibration": "files.calibration",
     "report": "api.report",
+    "routine": "api.routine",
     "stress": "api.stress",
     "sweep": "api.sweep",
     "transitions": "api.transitions",

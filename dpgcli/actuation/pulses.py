@@ -57,24 +57,28 @@ def shortest(graph: Graph, reach: float, start: int, target: int) -> tuple[Pulse
     >>> [(pulse.target, round(pulse.peak, 4), round(pulse.margin, 4)) for pulse in found]
     [(3, 0.2115, 0.0192), (1, -0.0742, 0.0092)]
     """
-    level = dict(zip(graph.code.tolist(), graph.n_pulses.tolist(), strict=True))
-    if target not in level or start not in level:
-        return None
-    best: dict[int, tuple[float, Pulse | None]] = {target: (np.inf, None)}
-    onward = [pulse for pulse in _each(graph, reach) if level[pulse.target] <= level[target]]
-    for depth in range(level[target] - 1, -1, -1):
-        for pulse in onward:
-            is_step = level[pulse.source] == depth and level[pulse.target] == depth + 1
-            if is_step and pulse.target in best:
-                margin = min(pulse.margin, best[pulse.target][0])
-                if margin > best.get(pulse.source, (-1.0, None))[0]:
-                    best[pulse.source] = margin, pulse
-    found: list[Pulse] = []
-    code = start
-    while (pulse_on := best[code][1]) is not None:
-        found.append(pulse_on)
-        code = pulse_on.target
-    return tuple(found)
+    return routes(graph, reach, start).get(target)
+
+
+def routes(graph: Graph, reach: float, start: int) -> dict[int, tuple[Pulse, ...]]:
+    """The same from a state of the graph to each that pulses lead to, by code, nearest first."""
+    if start not in graph.code.tolist():
+        return {}
+    each = _each(graph, reach)
+    found: dict[int, tuple[Pulse, ...]] = {start: ()}
+    margin = {start: np.inf}
+    newest = [start]
+    while newest:
+        best: dict[int, tuple[float, Pulse]] = {}
+        for pulse in each:
+            if pulse.source in newest and pulse.target not in found:
+                least = min(pulse.margin, margin[pulse.source])
+                if least > best.get(pulse.target, (-1.0, None))[0]:
+                    best[pulse.target] = least, pulse
+        newest = [*best]
+        for code, (least, pulse) in best.items():
+            found[code], margin[code] = (*found[pulse.source], pulse), least
+    return found
 
 
 def _each(graph: Graph, reach: float) -> list[Pulse]:

@@ -9,7 +9,10 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.closing import Closing
 from dpgcli.mechanics.laws import PushOnly
 
-OTHERS = "; take finger.law: published or tabulated, or another "
+PUSHED = (
+    ": domes that only push leave their neighbors as pressures change, which is not computed "
+    "beside a body; take finger.law: published or tabulated"
+)
 
 
 def closing_input(
@@ -23,9 +26,8 @@ def closing_input(
     pressed = pressed_input(spec, settings)
     history = history_input(pressure, pressed.pressure)
     if isinstance(pressed.pressed.finger.law, PushOnly):
-        what = " close: domes that only push leave their neighbors as pressures change, which is "
         approach = Field("approach")
-        raise UsageError(approach, what, "not computed beside a body", OTHERS, approach)
+        raise UsageError(approach, " close", PUSHED, ", or another ", approach)
     last = history.history.pressure[-1]
     if last.any():
         ended = ", ".join(f"{value:g}" for value in last)

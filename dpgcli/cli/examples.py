@@ -77,6 +77,11 @@ EXAMPLES = {
         "dpg pulses finger.yaml --to 110 --set 'pressure.lines={A: 1-2, B: 3}'",
         "dpg pulses finger.yaml --table --from 111 --format csv > pulses.csv",
     ),
+    "routine": (
+        "dpg routine gripper.yaml --object disc:20 --at 45,0 --approach-from 90,0",
+        "dpg routine gripper.yaml --object disc:20 --at 45,0 --approach-from 90,0 "
+        "--controller routine.csv --plot strip.svg",
+    ),
     "validate": (
         "dpg validate finger.yaml sweep.yaml",
         "dpg validate finger.yaml --format github",

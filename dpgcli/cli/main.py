@@ -20,8 +20,8 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 NAMES = (
     *("predict", "explain", "sweep", "merge", "check", "pick", "report", "design", "bench"),
-    *("compare", "stress", "actuate", "transitions", "pulses", "landscape", "grasp", "validate"),
-    *("init", "schema", "fit", "fe", "help"),
+    *("compare", "stress", "actuate", "transitions", "pulses", "landscape", "grasp", "routine"),
+    *("validate", "init", "schema", "fit", "fe", "help"),
 )
 
 

@@ -44,6 +44,7 @@ class Mark(Enum):
     DEPFILE = rb"\A# dpg sweep: "
     DECK = rb"\A\*\* dpg fe "
     CURVE = rb"\A# dpg fe "
+    CONTROLLER = rb"\A# dpg routine: "
     LOG = rb"\A# dpg fe, .*: words of "
     DISPLACEMENTS = rb"\A# dpg fe, .*: printed by "
     PARTS = rb'\A\{\s*"dpg\.'

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dpgcli.actuation.folding import folded
-from dpgcli.arrays import Flags
+from dpgcli.arrays import Array, Flags
 from dpgcli.design.pressure import History, Pressure
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
@@ -28,18 +28,27 @@ class Closing:
 
 def closed(own: Obstructed, start: Approach, closing: Closing) -> Approach:
     """Let pressures change beside bodies; what flips is told by pressures."""
-    shapes, resets, n = start.shapes, list(start.resets), len(start.load)
     by_unit = closing.history.pressure[:, closing.pressure.line_of]
-    before = 0.0 * by_unit[0]
-    for target in by_unit:
-        ramp = Ramp(closing.volumes, before[:, None], (target - before)[:, None])
+    return driven(own, start, closing.volumes, by_unit[..., None])
+
+
+def driven(own: Obstructed, start: Approach, volumes: DomeVolumes, pressures: Array) -> Approach:
+    """The same by pressures on each finger from none on, (step, unit, 1 or lane), in MPa."""
+    shapes, resets, n = start.shapes, list(start.resets), len(start.load)
+    before = 0.0 * pressures[0]
+    for target in pressures:
+        ramp = Ramp(volumes, before, target - before)
         under = replace(own, depth=np.zeros(1), ramp=ramp)
         came = approach(under, shapes, np.zeros(n), np.ones(n))
-        begin, change = (np.tile(p, (own.n_fingers, 1)) for p in (ramp.begin, ramp.change))
-        resets += [replace(told, pressure=begin + told.load * change) for told in came.resets]
+        resets += [_told_by_pressure(told, ramp, own.n_fingers) for told in came.resets]
         is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
         shapes, before = replace(came.shapes, is_there=is_sound), target
     return replace(start, shapes=shapes, resets=tuple(resets))
+
+
+def _told_by_pressure(told: Reset, ramp: Ramp, n_fingers: int) -> Reset:
+    own = ramp.take_lanes(told.lanes)
+    return replace(told, pressure=np.tile(own.begin + told.load * own.change, (n_fingers, 1)))
 
 
 def _are_folded(own: Obstructed, shapes: ContactShapes) -> Flags:

@@ -103,5 +103,12 @@ def jaw_seconds(scene: Scene, n_states: int) -> float:
     return START_SECONDS + n_states * JAW_SECONDS * scene.finger.n_units**2 * _of_law(scene)
 
 
+def routine_seconds(scene: Scene, body: Body, n_pulses: int) -> float:
+    """Seconds of one core for plans of so many pulses, and as many that let go of the body."""
+    n_fingers = 1 if bool(np.all(body.is_mirrored)) else 2
+    one = (STATE_SECONDS[Way.CLOSE] + 2 * RAMP_SECONDS) * n_fingers
+    return START_SECONDS + 2 * n_pulses * one * effort(scene, body) * scene.finger.n_units**2
+
+
 def _of_law(scene: Scene) -> float:
     return 1.0 if scene.finger.law.curve is None else CURVE

@@ -1,5 +1,6 @@
 """Figures of grasps: fingers on a body with the forces on it, a panel for each state."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -35,19 +36,36 @@ SHORTEST = 4.0  # points: an arrow's head
 
 def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
     """Draw every grasp to an SVG or PNG file, the same bytes each time."""
-    n = len(rows["pattern"])
+    n = range(len(rows["pattern"]))
+    titles, lines = [_title(rows, row) for row in n], [_described(rows, row) for row in n]
+    draw_panels(found, rows, path, ("Grasps", "\n".join(lines)), titles)
+
+
+def draw_panels(
+    found: Grasps,
+    rows: Columns,
+    path: Path,
+    described: tuple[str, str],
+    titles: Sequence[str],
+    ghosts: Mapping[int, Array] | None = None,
+) -> None:
+    """Draw grasps, a panel for each row, under these titles.
+
+    `described` are title and text for those who do not see it. `ghosts` (2,) mm are places by row
+    between which the body moves and that where it is.
+    """
+    n, pale = len(titles), ghosts or {}
     profile = Profile.of(found.scene)
     shapes = [_fingers(found, profile, row, rows) for row in range(n)]
     bodies = [_body(found, row) for row in range(n)]
     drawn = [finger.points for own in shapes for finger in own]
     window = Window.of(np.concatenate([*bodies, *drawn]))
     largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
-    grid = PanelGrid.of(n, max(len(_title(rows, row)) for row in range(n)), window)
+    grid = PanelGrid.of(n, max(map(len, titles)), window)
     said = [*notes(found.scene), _said(largest, found.body)]
     foot = Foot(said, partial(_handles, found.body), grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
-    text = "\n".join(_described(rows, row) for row in range(n))
-    with figure_to(path, *grid.page, "Grasps", text, layout=None) as figure:
+    with figure_to(path, *grid.page, *described, layout=None) as figure:
         for row, fingers in enumerate(shapes):
             axes = figure.add_axes(grid.box(row))
             scale = window.size[1] / grid.shape_height  # mm per inch
@@ -55,7 +73,9 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
             is_leftmost, is_lowest = grid.is_outer(row)
             axes.tick_params("x", bottom=is_lowest, labelbottom=is_lowest)
             axes.tick_params("y", left=is_leftmost, labelleft=is_leftmost)
-            axes.set_title(_title(rows, row), fontsize=TITLE_SIZE, pad=3.0)
+            axes.set_title(titles[row], fontsize=TITLE_SIZE, pad=3.0)
+            if row in pale:
+                _draw_ghost(axes, bodies[row], pale[row] - found.centers[:, row])
             if found.body is not None:
                 _draw_body(axes, found.body, bodies[row])
             for finger in fingers:
@@ -68,6 +88,14 @@ def draw_grasps(found: Grasps, rows: Columns, path: Path) -> None:
                 middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
                 axes.text(0.5, 0.5, word, color=WORD, style="italic", **middle)
         foot.draw(figure, window, grid)
+
+
+def _draw_ghost(axes: Any, around: Points, away: Array) -> None:
+    """The outline of a body at another place, so far away, and the way between both."""
+    there = np.append(around, around[0]) + complex(*away)
+    axes.plot(there.real, there.imag, color=EDGE, lw=0.7, ls="--", zorder=0)
+    way = np.mean(around) + np.array([complex(*away), 0.0])
+    axes.plot(way.real, way.imag, color=EDGE, lw=0.7, ls=":", zorder=0.5)
 
 
 def _moved(found: Grasps, row: int) -> Array:

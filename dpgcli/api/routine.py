@@ -1,0 +1,307 @@
+"""`routine`: pulses that open a gripper, close it on a body that comes, and let it go."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dpgcli.api.bodies import check_body, force_lines, pressure_lines, with_body
+from dpgcli.api.closing import PUSHED
+from dpgcli.api.inputs import (
+    SceneInput,
+    Settings,
+    SpecInput,
+    check_positive,
+    figure_path,
+    path_of,
+    point,
+    table_path,
+)
+from dpgcli.api.pressed_states import code_of
+from dpgcli.api.pressure import pressed_input
+from dpgcli.api.pulses import check_size
+from dpgcli.api.tables import Table
+from dpgcli.api.transitions import failed_searches
+from dpgcli.arrays import Columns, keep_freed_memory
+from dpgcli.design.bodies import Jaws
+from dpgcli.design.loads import direction_text
+from dpgcli.design.pressure import History
+from dpgcli.design.scene import Held
+from dpgcli.errors import ActuationError, Field, UsageError
+from dpgcli.grasping.costs import routine_seconds
+from dpgcli.grasping.plans import Prospect, prospect
+from dpgcli.grasping.routine import NO_PULSES, NOT_CHECKED, Stage, searched
+from dpgcli.grasping.stages import Task
+from dpgcli.grasping.steps import (
+    Routine,
+    columns_of,
+    routine_of,
+    routine_rows,
+    schedule,
+)
+from dpgcli.mechanics.laws import PushOnly
+from dpgcli.states.columns import Column
+from dpgcli.text import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RAMP, MOVE = 1.0, 5.0  # s
+
+
+@dataclass(frozen=True)
+class RoutineResult:
+    """A routine step by step, or how far the best plan comes and what is in its way."""
+
+    given: SceneInput
+    routine: Routine
+    ramp: float
+    move: float
+
+    @property
+    def exists(self) -> bool:
+        """Whether pulses do all that is asked for, as far as it is checked."""
+        return self.routine.search.holds
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of the steps."""
+        return columns_of(self.routine.task)
+
+    @cached_property
+    def rows(self) -> Columns:
+        """Steps by column."""
+        return routine_rows(self.routine)
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each step."""
+        return Table.of(self.columns, self.rows)
+
+    @property
+    def history(self) -> History:
+        """The pressures of all lines by time. Raises UsageError where there is no routine."""
+        if not self.exists:
+            raise UsageError("no routine is found: there are no pressures for a controller")
+        return schedule(self.routine, self.ramp, self.move)
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """What was found, what is in the way, and what all that rests on: lines."""
+        return tuple(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        search, rows = self.routine.search, self.rows
+        known, n_plans = search.known, len(search.known.plans)
+        if self.exists:
+            pulses = [step for step in self.routine.steps if step.pulse is not None]
+            least = min((step.margin for step in pulses if step.margin == step.margin), default=0.0)
+            yield (
+                f"routine of {counted(len(pulses), 'pulse')}, the fewest that are found; smallest "
+                f"margin {least:.4g} MPa; followed step by step with the body there"
+            )
+        else:
+            plans = counted(n_plans, "plan")
+            yield f"no routine found: {plans} of pulses up to {known.reach:.4g} MPa"
+        yield from self._failures()
+        if known.n_left_out:
+            yield f"{counted(known.n_left_out, 'plan')} of more pulses were not tried"
+        if known.graph.n_unknown:
+            yield f"{failed_searches(known.graph.n_unknown)}: there may be other plans"
+        if NOT_CHECKED in rows["status"].tolist():
+            yield from self._unchecked()
+        if any(rows["tie"]):
+            yield (
+                "ties: the model does not say which of the units goes first, and with a body in "
+                "the way another order may end in another state"
+            )
+        yield from self._assumptions()
+        yield from pressure_lines(self.given.scene)
+        yield from force_lines(self.given.scene)
+
+    def _failures(self) -> Iterator[str]:
+        """Which plans fail where."""
+        search, steps = self.routine.search, self.routine.steps
+        if not steps:
+            yield "no pulses lead from rest to the open state that is asked for"
+            return
+        for (stage, why), number in search.failures.items():
+            of = "open state" if stage is Stage.APPROACH else "plan"
+            yield f"{stage}: {why} in {counted(number, of)}"
+        if not self.exists:
+            yield f"shown is the plan that comes furthest: {self._reason()}"
+
+    def _reason(self) -> str:
+        """Why the plan that comes furthest ends where it does."""
+        last, task = self.routine.steps[-1], self.routine.task
+        x, y = last.found.centers[:, 0]
+        friction = task.scene.friction
+        weight = 0.0 if friction is None else friction.weight or 0.0
+        payload = self.rows["payload_N"][-1] if "payload_N" in self.rows else 0.0
+        return {
+            "collides": f"body and fingers meet with the body at {x:.4g},{y:.4g} mm",
+            NO_PULSES: f"no pulses up to {self.routine.search.known.reach:.4g} MPa lead on from "
+            f"{self.rows['pattern_after'][-1]}",
+            "not_touched": "not both fingers touch the body after the pulses that close them",
+            "slips": "the body slips as soon as its support is gone",
+            "not_held": "let go of, the body leaves the fingers",
+            "too_heavy": f"{payload:.4g} N are borne of a weight of {weight:.4g} N",
+            "in_touch": "after the pulses that let go the fingers still touch the body",
+        }.get(last.status, f"{last.stage} ends {last.status}")
+
+    def _unchecked(self) -> Iterator[str]:
+        lifts = self.routine.task.scene.held is not Held.FIXED
+        what = "carried" if lifts else "lifted and carried"
+        yield (
+            f"not checked: whether the body is {what}, as object.friction is not given"
+            + ("" if lifts else ", and the body is fixed")
+        )
+
+    def _assumptions(self) -> Iterator[str]:
+        """What the steps are computed with."""
+        task = self.routine.task
+        yield (
+            "quasi-static: pressures change slowly, and not while the gripper moves; the body is "
+            "kept in its place while they do, and contact is without friction"
+        )
+        if (friction := task.scene.friction) is not None:
+            yield (
+                f"payload: pull along {direction_text(task.scene.gravity)}, where gravity acts to; "
+                f"rests on the friction of {friction.coefficient:g} that is given"
+                + ("" if friction.weight is not None else "; no mass_g says what has to be borne")
+            )
+
+    def to_arrow(self) -> Any:
+        """The steps as a `pyarrow.Table`."""
+        return self.table.to_arrow()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The steps as a `pandas.DataFrame`."""
+        return self.table.to_pandas()
+
+    def save(self, path: str | Path) -> None:
+        """Write the steps to a Parquet file, the bytes of `dpg routine --output`.
+
+        Raises OutputError, and UsageError for a file that was read or a name of another format.
+        """
+        from dpgcli.files.output import Mark, check_outputs
+        from dpgcli.files.scene_file.objects import told_of
+        from dpgcli.files.scene_rows import write_scene_rows
+
+        table, task = path_of("path", path), self.routine.task
+        check_outputs(self.given.files, (table, Mark.TABLE))
+        chosen = {"object": told_of(task.body, task.scene.held)}
+        chosen |= {"approach_from_mm": task.begin.tolist()}
+        scene = self.given.scene
+        write_scene_rows(table_path(table), scene, self.given.json, self.columns, self.rows, chosen)
+
+    def save_controller(self, path: str | Path) -> None:
+        """Write the pressures by time to a CSV file, as `actuate` reads them.
+
+        Raises OutputError, and UsageError where there is no routine.
+        """
+        from dpgcli.files.controller import write_controller
+        from dpgcli.files.output import Mark, check_outputs
+
+        file, history = path_of("path", path), self.history
+        if file.suffix.lower() != ".csv":
+            raise UsageError(f"path {path}: expected a name that ends in .csv")
+        check_outputs(self.given.files, (file, Mark.CONTROLLER))
+        write_controller(file, self.routine.task.lines.lines, history)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw the steps, a panel each, to a .svg or .png file. Raises UsageError without steps."""
+        from dpgcli.reports.routine import draw_routine
+
+        if not self.routine.steps:
+            raise UsageError("there are no steps to draw")
+        draw_routine(self.routine, self.rows, figure_path(path))
+
+
+def routine(
+    spec: SpecInput,
+    *,
+    approach_from: Sequence[float],
+    object: str | None = None,
+    at: Sequence[float] | None = None,
+    open: str = "",
+    closed: str = "",
+    ramp: float = RAMP,
+    move: float = MOVE,
+    settings: Settings = (),
+) -> RoutineResult:
+    """Pulses, without feedback, that open a gripper, close it on a body, hold it and let it go.
+
+    The body comes along a straight line from `approach_from` (mm, in the gripper's frame) to its
+    place; `object` and `at` are those of `grasp`. Only open states `open` are tried, and pulses
+    that lead to `closed` without the body, if they are given. Controllers need times, which no
+    model knows: `ramp` (s) is that of a ramp of pressure, `move` that of a move of the gripper.
+    Raises SpecError for a wrong spec, UsageError for wrong choices, ActuationError where a finger
+    that is followed ends elsewhere than planned.
+
+    >>> spec = {"finger": {"units": 3, "calibration": "published", "geometry": {
+    ...     "dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "unit_cell_mm": 22,
+    ...     "chamber_length_mm": 9, "channel_width_mm": 10, "limiting_layer_thickness_mm": 1.5,
+    ...     "unit_separation_mm": 3, "elastic_modulus_MPa": 26}},
+    ...     "gripper": {"base_spacing_mm": 34, "mounting_angle_deg": 0}}
+    >>> found = routine(spec, object="disc:24", at=(42, 0), approach_from=(90, 0))
+    >>> found.exists, found.table["step"].tolist()
+    """
+    check_positive("ramp", ramp)
+    check_positive("move", move)
+    given, known = planned(spec, approach_from, object, at, open, closed, settings)
+    return found_routine(given, known, ramp, move)
+
+
+def planned(
+    spec: SpecInput,
+    approach_from: Sequence[float],
+    body: str | None,
+    at: Sequence[float] | None,
+    opened: str,
+    closed: str,
+    settings: Settings = (),
+) -> tuple[SceneInput, Prospect]:
+    """What there is to try: open states past which the body comes, and pulses that close."""
+    begin = np.array(point("approach_from", approach_from))
+    pressed = pressed_input(spec, settings)
+    check_size(pressed)
+    scene = pressed.given.scene
+    if scene.gripper is None:
+        raise UsageError("a routine needs two fingers: expected gripper in the spec")
+    if isinstance(pressed.pressed.finger.law, PushOnly):
+        raise UsageError("a routine", PUSHED)
+    codes = [
+        code_of(pressed, field, pattern) if pattern else None
+        for field, pattern in (("open", opened), ("closed", closed))
+    ]
+    given = with_body(pressed.given, body, at)
+    known = given.scene.body
+    assert known is not None, "a scene with a body"
+    check_body(given.scene, known)
+    if isinstance(known, Jaws) and known.stiffness is not None:
+        raise UsageError(
+            Field("object"), ": expected a body that keeps its shape, without compliance"
+        )
+    if (begin == known.center).all():
+        raise UsageError(Field("approach_from"), ": expected another place than that of the body")
+    keep_freed_memory()
+    return given, prospect(Task(given.scene, pressed.pressed, begin), *codes)
+
+
+def seconds_of(known: Prospect) -> float:
+    """Seconds of one core that following all plans of a prospect may take."""
+    scene = known.task.scene
+    assert scene.body is not None, "a scene with a body"
+    return routine_seconds(scene, scene.body, sum(plan.n_pulses for plan in known.plans))
+
+
+def found_routine(given: SceneInput, known: Prospect, ramp: float, move: float) -> RoutineResult:
+    """The same, of what there is to try."""
+    found = routine_of(searched(known))
+    if found.opening is not None and found.opening.problem:
+        raise ActuationError(found, f"the pulses that open do not hold: {found.opening.problem}")
+    return RoutineResult(given, found, ramp, move)

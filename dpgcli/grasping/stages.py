@@ -1,0 +1,242 @@
+"""The stages of a routine without feedback, of many fingers at once: each as far as it is checked.
+
+Fingers stay as they are while the gripper moves; as pressures change, the body is kept in its
+place. What is told of each stage is a `Grasps`, a row for each lane.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from dpgcli.actuation.pressed import Pressed
+from dpgcli.actuation.pulses import Pulse
+from dpgcli.arrays import Array, Codes, Flags, Indices
+from dpgcli.design.bodies import Body
+from dpgcli.design.pressure import Pressure
+from dpgcli.design.scene import Held, Scene
+from dpgcli.grasping.approach import Approach, approach
+from dpgcli.grasping.clearance import Clearance, clearance, outlines
+from dpgcli.grasping.closing import driven, with_reach
+from dpgcli.grasping.frames import FingerFrame, frames
+from dpgcli.grasping.grasp import Grasped, Placed, described, placed
+from dpgcli.grasping.pull import Pulled, borne
+from dpgcli.grasping.release import let_go, motion_of, moved_by
+from dpgcli.grasping.shapes import ContactShapes, Ramp
+from dpgcli.grasping.table import Grasps
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
+
+AWAY = 1e4  # times the length of a finger: out of everybody's way
+
+
+@dataclass(frozen=True)
+class Task:
+    """A gripper under pressure, the body at its place, and from where it comes, `begin` (2,) mm."""
+
+    scene: Scene
+    pressed: Pressed
+    begin: Array
+
+    @property
+    def body(self) -> Body:
+        """The body at its place."""
+        assert self.scene.body is not None, "a scene with a body"
+        return self.scene.body
+
+    @property
+    def lines(self) -> Pressure:
+        """The lines of pressure."""
+        assert self.scene.pressure is not None, "a scene with pressure"
+        return self.scene.pressure
+
+    @cached_property
+    def frames(self) -> tuple[FingerFrame, ...]:
+        """The frames of both fingers."""
+        return frames(self.scene.gripper)
+
+    @cached_property
+    def is_alike(self) -> bool:
+        """Whether both fingers meet the same."""
+        return bool(self.body.is_mirrored)
+
+    def centers(self, n_lanes: int) -> Array:
+        """The body's place, (2, lane)."""
+        return np.repeat(self.body.center[:, None], n_lanes, axis=1)
+
+    def begins(self, n_lanes: int) -> Array:
+        """Where it comes from, (2, lane)."""
+        return np.repeat(self.begin[:, None], n_lanes, axis=1)
+
+    def pressures(self, sequences: Sequence[Sequence[Pulse]]) -> Array:
+        """Pressures of each lane's pulses, there and back, (step, unit, lane), in MPa."""
+        line_of = self.lines.line_of
+        n_steps = 2 * max(map(len, sequences), default=0)
+        steps = np.zeros((n_steps, len(line_of), len(sequences)))
+        for lane, pulses in enumerate(sequences):
+            for place, pulse in enumerate(pulses):
+                steps[2 * place, line_of == pulse.line, lane] = pulse.peak
+        return steps
+
+
+Parts = tuple[Placed, ...]
+"""The upper and the lower finger, one and the same where both meet the same."""
+
+T = TypeVar("T")
+
+
+def _each(parts: Parts, work: Callable[[Placed], T]) -> tuple[T, ...]:
+    """Work on every finger; on one, if both are the same."""
+    if parts[-1] is parts[0]:
+        return (work(parts[0]),) * len(parts)
+    return tuple(map(work, parts))
+
+
+def beside(task: Task, codes: Codes) -> Parts:
+    """Fingers in open states, (lane,), with the body at its place: it grows there."""
+    parts: list[Placed] = []
+    for frame in task.frames:
+        if parts and task.is_alike:
+            parts.append(parts[0])
+            continue
+        part = placed(task.scene, chain_potential, task.body, frame, codes)
+        parts.append(replace(part, own=with_reach(part.own)))
+    return tuple(parts)
+
+
+def pulsed(task: Task, parts: Parts, sequences: Sequence[Sequence[Pulse]]) -> Parts:
+    """The same after pulses, of each lane its own, with the body kept in its place."""
+    history = task.pressures(sequences)
+    return _each(parts, lambda part: _pulsed(task, part, history)) if len(history) else parts
+
+
+def _pulsed(task: Task, part: Placed, history: Array) -> Placed:
+    came = driven(part.own, _begun(part), task.pressed.volumes, history)
+    is_lost = (part.status == Status.STABLE) & ~came.shapes.is_there
+    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), part.status)
+    return Placed(part.codes, part.own, came, status)
+
+
+def _begun(part: Placed) -> Approach:
+    """Where fingers are, without what happened to them."""
+    return Approach(part.grown.shapes, part.grown.load, ())
+
+
+def some(parts: Parts, index: Indices) -> Parts:
+    """The fingers of some lanes, without what happened to them."""
+
+    def taken(part: Placed) -> Placed:
+        came = Approach(part.grown.shapes.take_lanes(index), part.grown.load[index], ())
+        own = part.own.take_lanes(index)
+        return Placed(part.codes[index], own, came, part.status[index])
+
+    return _each(parts, taken)
+
+
+def kept(task: Task, parts: Parts, centers: Array) -> Grasps:
+    """Fingers with the body kept in its place, at `centers` (2, lane)."""
+    scene = replace(task.scene, held=Held.FIXED, friction=None)
+    rows = np.tile(np.arange(centers.shape[1]), (len(parts), 1))
+    return Grasps(scene, task.body, task.frames, _each(parts, _described), rows, centers)
+
+
+def _described(part: Placed) -> Grasped:
+    (told,) = described(part.own, [part.codes], part.grown, part.status, with_margins=False)
+    return told
+
+
+def free(task: Task, codes: Codes, centers: Array) -> Grasps:
+    """Fingers in states that nothing touches, the body far from them; told to be at `centers`."""
+    away = task.body.center + AWAY * task.scene.finger.straight_length.max() * np.array([1.0, 0.0])
+    far = replace(task, scene=replace(task.scene, body=replace(task.body, center=away)))
+    return replace(kept(far, beside(far, codes), centers), body=task.body)
+
+
+def are_touched(found: Grasps) -> Flags:
+    """Rows whose body every finger touches."""
+    return np.asarray(np.all([(own.push > 0.0).any(axis=0) for own in found.fingers], axis=0))
+
+
+def way(task: Task, found: Grasps, begin: Array, end: Array) -> Clearance:
+    """How near the body comes to the fingers on its way, (2, lane) mm, as they are."""
+    finger = task.scene.finger
+    height, length = finger.segment_height[0], finger.segment_length[-1]
+    around = [
+        outlines(own, frame, height, length)
+        for own, frame in zip(found.fingers, found.frames, strict=True)
+    ]
+    return clearance(np.concatenate(around), task.body, begin, end)
+
+
+def lifted(task: Task, parts: Parts) -> tuple[Grasps, Parts]:
+    """What becomes of fingers as the body leaves its support, and of the body; what it bears.
+
+    A body that is fixed stays, and only friction tells. Also the fingers where it then is.
+    """
+    scene, n = task.scene, len(parts[0].codes)
+    lanes = [np.arange(n) for _ in parts]
+    motion = motion_of(task.body, scene.held, task.frames)
+    if motion is None:
+        found, rest, after = kept(task, parts, task.centers(n)), None, parts
+    else:
+        fingers, motions, rest = let_go(parts, lanes, motion, scene.held, with_margins=False)
+        centers = task.centers(n) + moved_by(scene.held, motions)
+        found = replace(kept(task, parts, centers), fingers=fingers)
+        after = _apart(task, parts, found, rest)
+    found = replace(found, scene=scene)
+    if scene.friction is None:
+        return found, after
+    pulled = Pulled(task.body, scene.held, task.frames, scene.friction, scene.gravity)
+    is_there = found.fingers[0].status == Status.STABLE
+    return replace(found, borne=borne(pulled, parts, lanes, rest, is_there)), after
+
+
+def _apart(task: Task, parts: Parts, found: Grasps, rest: ContactShapes) -> Parts:
+    """The fingers of bodies that have moved, each by itself, with the body kept where it is."""
+    places = np.where(np.isnan(found.centers), task.body.center[:, None], found.centers)
+    body = replace(task.body, center=places)
+    n_units, n_before, after = task.scene.finger.n_units, 0, []
+    joint = replace(parts[0].own, bodies=tuple(part.own.bodies[0] for part in parts))
+    for finger, (part, frame) in enumerate(zip(parts, found.frames, strict=True)):
+        own = replace(part.own, bodies=(frame.obstacle(body),))
+        cells = slice(n_before, n_before + own.n_gaps)
+        units = slice(finger * n_units, (finger + 1) * n_units)
+        shapes = ContactShapes(
+            joint.of_finger(rest.coordinates, finger),
+            rest.push[cells],
+            rest.active[cells],
+            rest.inverted[units],
+            rest.is_there,
+        )
+        status = found.fingers[finger].status
+        came = Approach(shapes, np.ones(len(status)), ())
+        after.append(Placed(part.codes, own, came, status))
+        n_before = cells.stop
+    return tuple(after)
+
+
+def margin(task: Task, parts: Parts, pulse: Pulse, limit: float) -> float:
+    """From a pulse's peak to the nearest threshold with the body there, of one lane, MPa.
+
+    Thresholds up to the pressure `limit` count, and where nothing is found on the way there.
+    """
+    near = _each(parts, lambda part: _nearest(task, part, pulse, limit))
+    return min((size for sizes in near for size in sizes), default=float("nan"))
+
+
+def _nearest(task: Task, part: Placed, pulse: Pulse, limit: float) -> list[float]:
+    """How far the last threshold is that a finger has passed at a peak, and the next one."""
+    volumes, peak = task.pressed.volumes, task.pressures([[pulse]])[:1]
+    here = driven(part.own, _begun(part), volumes, peak)
+    share = [float(told.load[0]) for told in here.resets]
+    found = [abs(pulse.peak) * (1.0 - max(share))] if share else []
+    further = limit - abs(pulse.peak)
+    beyond = Ramp(volumes, peak[0], peak[0] * further / abs(pulse.peak))
+    own = replace(part.own, depth=np.zeros(1), ramp=beyond)
+    onwards = approach(own, here.shapes, np.zeros(1), np.ones(1), to_reset=True)
+    if onwards.resets or not onwards.shapes.is_there[0]:
+        next_one = min((told.load[0] for told in onwards.resets), default=onwards.load[0])
+        found.append(further * float(next_one))
+    return found
