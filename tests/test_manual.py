@@ -35,6 +35,7 @@ from dpgcli.cli import (
     predict,
     pulses,
     report,
+    routine,
     schema,
     stress,
     sweep,
@@ -82,6 +83,7 @@ COMMANDS = {
             init,
             landscape,
             grasp,
+            routine,
             schema,
             help,
         )

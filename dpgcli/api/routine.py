@@ -95,22 +95,11 @@ class RoutineResult:
 
     def _lines(self) -> Iterator[str]:
         search, rows = self.routine.search, self.rows
-        known, n_plans = search.known, len(search.known.plans)
-        if self.exists:
-            pulses = [step for step in self.routine.steps if step.pulse is not None]
-            least = min((step.margin for step in pulses if step.margin == step.margin), default=0.0)
-            yield (
-                f"routine of {counted(len(pulses), 'pulse')}, the fewest that are found; smallest "
-                f"margin {least:.4g} MPa; followed step by step with the body there"
-            )
-        else:
-            plans = counted(n_plans, "plan")
-            yield f"no routine found: {plans} of pulses up to {known.reach:.4g} MPa"
-        yield from self._failures()
-        if known.n_left_out:
-            yield f"{counted(known.n_left_out, 'plan')} of more pulses were not tried"
-        if known.graph.n_unknown:
-            yield f"{failed_searches(known.graph.n_unknown)}: there may be other plans"
+        yield from self._found() if self.exists else self._failures()
+        if search.n_left_out:
+            yield f"{counted(search.n_left_out, 'plan')} not tried: those of most pulses"
+        if n_unknown := search.known.graph.n_unknown:
+            yield f"{failed_searches(n_unknown)}: there may be other plans"
         if NOT_CHECKED in rows["status"].tolist():
             yield from self._unchecked()
         if any(rows["tie"]):
@@ -118,21 +107,41 @@ class RoutineResult:
                 "ties: the model does not say which of the units goes first, and with a body in "
                 "the way another order may end in another state"
             )
+        if n_over := sum(step.overlaps for step in self.routine.steps):
+            yield (
+                f"{counted(n_over, 'step')} in which the fingers overlap each other: their contact "
+                "with each other is not in the model"
+            )
         yield from self._assumptions()
         yield from pressure_lines(self.given.scene)
         yield from force_lines(self.given.scene)
 
+    def _found(self) -> Iterator[str]:
+        pulses = [step for step in self.routine.steps if step.pulse is not None]
+        margins = [
+            (step.margin, abs(step.pulse.peak))
+            for step in pulses
+            if step.pulse is not None and step.margin == step.margin
+        ]
+        words = f"routine of {counted(len(pulses), 'pulse')}, the fewest that are found"
+        if margins:
+            least, peak = min(margins)
+            words += f"; smallest margin {least:.4g} MPa, {100.0 * least / peak:.2g}% of its peak"
+        yield f"{words}; each step followed with the body there"
+
     def _failures(self) -> Iterator[str]:
         """Which plans fail where."""
         search, steps = self.routine.search, self.routine.steps
+        known = search.known
+        plans = counted(len(known.plans), "plan")
+        yield f"no routine found: {plans} of pulses up to {known.reach:.4g} MPa"
         if not steps:
             yield "no pulses lead from rest to the open state that is asked for"
             return
         for (stage, why), number in search.failures.items():
             of = "open state" if stage is Stage.APPROACH else "plan"
             yield f"{stage}: {why} in {counted(number, of)}"
-        if not self.exists:
-            yield f"shown is the plan that comes furthest: {self._reason()}"
+        yield f"shown is the one that comes furthest: {self._reason()}"
 
     def _reason(self) -> str:
         """Why the plan that comes furthest ends where it does."""
@@ -242,13 +251,17 @@ def routine(
     Raises SpecError for a wrong spec, UsageError for wrong choices, ActuationError where a finger
     that is followed ends elsewhere than planned.
 
-    >>> spec = {"finger": {"units": 3, "calibration": "published", "geometry": {
+    >>> spec = {"finger": {"units": 2, "calibration": "published",
+    ...     "linear_stiffness_N_per_mm": float("inf"), "geometry": {
     ...     "dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "unit_cell_mm": 22,
     ...     "chamber_length_mm": 9, "channel_width_mm": 10, "limiting_layer_thickness_mm": 1.5,
     ...     "unit_separation_mm": 3, "elastic_modulus_MPa": 26}},
     ...     "gripper": {"base_spacing_mm": 34, "mounting_angle_deg": 0}}
-    >>> found = routine(spec, object="disc:24", at=(42, 0), approach_from=(90, 0))
-    >>> found.exists, found.table["step"].tolist()
+    >>> found = routine(spec, object="disc:26", at=(20, 0), approach_from=(90, 0))
+    >>> found.exists, found.table["pattern_after"].tolist()
+    (True, ['00', '00', '11', '11', '11', '00', '00'])
+    >>> found.history.pressure[:, 0].round(3).tolist()
+    [0.0, 0.0, 0.164, 0.0, 0.0, -0.071, 0.0, 0.0]
     """
     check_positive("ramp", ramp)
     check_positive("move", move)
@@ -296,7 +309,8 @@ def seconds_of(known: Prospect) -> float:
     """Seconds of one core that following all plans of a prospect may take."""
     scene = known.task.scene
     assert scene.body is not None, "a scene with a body"
-    return routine_seconds(scene, scene.body, sum(plan.n_pulses for plan in known.plans))
+    rounds = [[plan.n_pulses for plan in plans] for plans in known.rounds()]
+    return routine_seconds(scene, scene.body, rounds)
 
 
 def found_routine(given: SceneInput, known: Prospect, ramp: float, move: float) -> RoutineResult:

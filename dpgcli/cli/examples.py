@@ -78,8 +78,8 @@ EXAMPLES = {
         "dpg pulses finger.yaml --table --from 111 --format csv > pulses.csv",
     ),
     "routine": (
-        "dpg routine gripper.yaml --object disc:20 --at 45,0 --approach-from 90,0",
-        "dpg routine gripper.yaml --object disc:20 --at 45,0 --approach-from 90,0 "
+        "dpg routine gripper.yaml --object disc:50 --at 45,0 --approach-from 110,0",
+        "dpg routine gripper.yaml --object disc:50 --at 45,0 --approach-from 110,0 "
         "--controller routine.csv --plot strip.svg",
     ),
     "validate": (

@@ -13,8 +13,8 @@ from dpgcli.errors import UsageError
 
 TOPICS = (  # in the order in which one reads them
     *("tutorial", "spec", "columns", "sweeps", "choosing", "designing", "pressure", "loads"),
-    *("grasping", "barriers", "calibration", "laws", "trust", "accuracy", "stress", "files"),
-    *("python", "glossary"),
+    *("grasping", "routines", "barriers", "calibration", "laws", "trust", "accuracy", "stress"),
+    *("files", "python", "glossary"),
 )
 LINK_TO_PAGE = re.compile(r"\[([^]]+)\]\((\w+)\.md(#[\w-]+)?\)")
 

@@ -32,10 +32,19 @@ def closed(own: Obstructed, start: Approach, closing: Closing) -> Approach:
     return driven(own, start, closing.volumes, by_unit[..., None])
 
 
-def driven(own: Obstructed, start: Approach, volumes: DomeVolumes, pressures: Array) -> Approach:
-    """The same by pressures on each finger from none on, (step, unit, 1 or lane), in MPa."""
+def driven(
+    own: Obstructed,
+    start: Approach,
+    volumes: DomeVolumes,
+    pressures: Array,
+    begin: Array | None = None,
+) -> Approach:
+    """The same by pressures on each finger, (step, unit, 1 or lane) in MPa.
+
+    They `begin` at none, unless that is given.
+    """
     shapes, resets, n = start.shapes, list(start.resets), len(start.load)
-    before = 0.0 * pressures[0]
+    before = 0.0 * pressures[0] if begin is None else begin
     for target in pressures:
         ramp = Ramp(volumes, before, target - before)
         under = replace(own, depth=np.zeros(1), ramp=ramp)

@@ -1,5 +1,6 @@
 """What grasps will take, before the work: time and memory, to a factor of two or three."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
 PAIR_SECONDS = 3.5e-3  # of two fingers in different states that come together
+PULSE_SECONDS = 0.1  # of a pulse, however many states go through it, times the number of units
 JAW_SECONDS = 0.03  # of a state at all apertures
 BODIES = {Disc: 1.0, Jaws: 2.0, Polygon: 8.0}  # times as long: a polygon's corners take most
 CURVE = 10.0  # times as long with a calibration's curve
@@ -103,11 +105,17 @@ def jaw_seconds(scene: Scene, n_states: int) -> float:
     return START_SECONDS + n_states * JAW_SECONDS * scene.finger.n_units**2 * _of_law(scene)
 
 
-def routine_seconds(scene: Scene, body: Body, n_pulses: int) -> float:
-    """Seconds of one core for plans of so many pulses, and as many that let go of the body."""
-    n_fingers = 1 if bool(np.all(body.is_mirrored)) else 2
-    one = (STATE_SECONDS[Way.CLOSE] + 2 * RAMP_SECONDS) * n_fingers
-    return START_SECONDS + 2 * n_pulses * one * effort(scene, body) * scene.finger.n_units**2
+def routine_seconds(scene: Scene, body: Body, rounds: Sequence[Sequence[int]]) -> float:
+    """Seconds of one core for routines, by the pulses of each plan in each round of plans.
+
+    Plans of a round are followed at once, the best once more, and as many pulses let go.
+    """
+    n_units, n_fingers = scene.finger.n_units, 1 if bool(np.all(body.is_mirrored)) else 2
+    steps = sum(max(plans) for plans in rounds)
+    at_once = 4 * steps * PULSE_SECONDS * n_units * np.sqrt(_of_law(scene))
+    ramps = 6 * sum(map(sum, rounds))
+    each = ramps * RAMP_SECONDS * n_units**2 * BODIES[type(body)]
+    return START_SECONDS + n_fingers * float(at_once + each)
 
 
 def _of_law(scene: Scene) -> float:

@@ -1,8 +1,8 @@
 """Routines without feedback: searched among plans, then followed stage by stage.
 
 Plans of fewest pulses come first, many at once. Of those that hold the body and let it go, one that
-ends in the open state in which it began is taken first, then that of the largest payload, or
-squeeze where nothing is known of friction.
+ends in the open state in which it began is taken first, then one whose peaks are 5 % or more from
+all thresholds, then that of the largest payload, or squeeze where nothing is known of friction.
 """
 
 from collections import Counter
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dpgcli.actuation.pulses import Pulse
 from dpgcli.arrays import Array, Columns, Indices
 from dpgcli.design.scene import Held
-from dpgcli.grasping.plans import Plan, Prospect, Sequences, releases, variants
+from dpgcli.grasping.plans import MOST_PLANS, Plan, Prospect, releases, variants
 from dpgcli.grasping.stages import (
     Parts,
     Task,
@@ -50,28 +50,32 @@ COLLIDES, NO_PULSES, NOT_TOUCHED = "collides", "no_pulses", "not_touched"
 SLIPS, TOO_HEAVY, IN_TOUCH = "slips", "too_heavy", "in_touch"
 NOT_CHECKED, UNKNOWN = "not_checked", "unknown"
 FINE = (WELL, NOT_CHECKED)
+ENOUGH = 0.05  # of a peak: how far thresholds should be
 
 
 @dataclass(frozen=True)
 class Search:
     """The plan that does, or the one that comes furthest; how many fail, by stage and why.
 
-    `plan` is None where no pulses lead to the open state that is asked for.
+    `plan` is None where no pulses lead to the open state that is asked for; `n_left_out` plans, or
+    ways to let go, were too many to be followed.
     """
 
     known: Prospect
     plan: Plan | None
     holds: bool
-    failures: Mapping[tuple[Stage, str], int] = field(default_factory=dict)
+    failures: Mapping[tuple[Stage, str], int]
+    n_left_out: int
 
 
 @dataclass
 class _Furthest:
-    """What has failed so far, and the plan that has come furthest."""
+    """What has failed so far, the plan that has come furthest, and how many were not tried."""
 
     plan: Plan | None
     place: int
-    failures: Counter[tuple[Stage, str]]
+    n_left_out: int
+    failures: Counter[tuple[Stage, str]] = field(default_factory=Counter)
 
     def add(self, plan: Plan, stage: Stage, why: str) -> None:
         self.failures[stage, why] += 1
@@ -81,7 +85,7 @@ class _Furthest:
 
 def searched(known: Prospect) -> Search:
     """The routine among the plans of a prospect."""
-    failed = _Furthest(known.nearest_miss, STAGES.index(Stage.APPROACH), Counter())
+    failed = _Furthest(known.nearest_miss, STAGES.index(Stage.APPROACH), known.n_left_out)
     if n_met := int((~known.coming.is_clear).sum()):
         failed.failures[Stage.APPROACH, COLLIDES] = n_met
     if known.coming.is_clear.any() and not known.plans:
@@ -90,38 +94,43 @@ def searched(known: Prospect) -> Search:
     for plans in known.rounds():
         best = _best(known, plans, failed)
         if best is not None:
-            return Search(known, best, holds=True, failures=failed.failures)
-    return Search(known, failed.plan, holds=False, failures=failed.failures)
+            return Search(known, best, True, failed.failures, failed.n_left_out)
+    return Search(known, failed.plan, False, failed.failures, failed.n_left_out)
 
 
 def _best(known: Prospect, plans: Sequence[Plan], failed: _Furthest) -> Plan | None:
     """The best of some plans; what fails of the others is noted."""
     task = known.task
     opened = np.array([plan.opened for plan in plans], np.uint64)
-    parts = pulsed(task, beside(task, opened), [plan.closing for plan in plans])
+    closings = [plan.closing for plan in plans]
+    parts, near = pulsed(task, beside(task, opened), closings, known.reach)
     lanes = _sifted(closing(task, parts), plans, Stage.CLOSE, failed)
     if not len(lanes):
         return None
-    plans, parts = [plans[lane] for lane in lanes], some(parts, lanes)
-    found, after = lifted(task, parts)
+    plans, near = [plans[lane] for lane in lanes], near[lanes]
+    found, after = lifted(task, some(parts, lanes))
     rows = grasp_rows(found)
     for stage in (Stage.LIFT, Stage.CARRY):
         words = lifting(task, rows) if stage is Stage.LIFT else carrying(task, rows)
-        lanes = _sifted(words, plans, stage, failed)
-        plans = [plans[lane] for lane in lanes]
+        lanes = _sifted(words, plans, stage, failed, np.argsort(-_worth(rows), kind="stable"))
+        plans, near = [plans[lane] for lane in lanes], near[lanes]
         rows = {name: values[lanes] for name, values in rows.items()}
         found = replace(found, pairs=found.pairs[:, lanes], centers=found.centers[:, lanes])
         after = some(after, lanes)
-    return _released(known, plans, found, after, _worth(rows), failed) if plans else None
+    return _released(known, plans, found, after, (near, _worth(rows)), failed) if plans else None
 
 
 def _sifted(
-    words: NDArray[np.str_], plans: Sequence[Plan], stage: Stage, failed: _Furthest
+    words: NDArray[np.str_],
+    plans: Sequence[Plan],
+    stage: Stage,
+    failed: _Furthest,
+    order: Indices | None = None,
 ) -> Indices:
-    """Plans that go well at a stage; of the others it is noted why not."""
-    for plan, word in zip(plans, words.tolist(), strict=True):
-        if word not in FINE:
-            failed.add(plan, stage, word)
+    """Plans that go well at a stage; of the others it is noted why not, the best first."""
+    for place in np.arange(len(plans)) if order is None else order:
+        if words[place] not in FINE:
+            failed.add(plans[place], stage, str(words[place]))
     return np.flatnonzero(np.isin(words, FINE))
 
 
@@ -163,33 +172,42 @@ def carrying(task: Task, rows: Columns) -> NDArray[np.str_]:
     return np.where((words == WELL) & (payload < friction.weight), TOO_HEAVY, words)
 
 
+Option = tuple[int, tuple[Pulse, ...]]
+"""The place of a plan, and pulses that may let go of its body."""
+
+
 def _released(
     known: Prospect,
     plans: Sequence[Plan],
     found: Grasps,
     after: Parts,
-    worth: Array,
+    merits: tuple[Array, Array],
     failed: _Furthest,
 ) -> Plan | None:
-    """Of plans that hold the best one with pulses that let the body go; fewest pulses first."""
-    patterns = [own.after[lanes] for own, lanes in zip(found.fingers, found.pairs, strict=True)]
-    codes = [sorted({int(own[place]) for own in patterns}) for place in range(len(plans))]
-    ways = releases(known, sorted({code for own in codes for code in own}))
-    options = [
-        (place, pulses)
-        for place, own in enumerate(codes)
-        for pulses in _each(ways, own, known.reach)
-    ]
+    """Of plans that hold the best one with pulses that let the body go; fewest pulses first.
+
+    Their `merits` are how near their peaks are to thresholds, and what they bear.
+    """
+    closed, worth = merits
+    options = _options(known, found, np.argsort(-worth, kind="stable"))
     came: dict[int, tuple[Stage, str, tuple[Pulse, ...]]] = {}
     for n_pulses in sorted({len(pulses) for _, pulses in options}):
         few = [option for option in options if len(option[1]) == n_pulses]
-        words, at_rest = letting_go(known.task, found, after, few)
-        told = zip(few, words.tolist(), at_rest.tolist(), strict=True)
-        good = [(option, code) for option, word, code in told if word == WELL]
-        if good:
-            (place, pulses), _ = max(
-                good, key=lambda one: (one[1] == plans[one[0][0]].opened, worth[one[0][0]])
+        failed.n_left_out += max(len(few) - MOST_PLANS, 0)
+        few = few[:MOST_PLANS]
+        words, codes, near = letting_go(known, found, after, few)
+        good = [
+            (
+                code == plans[place].opened,
+                min(near[number], closed[place]) >= ENOUGH,
+                worth[place],
+                -number,
             )
+            for number, ((place, _), word, code) in enumerate(zip(few, words, codes, strict=True))
+            if word == WELL
+        ]
+        if good:
+            place, pulses = few[-max(good)[-1]]
             return replace(plans[place], release=pulses)
         for (place, pulses), word in zip(few, words.tolist(), strict=True):
             stage = Stage.WITHDRAW if word == COLLIDES else Stage.RELEASE
@@ -201,25 +219,36 @@ def _released(
     return None
 
 
-def _each(
-    ways: Mapping[int, Sequences], codes: Sequence[int], reach: float
-) -> list[tuple[Pulse, ...]]:
-    """All pulses from states, with their variants; each once."""
-    sequences = [pulses for code in codes for pulses in ways[code].values() if pulses]
-    found = [option for pulses in sequences for option in variants(pulses, reach)]
-    return [*dict.fromkeys(found)]
+def _options(known: Prospect, found: Grasps, order: Indices) -> list[Option]:
+    """All pulses from the states that plans have left each finger in, with their variants."""
+    patterns = [own.after[lanes] for own, lanes in zip(found.fingers, found.pairs, strict=True)]
+    codes = [sorted({int(own[place]) for own in patterns}) for place in range(len(order))]
+    ways = releases(known, sorted({code for own in codes for code in own}))
+    options = [
+        (place, option)
+        for place in order.tolist()
+        for code in codes[place]
+        for pulses in ways[code].values()
+        for option in variants(pulses, known.reach)
+        if pulses
+    ]
+    return [*dict.fromkeys(options)]
 
 
 def letting_go(
-    task: Task, found: Grasps, after: Parts, options: Sequence[tuple[int, tuple[Pulse, ...]]]
-) -> tuple[NDArray[np.str_], NDArray[np.uint64]]:
-    """What becomes of fingers, by place, after pulses that should let go; codes of their states."""
-    places = np.array([place for place, _ in options])
-    parts = pulsed(task, some(after, places), [pulses for _, pulses in options])
+    known: Prospect, found: Grasps, after: Parts, options: Sequence[Option]
+) -> tuple[NDArray[np.str_], NDArray[np.uint64], Array]:
+    """What becomes of fingers, by place, after pulses that should let go.
+
+    Also codes of their states, and how near the peaks are to thresholds, as a share of them.
+    """
+    task, places = known.task, np.array([place for place, _ in options])
+    sequences = [pulses for _, pulses in options]
+    parts, near = pulsed(task, some(after, places), sequences, known.reach)
     free = kept(task, parts, found.centers[:, places])
     rows = grasp_rows(free)
     words = status_words(rows)
     words = np.where((words == WELL) & (rows["n_contacts"] > 0), IN_TOUCH, words)
     going = way(task, free, free.centers, task.begins(len(places)))
     words = np.where((words == WELL) & ~going.is_clear, COLLIDES, words)
-    return words, free.fingers[0].after
+    return words, free.fingers[0].after, near

@@ -6,7 +6,7 @@ place. What is told of each stage is a `Grasps`, a row for each lane.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -106,22 +106,46 @@ def beside(task: Task, codes: Codes) -> Parts:
     return tuple(parts)
 
 
-def pulsed(task: Task, parts: Parts, sequences: Sequence[Sequence[Pulse]]) -> Parts:
-    """The same after pulses, of each lane its own, with the body kept in its place."""
+def pulsed(
+    task: Task, parts: Parts, sequences: Sequence[Sequence[Pulse]], limit: float
+) -> tuple[Parts, Array]:
+    """The same after pulses, of each lane its own, with the body kept in its place.
+
+    Also how far peaks are from the nearest threshold with the body there, (lane,), as a share of
+    the peak: one that was passed, or the next one up to the pressure `limit`, MPa, or where nothing
+    is found on the way there; infinite where there are none.
+    """
     history = task.pressures(sequences)
-    return _each(parts, lambda part: _pulsed(task, part, history)) if len(history) else parts
+    near = np.full(len(sequences), np.inf)
+    for peak in history[::2]:
+        both = _each(parts, partial(_pulsed, task, peak=peak, limit=limit))
+        parts = tuple(part for part, _ in both)
+        near = np.min([near, *(own for _, own in both)], axis=0)
+    return parts, near
 
 
-def _pulsed(task: Task, part: Placed, history: Array) -> Placed:
-    came = driven(part.own, _begun(part), task.pressed.volumes, history)
+def _pulsed(task: Task, part: Placed, peak: Array, limit: float) -> tuple[Placed, Array]:
+    """A finger after a pulse to pressures (unit, lane), and how near these are to thresholds."""
+    volumes, size = task.pressed.volumes, np.abs(peak).max(axis=0)
+    there = driven(part.own, Approach(part.grown.shapes, part.grown.load, ()), volumes, peak[None])
+    near = np.full(len(size), np.inf)
+    for told in there.resets:
+        near[told.lanes] = 1.0 - told.load  # the last one counts
+    further = np.where(size > 0.0, limit / np.where(size > 0.0, size, 1.0) - 1.0, 0.0)
+    beyond = replace(part.own, depth=np.zeros(1), ramp=Ramp(volumes, peak, further * peak))
+    onwards = approach(beyond, there.shapes, 0.0 * size, 0.0 * size + 1.0, to_reset=True)
+    next_one = np.where(there.shapes.is_there & ~onwards.shapes.is_there, onwards.load, np.inf)
+    for told in onwards.resets:
+        next_one[told.lanes] = np.minimum(next_one[told.lanes], told.load)
+    near = np.minimum(near, np.where(size > 0.0, further * next_one, np.inf))
+    back = driven(part.own, there, volumes, 0.0 * peak[None], peak)
+    return _with_status(part, back), near
+
+
+def _with_status(part: Placed, came: Approach) -> Placed:
     is_lost = (part.status == Status.STABLE) & ~came.shapes.is_there
     status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), part.status)
     return Placed(part.codes, part.own, came, status)
-
-
-def _begun(part: Placed) -> Approach:
-    """Where fingers are, without what happened to them."""
-    return Approach(part.grown.shapes, part.grown.load, ())
 
 
 def some(parts: Parts, index: Indices) -> Parts:
@@ -215,28 +239,3 @@ def _apart(task: Task, parts: Parts, found: Grasps, rest: ContactShapes) -> Part
         after.append(Placed(part.codes, own, came, status))
         n_before = cells.stop
     return tuple(after)
-
-
-def margin(task: Task, parts: Parts, pulse: Pulse, limit: float) -> float:
-    """From a pulse's peak to the nearest threshold with the body there, of one lane, MPa.
-
-    Thresholds up to the pressure `limit` count, and where nothing is found on the way there.
-    """
-    near = _each(parts, lambda part: _nearest(task, part, pulse, limit))
-    return min((size for sizes in near for size in sizes), default=float("nan"))
-
-
-def _nearest(task: Task, part: Placed, pulse: Pulse, limit: float) -> list[float]:
-    """How far the last threshold is that a finger has passed at a peak, and the next one."""
-    volumes, peak = task.pressed.volumes, task.pressures([[pulse]])[:1]
-    here = driven(part.own, _begun(part), volumes, peak)
-    share = [float(told.load[0]) for told in here.resets]
-    found = [abs(pulse.peak) * (1.0 - max(share))] if share else []
-    further = limit - abs(pulse.peak)
-    beyond = Ramp(volumes, peak[0], peak[0] * further / abs(pulse.peak))
-    own = replace(part.own, depth=np.zeros(1), ramp=beyond)
-    onwards = approach(own, here.shapes, np.zeros(1), np.ones(1), to_reset=True)
-    if onwards.resets or not onwards.shapes.is_there[0]:
-        next_one = min((told.load[0] for told in onwards.resets), default=onwards.load[0])
-        found.append(further * float(next_one))
-    return found

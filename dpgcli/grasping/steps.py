@@ -25,7 +25,7 @@ from dpgcli.grasping.routine import (
     lifting,
     status_words,
 )
-from dpgcli.grasping.stages import Parts, Task, beside, free, kept, lifted, margin, pulsed, way
+from dpgcli.grasping.stages import Parts, Task, beside, free, kept, lifted, pulsed, way
 from dpgcli.grasping.table import Grasps, grasp_rows
 from dpgcli.states.columns import Column, Kind
 
@@ -72,6 +72,11 @@ class Step:
     clearance: float = float("nan")
     tie: str = ""
 
+    @property
+    def overlaps(self) -> bool:
+        """Whether the fingers overlap each other."""
+        return bool(grasp_rows(self.found)["overlaps"][0])
+
 
 @dataclass(frozen=True)
 class Routine:
@@ -110,12 +115,11 @@ def _steps(known: Prospect, plan: Plan, opening: Replay) -> Iterator[Step]:
     if not plan.closing:
         yield Step(Stage.CLOSE, kept(task, parts, task.centers(1)), NO_PULSES)
     for count, pulse in enumerate(plan.closing, start=1):
-        near = margin(task, parts, pulse, known.reach)
-        parts = pulsed(task, parts, [[pulse]])
+        parts, near = pulsed(task, parts, [[pulse]], known.reach)
         found = kept(task, parts, task.centers(1))
         is_last = count == len(plan.closing)
         words = closing(task, parts) if is_last else status_words(grasp_rows(found))
-        yield Step(Stage.CLOSE, found, str(words[0]), pulse, near, tie=_ties(parts))
+        yield Step(Stage.CLOSE, found, str(words[0]), pulse, _size(near, pulse), tie=_ties(parts))
     held, parts = lifted(task, parts)
     rows = grasp_rows(held)
     yield Step(Stage.LIFT, held, str(lifting(task, rows)[0]))
@@ -151,15 +155,19 @@ def _released(known: Prospect, plan: Plan, parts: Parts, held: Grasps) -> Iterat
     if not plan.release:
         yield Step(Stage.RELEASE, held, NO_PULSES)
     for count, pulse in enumerate(plan.release, start=1):
-        near = margin(task, parts, pulse, known.reach)
-        parts = pulsed(task, parts, [[pulse]])
+        parts, near = pulsed(task, parts, [[pulse]], known.reach)
         found = kept(task, parts, held.centers)
         rows = grasp_rows(found)
         word = str(status_words(rows)[0])
         is_held = word == WELL and count == len(plan.release) and rows["n_contacts"][0] > 0
         word = IN_TOUCH if is_held else word
-        yield Step(Stage.RELEASE, found, word, pulse, near, tie=_ties(parts))
+        yield Step(Stage.RELEASE, found, word, pulse, _size(near, pulse), tie=_ties(parts))
     yield _moved(task, Stage.WITHDRAW, found)
+
+
+def _size(near: Array, pulse: Pulse) -> float:
+    """A share of a pulse's peak in MPa; NaN where no threshold is known."""
+    return float(near[0]) * abs(pulse.peak) if np.isfinite(near[0]) else float("nan")
 
 
 def _code(code: int) -> np.ndarray[tuple[int], np.dtype[np.uint64]]:

@@ -234,6 +234,7 @@ NEEDED: dict[Callable[..., Any], dict[str, Any]] = {
     dpg.pulses: {"spec": BASE, "end": "11"},
     dpg.read_calibration: {"path": "none"},
     dpg.report: {"folder": "none"},
+    dpg.routine: {"spec": BASE, "approach_from": (90.0, 0.0)},
     dpg.stress: {"only": "none"},
     dpg.sweep: {"sweep": SWEEP, "executor": "serial"},
     dpg.transitions: {"spec": BASE},

@@ -73,6 +73,7 @@ FACE: dict[str, dict[str, Any]] = {
     "predict": {"spec": FINGER},
     "pulses": {"spec": FINGER, "end": "11"},
     "report": {"folder": "nowhere"},
+    "routine": {"spec": SPEC, "approach_from": (90.0, 0.0), "object": "disc:9", "closed": "x"},
     "stress": {"spec": None, "only": "none"},
     "sweep": {"sweep": SWEEP, "executor": "serial"},
     "transitions": {"spec": FINGER},
