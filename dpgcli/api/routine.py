@@ -302,7 +302,12 @@ def planned(
     if (begin == known.center).all():
         raise UsageError(Field("approach_from"), ": expected another place than that of the body")
     keep_freed_memory()
-    return given, prospect(Task(given.scene, pressed.pressed, begin), *codes)
+    found = prospect(Task(given.scene, pressed.pressed, begin), *codes)
+    if not len(found.graph.code):
+        raise UsageError(
+            "a routine begins at rest: expected a stable state there, found none that is certified"
+        )
+    return given, found
 
 
 def seconds_of(known: Prospect) -> float:
@@ -316,6 +321,10 @@ def seconds_of(known: Prospect) -> float:
 def found_routine(given: SceneInput, known: Prospect, ramp: float, move: float) -> RoutineResult:
     """The same, of what there is to try."""
     found = routine_of(searched(known))
+    result = RoutineResult(given, found, ramp, move)
     if found.opening is not None and found.opening.problem:
-        raise ActuationError(found, f"the pulses that open do not hold: {found.opening.problem}")
-    return RoutineResult(given, found, ramp, move)
+        raise ActuationError(result, f"the pulses that open do not hold: {found.opening.problem}")
+    if result.exists and not found.is_done:
+        last = found.steps[-1]
+        raise ActuationError(result, f"the routine does not hold: {last.stage} ends {last.status}")
+    return result

@@ -134,12 +134,13 @@ def _pulsed(task: Task, part: Placed, peak: Array, limit: float) -> tuple[Placed
     further = np.where(size > 0.0, limit / np.where(size > 0.0, size, 1.0) - 1.0, 0.0)
     beyond = replace(part.own, depth=np.zeros(1), ramp=Ramp(volumes, peak, further * peak))
     onwards = approach(beyond, there.shapes, 0.0 * size, 0.0 * size + 1.0, to_reset=True)
-    next_one = np.where(there.shapes.is_there & ~onwards.shapes.is_there, onwards.load, np.inf)
+    is_lost = there.shapes.is_there & ~onwards.shapes.is_there
+    ahead = np.where(is_lost & (size > 0.0), further * onwards.load, np.inf)
     for told in onwards.resets:
-        next_one[told.lanes] = np.minimum(next_one[told.lanes], told.load)
-    near = np.minimum(near, np.where(size > 0.0, further * next_one, np.inf))
+        share = further[told.lanes] * told.load
+        ahead[told.lanes] = np.minimum(ahead[told.lanes], share)
     back = driven(part.own, there, volumes, 0.0 * peak[None], peak)
-    return _with_status(part, back), near
+    return _with_status(part, back), np.minimum(near, ahead)
 
 
 def _with_status(part: Placed, came: Approach) -> Placed:

@@ -91,6 +91,12 @@ class Routine:
         """What was to be done."""
         return self.search.known.task
 
+    @property
+    def is_done(self) -> bool:
+        """Whether it goes well to its end."""
+        last = self.steps[-1] if self.steps else None
+        return last is not None and last.stage is Stage.WITHDRAW and last.status in FINE
+
 
 def routine_of(search: Search) -> Routine:
     """Follow the plan of a search, with the body there."""

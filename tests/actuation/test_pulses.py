@@ -12,7 +12,7 @@ from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions
 from dpgcli.actuation.graph import reachable
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.actuation.pulses import Pulse, intervals, replayed, shortest
+from dpgcli.actuation.pulses import Pulse, intervals, replayed, routes, shortest
 from dpgcli.actuation.sequences import pulse_sequence
 from dpgcli.mechanics.finger import Finger
 
@@ -158,3 +158,19 @@ def test_a_look_up_table_is_that_of_hysterons(
         assert [state_of(after, 4) for after in rows.after] == ends
         assert [state_of(peak, 4) for peak in rows.at_peak] == ends
         assert not rows.is_tie.any()
+
+
+def test_routes_are_the_shortest_to_every_state(study: Study, pressed: Made) -> None:
+    own = pressed(study(3, np.inf).changed(stroke=STROKES[:3]))
+    line, reach = np.array([0, 1, 0]), thresholds_alone(own).reach
+    graph = reachable(own, line, reach)
+    assert len(graph.code) > 4
+    for start in graph.code.tolist():
+        found = routes(graph, float(reach[0]), start)
+        alone = reachable(own, line, reach, np.array([start], np.uint64))
+        lengths = {code: len(pulses) for code, pulses in found.items()}
+        assert lengths == dict(zip(alone.code.tolist(), alone.n_pulses.tolist(), strict=True))
+        for code, pulses in found.items():
+            ends = [start, *(pulse.target for pulse in pulses)]
+            assert ends == [*(pulse.source for pulse in pulses), code]
+    assert routes(graph, float(reach[0]), 99) == {}

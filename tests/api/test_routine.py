@@ -13,6 +13,7 @@ import dpgcli as dpg
 from dpgcli.actuation.pulses import Pulse
 from dpgcli.api.routine import RoutineResult, planned, seconds_of
 from dpgcli.grasping import routine as search
+from dpgcli.grasping import steps
 from dpgcli.grasping.plans import Plan
 from dpgcli.grasping.routine import carrying, letting_go, lifting
 from dpgcli.grasping.stages import beside, lifted, pulsed
@@ -257,6 +258,21 @@ def test_without_friction_nothing_is_said_of_payload() -> None:
     assert [found.table["status"][k] for k in (3, 4)] == ["not_checked"] * 2
     text = "\n".join(found.summary)
     assert "not checked: whether the body is lifted and carried" in text
+
+
+@pytest.mark.slow
+def test_a_routine_that_does_not_hold_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if fingers that are followed one by one went another way than many at once."""
+    monkeypatch.setattr(steps, "closing", lambda *_: np.array(["not_touched"]))
+    with pytest.raises(dpg.ActuationError, match="does not hold: close ends not_touched") as caught:
+        dpg.routine(SPEC, approach_from=BEGIN)
+    assert caught.value.result.rows["status"][-1] == "not_touched"
+
+
+def test_fingers_that_do_not_rest_begin_nothing() -> None:
+    """A weight of the units that no straight finger bears."""
+    with pytest.raises(dpg.UsageError, match="a routine begins at rest"):
+        dpg.routine(SPEC, approach_from=BEGIN, settings={"loads.unit_mass_g": 1e6})
 
 
 @pytest.mark.slow
