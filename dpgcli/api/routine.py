@@ -251,15 +251,15 @@ def routine(
     Raises SpecError for a wrong spec, UsageError for wrong choices, ActuationError where a finger
     that is followed ends elsewhere than planned.
 
-    >>> spec = {"finger": {"units": 2, "calibration": "published",
+    >>> spec = {"finger": {"units": 1, "calibration": "published",
     ...     "linear_stiffness_N_per_mm": float("inf"), "geometry": {
     ...     "dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "unit_cell_mm": 22,
     ...     "chamber_length_mm": 9, "channel_width_mm": 10, "limiting_layer_thickness_mm": 1.5,
     ...     "unit_separation_mm": 3, "elastic_modulus_MPa": 26}},
-    ...     "gripper": {"base_spacing_mm": 34, "mounting_angle_deg": 0}}
-    >>> found = routine(spec, object="disc:26", at=(20, 0), approach_from=(90, 0))
+    ...     "gripper": {"base_spacing_mm": 24, "mounting_angle_deg": 0}}
+    >>> found = routine(spec, object="disc:20", at=(14, 0), approach_from=(60, 0))
     >>> found.exists, found.table["pattern_after"].tolist()
-    (True, ['00', '00', '11', '11', '11', '00', '00'])
+    (True, ['0', '0', '1', '1', '1', '0', '0'])
     >>> found.history.pressure[:, 0].round(3).tolist()
     [0.0, 0.0, 0.164, 0.0, 0.0, -0.071, 0.0, 0.0]
     """

@@ -152,7 +152,10 @@ def failing(**changes: Any) -> RoutineResult:
     [
         ({"gripper.base_spacing_mm": 26}, "approach", "collides", "meet with the body at "),
         ({"closed": "101"}, "close", "no_pulses", "lead on from 000"),
-        ({"at": (70.0, 0.0)}, "close", "not_touched", "not both fingers touch"),
+        pytest.param(
+            *({"at": (70.0, 0.0)}, "close", "not_touched", "not both fingers touch"),
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             *({"object.held": "free"}, "lift", "not_held", "let go of, the body leaves"),
             marks=pytest.mark.slow,
@@ -297,6 +300,7 @@ def test_two_lines_go_one_after_the_other() -> None:
     assert other.table["squeeze_N"][0] == pytest.approx(table["squeeze_N"][3], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_fingers_open_by_a_pulse_first() -> None:
     missed = dpg.routine(
         SPEC, approach_from=BEGIN, open="001", object="disc:18", at=(70, 0), settings=TWO_LINES
