@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.actuation.pulses import Pulse
-from dpgcli.arrays import Array, Columns, Indices
+from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.scene import Held
 from dpgcli.grasping.plans import MOST_PLANS, Plan, Prospect, releases, variants
 from dpgcli.grasping.stages import (
@@ -104,34 +104,37 @@ def _best(known: Prospect, plans: Sequence[Plan], failed: _Furthest) -> Plan | N
     opened = np.array([plan.opened for plan in plans], np.uint64)
     closings = [plan.closing for plan in plans]
     parts, near = pulsed(task, beside(task, opened), closings, known.reach)
-    lanes = _sifted(closing(task, parts), plans, Stage.CLOSE, failed)
+    words = closing(task, parts)
+    lanes = np.flatnonzero(_well(words, plans, Stage.CLOSE, failed, np.arange(len(plans))))
     if not len(lanes):
         return None
-    plans, near = [plans[lane] for lane in lanes], near[lanes]
+    plans, near = [plans[lane] for lane in lanes.tolist()], near[lanes]
     found, after = lifted(task, some(parts, lanes))
     rows = grasp_rows(found)
-    for stage in (Stage.LIFT, Stage.CARRY):
-        words = lifting(task, rows) if stage is Stage.LIFT else carrying(task, rows)
-        lanes = _sifted(words, plans, stage, failed, np.argsort(-_worth(rows), kind="stable"))
-        plans, near = [plans[lane] for lane in lanes], near[lanes]
-        rows = {name: values[lanes] for name, values in rows.items()}
-        found = replace(found, pairs=found.pairs[:, lanes], centers=found.centers[:, lanes])
-        after = some(after, lanes)
-    return _released(known, plans, found, after, (near, _worth(rows)), failed) if plans else None
+    worth = _worth(rows)
+    order = np.argsort(-worth, kind="stable")
+    are_lifted = _well(lifting(task, rows), plans, Stage.LIFT, failed, order)
+    words = np.where(are_lifted, carrying(task, rows), WELL)
+    lanes = np.flatnonzero(are_lifted & _well(words, plans, Stage.CARRY, failed, order))
+    if not len(lanes):
+        return None
+    found = replace(found, pairs=found.pairs[:, lanes], centers=found.centers[:, lanes])
+    plans, merits = [plans[lane] for lane in lanes.tolist()], (near[lanes], worth[lanes])
+    return _released(known, plans, found, some(after, lanes), merits, failed)
 
 
-def _sifted(
+def _well(
     words: NDArray[np.str_],
     plans: Sequence[Plan],
     stage: Stage,
     failed: _Furthest,
-    order: Indices | None = None,
-) -> Indices:
-    """Plans that go well at a stage; of the others it is noted why not, the best first."""
-    for place in np.arange(len(plans)) if order is None else order:
-        if words[place] not in FINE:
-            failed.add(plans[place], stage, str(words[place]))
-    return np.flatnonzero(np.isin(words, FINE))
+    order: Indices,
+) -> Flags:
+    """Plans that go well at a stage; of the others it is noted why not, in this order."""
+    are_well = np.isin(words, FINE)
+    for place in order[~are_well[order]].tolist():
+        failed.add(plans[place], stage, str(words[place]))
+    return are_well
 
 
 def _worth(rows: Columns) -> Array:

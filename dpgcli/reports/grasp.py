@@ -184,7 +184,7 @@ def _handles(body: Body | None) -> list[Any]:
 
 def _said(largest: float, body: Body | None) -> str:
     if largest == 0.0:
-        return f"no finger touches the {'other' if body is None else 'body'}"
+        return f"no forces on the {'other finger' if body is None else 'body'}"
     return f"arrows are to scale: the longest is {largest:.3g} N"
 
 

@@ -75,6 +75,15 @@ def test_a_body_off_the_axis_meets_each_finger_by_itself(known: Prospect) -> Non
     assert known.coming.gap[0] == pytest.approx(17.0 - 0.75 - 13.0)
 
 
+def test_plans_of_few_pulses_come_first(known: Prospect) -> None:
+    counts = [plan.n_pulses for plan in known.plans]
+    assert set(counts) == {1, 2}
+    assert counts == sorted(counts)
+    assert [len(plans) for plans in known.rounds()] == [counts.count(n) for n in (1, 2)]
+    for plan in known.plans:
+        assert known.coming.is_clear[known.opened == plan.opened].all()
+
+
 def test_pulses_let_go_from_every_state(known: Prospect) -> None:
     found = releases(known, [0b01, 0b11])
     assert found[0b11] == routes(known.graph, known.reach, 0b11)
