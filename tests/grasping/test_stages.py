@@ -1,5 +1,6 @@
 """Stages of routines: many fingers at once, each with pulses of its own."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from dpgcli.actuation.pulses import Pulse, routes
 from dpgcli.api.routine import planned
+from dpgcli.design.bodies import Disc
 from dpgcli.grasping.plans import Prospect, releases, variants
 from dpgcli.grasping.stages import beside, kept, pulsed, some
 from dpgcli.grasping.table import grasp_rows
@@ -73,6 +75,17 @@ def test_a_body_off_the_axis_meets_each_finger_by_itself(known: Prospect) -> Non
     assert found.fingers[0].push.sum() > found.fingers[1].push.sum()
     assert other.coming.gap[0] == pytest.approx(17.0 - 0.75 - 13.0 - 1.5)
     assert known.coming.gap[0] == pytest.approx(17.0 - 0.75 - 13.0)
+
+
+def test_the_next_threshold_counts_as_the_last_one_does(known: Prospect) -> None:
+    """Free units snap at 0.1495 MPa: 0.14 is 0.0095 MPa before, 0.16 is 0.0105 MPa beyond."""
+    task, limit = known.task, 0.2
+    pulses = [(replace(UP[0], peak=peak),) for peak in (0.14, 0.16)]
+    far = replace(task, scene=replace(task.scene, body=Disc(np.array([500.0, 0.0]), 1.0)))
+    _, near = pulsed(far, beside(far, np.zeros(2, np.uint64)), pulses, limit)
+    np.testing.assert_allclose(near * [0.14, 0.16], [0.0095, 0.0105], atol=1e-7)
+    _, near = pulsed(far, beside(far, np.zeros(1, np.uint64)), pulses[:1], 0.149)
+    assert near.tolist() == [np.inf]
 
 
 def test_plans_of_few_pulses_come_first(known: Prospect) -> None:
