@@ -16,7 +16,8 @@ from dpgcli.grasping import routine as search
 from dpgcli.grasping import steps
 from dpgcli.grasping.plans import Plan
 from dpgcli.grasping.routine import carrying, letting_go, lifting
-from dpgcli.grasping.stages import beside, lifted, pulsed
+from dpgcli.grasping.stages import beside, kept, lifted, pulsed
+from dpgcli.grasping.table import grasp_rows
 from dpgcli.states.certify import Status
 
 SPEC: dict[str, Any] = {
@@ -371,6 +372,20 @@ def test_a_body_that_moves_is_let_go_of_where_it_is(moving: RoutineResult) -> No
     assert table.object_x_mm["lift"] < 25.0 - 1e-3
     assert table.object_x_mm["release"] == table.object_x_mm["lift"]
     assert table.n_contacts["release"] == 0
+
+
+@pytest.mark.slow
+def test_a_body_that_has_moved_is_kept_where_it_is(moving: RoutineResult) -> None:
+    """With the same forces, now of fingers that are each by itself."""
+    task, plan = moving.routine.task, moving.routine.search.plan
+    assert plan is not None
+    parts = beside(task, np.array([plan.opened], np.uint64))
+    found, after = lifted(task, pulsed(task, parts, [plan.closing], 0.3)[0])
+    there, rows = grasp_rows(found), grasp_rows(kept(task, after, found.centers))
+    assert rows["n_contacts"][0] == there["n_contacts"][0] == 4
+    assert rows["squeeze_N"][0] == pytest.approx(there["squeeze_N"][0], rel=1e-9)
+    assert rows["penetration_mm"][0] < 1e-9
+    assert rows["residual_N"][0] < 1e-9
 
 
 def test_plans_have_peaks_10_percent_beyond_and_midway(held: Any) -> None:

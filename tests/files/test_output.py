@@ -190,6 +190,7 @@ KNOWN = {
     Mark.SPEC: [b"# Written by dpg: design 3 of the sweep around a.yaml\nfinger:\n" + LONG],
     Mark.DECK: [b"** dpg fe hinge" + LONG],
     Mark.CURVE: [b"# dpg fe hinge: a simulation"],
+    Mark.CONTROLLER: [b"# dpg routine: pressures of lines by time\ntime_s,A_MPa\n"],
     Mark.LOG: [b"# dpg fe, hinge.inp: words of ccx\n"],
     Mark.DISPLACEMENTS: [b"# dpg fe, hinge.inp: printed by ccx\n\n displacements" + LONG],
     Mark.PARTS: [b'{\n  "dpg.sweep": "' + LONG],
