@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dpgcli.api.bodies import check_body, force_lines, pressure_lines, with_body
+from dpgcli.api.bodies import (
+    check_body,
+    force_lines,
+    own_settings,
+    pressure_lines,
+    with_body,
+)
 from dpgcli.api.closing import PUSHED
 from dpgcli.api.inputs import (
     SceneInput,
@@ -26,7 +32,7 @@ from dpgcli.api.pulses import check_size
 from dpgcli.api.tables import Table
 from dpgcli.api.transitions import failed_searches
 from dpgcli.arrays import Columns, keep_freed_memory
-from dpgcli.design.bodies import Jaws
+from dpgcli.design.bodies import gives_way
 from dpgcli.design.loads import direction_text
 from dpgcli.design.pressure import History
 from dpgcli.design.scene import Held
@@ -202,7 +208,7 @@ class RoutineResult:
 
         table, task = path_of("path", path), self.routine.task
         check_outputs(self.given.files, (table, Mark.TABLE))
-        chosen = {"object": told_of(task.body, task.scene.held)}
+        chosen = {"object": told_of(task.body, task.scene.held, task.scene.friction)}
         chosen |= {"approach_from_mm": task.begin.tolist()}
         scene = self.given.scene
         write_scene_rows(table_path(table), scene, self.given.json, self.columns, self.rows, chosen)
@@ -280,7 +286,8 @@ def planned(
 ) -> tuple[SceneInput, Prospect]:
     """What there is to try: open states past which the body comes, and pulses that close."""
     begin = np.array(point("approach_from", approach_from))
-    pressed = pressed_input(spec, settings)
+    of_spec, of_body = own_settings(settings, body)
+    pressed = pressed_input(spec, of_spec)
     check_size(pressed)
     scene = pressed.given.scene
     if scene.gripper is None:
@@ -291,11 +298,11 @@ def planned(
         code_of(pressed, field, pattern) if pattern else None
         for field, pattern in (("open", opened), ("closed", closed))
     ]
-    given = with_body(pressed.given, body, at)
+    given = with_body(pressed.given, body, at, of_body)
     known = given.scene.body
     assert known is not None, "a scene with a body"
     check_body(given.scene, known)
-    if isinstance(known, Jaws) and known.stiffness is not None:
+    if gives_way(known):
         raise UsageError(
             Field("object"), ": expected a body that keeps its shape, without compliance"
         )

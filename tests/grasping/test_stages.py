@@ -9,6 +9,7 @@ import pytest
 from dpgcli.actuation.pulses import Pulse, routes
 from dpgcli.api.routine import planned
 from dpgcli.design.bodies import Disc
+from dpgcli.grasping.closing import driven
 from dpgcli.grasping.plans import Prospect, releases, variants
 from dpgcli.grasping.stages import beside, kept, pulsed, some
 from dpgcli.grasping.table import grasp_rows
@@ -86,6 +87,21 @@ def test_the_next_threshold_counts_as_the_last_one_does(known: Prospect) -> None
     np.testing.assert_allclose(near * [0.14, 0.16], [0.0095, 0.0105], atol=1e-7)
     _, near = pulsed(far, beside(far, np.zeros(1, np.uint64)), pulses[:1], 0.149)
     assert near.tolist() == [np.inf]
+
+
+def test_ways_in_parts_are_the_whole_way(known: Prospect) -> None:
+    """Units that reset on the way from 0.1 to -0.1 MPa do so at the same share of it."""
+    (part, _), volumes = beside(known.task, np.array([0b11], np.uint64)), known.task.pressed.volumes
+    history = np.array([[[0.1], [0.1]], [[-0.1], [-0.1]]])
+    start = replace(part.grown, resets=())
+    whole = driven(part.own, start, volumes, history)
+    there = driven(part.own, start, volumes, history[:1])
+    back = driven(part.own, there, volumes, history[1:], history[0])
+    assert 0 < len(back.resets) == len(whole.resets)
+    for told, other in zip(back.resets, whole.resets, strict=True):
+        assert told.load == pytest.approx(other.load, rel=1e-9)
+        assert told.pressure == pytest.approx(0.1 - 0.2 * told.load * np.ones((2, 1)))
+        assert other.pressure == pytest.approx(told.pressure)
 
 
 def test_plans_of_few_pulses_come_first(known: Prospect) -> None:
