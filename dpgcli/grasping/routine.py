@@ -51,6 +51,7 @@ SLIPS, TOO_HEAVY, IN_TOUCH = "slips", "too_heavy", "in_touch"
 NOT_CHECKED, UNKNOWN = "not_checked", "unknown"
 FINE = (WELL, NOT_CHECKED)
 ENOUGH = 0.05  # of a peak: how far thresholds should be
+ALIKE = 6  # digits of the largest: what differs further behind is rounding
 
 
 @dataclass(frozen=True)
@@ -138,8 +139,10 @@ def _well(
 
 
 def _worth(rows: Columns) -> Array:
+    """What plans bear, or how they squeeze, without rounding: the first of equal ones is taken."""
     worth = rows["payload_N"] if "payload_N" in rows else rows["squeeze_N"]
-    return np.asarray(worth)
+    largest = np.abs(np.nan_to_num(worth)).max(initial=0.0) or 1.0
+    return np.asarray(np.round(worth / largest, ALIKE) * largest)
 
 
 def status_words(rows: Columns) -> NDArray[np.str_]:
