@@ -3,9 +3,10 @@
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
+
+from dpgcli.records import dataclass
 
 MOST_PROCESSES = 4096  # more than any machine has cores
 

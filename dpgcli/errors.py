@@ -1,9 +1,9 @@
 """Every error raised on purpose, and messages that name fields."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Self
 
+from dpgcli.records import dataclass
 from dpgcli.text import printable
 
 

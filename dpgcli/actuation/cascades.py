@@ -6,7 +6,7 @@ to where its spring is slack; the energy falls all the way. So folds decide what
 these are found to the last digits, however long the steps are between them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from dpgcli.equilibrium.contracts import Measured, ScalarLaw, WideMeasured, take
 from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
+from dpgcli.records import dataclass
 
 FURTHEST = 10.0  # strokes: no unit goes as far
 SHORTER = 0.1  # of a step, where curves bend often: no well of theirs is stepped over

@@ -1,10 +1,9 @@
 """Whether the shape that a way ends in is a stable state, or an equilibrium under its pressures."""
 
-from dataclasses import dataclass
-
 from dpgcli.actuation.pressed import LARGEST_RESIDUAL, Pressed, Shapes
 from dpgcli.actuation.readings import Readings
 from dpgcli.actuation.rest import at_rest, is_same
+from dpgcli.records import dataclass
 from dpgcli.states.certify import MARGINAL_CURVATURE, Status
 from dpgcli.states.solved import ALONE
 

@@ -1,7 +1,7 @@
 """States and what is done to them: one line of pressure up or down, the others left alone."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Self
 
 import numpy as np
@@ -10,6 +10,7 @@ from dpgcli.actuation.pressed import Pressed, Shapes
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.staircase import Stair, Way, staircase
 from dpgcli.arrays import Array, Codes, Indices
+from dpgcli.records import dataclass
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.settle import lanes_at_once
 

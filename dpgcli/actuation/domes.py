@@ -1,7 +1,7 @@
 """Domes under pressure: what they push with, where they touch their neighbors, when they snap."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -12,6 +12,7 @@ from dpgcli.equilibrium.contracts import Measured, Response, ScalarLaw, WideMeas
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import Dome
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
+from dpgcli.records import dataclass
 
 NEAREST = 1e-15  # of extensions: as near as rounding tells
 

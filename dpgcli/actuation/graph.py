@@ -5,7 +5,6 @@ on its peak alone: on the way the finger goes through one event after another, a
 another state, or in the same, if it turns back after each.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
 from dpgcli.actuation.staircase import UNKNOWN
 from dpgcli.arrays import Array, Codes, Flags, Indices, distinct
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.settle import lanes_at_once

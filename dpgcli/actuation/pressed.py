@@ -1,6 +1,6 @@
 """Fingers under pressure: followed as it changes, and relaxed where they lose their balance."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from functools import cached_property
 from typing import TypeVar
@@ -31,6 +31,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
 from dpgcli.mechanics.terms import chain_potential, springs_merged
+from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
 

@@ -1,7 +1,7 @@
 """Sequences of pulses from one state to another: searched in the graph of states, then replayed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest, is_certified
 from dpgcli.actuation.travel import Travel, travel
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.states.patterns import codes_of, inverted_units
 
 ABOVE = 0.1  # of the last threshold: how far beyond it a peak goes that no other one bounds

@@ -1,6 +1,5 @@
 """What a finger is like in its shapes under pressure, all at once, and how far they differ."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +8,7 @@ from dpgcli.actuation.pressed import Pressed, Shapes
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.newton import Equilibrium, looked_at
 from dpgcli.mechanics.coordinates import Stations
+from dpgcli.records import dataclass
 from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import Surroundings, all_nodes

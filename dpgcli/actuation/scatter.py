@@ -1,7 +1,7 @@
 """What scatter does to pulses and thresholds: of many draws of a finger, a lane each."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from dpgcli.actuation.pulses import WHOLE, Pulse, intervals
 from dpgcli.actuation.rest import at_rest, is_certified
 from dpgcli.actuation.staircase import driven, released
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of, inverted_units
 from dpgcli.states.settle import lanes_at_once

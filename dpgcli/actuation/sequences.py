@@ -1,7 +1,5 @@
 """The shortest sequence of pulses between two states of a finger: searched, then replayed."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.actuation.alone import Thresholds, thresholds_alone
@@ -9,6 +7,7 @@ from dpgcli.actuation.graph import Graph, reachable
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.pulses import Pulse, Replay, replayed, shortest
 from dpgcli.arrays import Indices
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What fingers go through as pressures change, event by event, and what is left after release."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from dpgcli.actuation.pressed import Halt, Halted, Pressed, Shapes
 from dpgcli.actuation.snaps import after
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
+from dpgcli.records import dataclass
 
 EVENTS = (Halt.FOLD, Halt.ALONE, Halt.CONTACT, Halt.RELEASE)
 JUMPS = (Halt.FOLD, Halt.ALONE)

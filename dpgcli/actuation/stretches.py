@@ -8,7 +8,6 @@ ripples has more.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.pressure import DomeVolumes
+from dpgcli.records import dataclass
 
 BISECTIONS = 60
 PLACES = 512  # of a dome's travel, at which its own pressure is looked at

@@ -1,6 +1,5 @@
 """Transitions: what first happens to each stable state as the pressure of a line rises or falls."""
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -12,6 +11,7 @@ from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import is_certified
 from dpgcli.actuation.staircase import Stair, Way
 from dpgcli.arrays import Array, Codes, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.states.patterns import codes_of
 
 

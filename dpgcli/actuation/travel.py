@@ -1,7 +1,7 @@
 """The way of one finger through a history of pressures: what happens on it, and its points."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -12,6 +12,7 @@ from dpgcli.actuation.snaps import after
 from dpgcli.actuation.staircase import EVENTS, MOST_EVENTS
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.path import LARGEST_STEP
+from dpgcli.records import dataclass
 
 HALVINGS = 20  # of the way to where a finger folds onto itself
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from dpgcli.api.tables import Table
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, Field, UsageError
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import texts

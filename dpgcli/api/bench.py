@@ -1,10 +1,10 @@
 """`bench`: error against run time, on the user's own finger."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dpgcli.api.data import frame_of
 from dpgcli.api.inputs import (
     Place,
     Settings,
@@ -16,7 +16,6 @@ from dpgcli.api.inputs import (
     check_whole,
     figure_path,
     files_of,
-    frame_of,
     path_of,
     scene_input,
     table_path,
@@ -31,6 +30,7 @@ from dpgcli.files.output import Mark, check_outputs
 from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record
+from dpgcli.records import dataclass
 from dpgcli.reports.precision import changes, cheapest_way, draw_precision
 from dpgcli.sweeps.differences import differences
 

@@ -1,13 +1,13 @@
 """`compare`: predictions beside finite elements or measurements."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, frame_of, scene_input
+from dpgcli.api.data import frame_of
+from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, scene_input
 from dpgcli.api.recalibration import CalibrationInput, recalibrated_scene
 from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns
@@ -19,6 +19,7 @@ from dpgcli.errors import Message
 from dpgcli.files.csv_file import Tabular, name_of
 from dpgcli.files.known_states import states_of
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reports.comparison import comparison_summary, draw_comparison
 from dpgcli.states.columns import Column
 

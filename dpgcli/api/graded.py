@@ -1,7 +1,5 @@
 """Dome heights with which pulses lead where they do not lead with the given ones."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.actuation.grading import HEIGHT, SEPARATION, nearest_heights
@@ -10,6 +8,7 @@ from dpgcli.actuation.sequences import PulseSequence, pulse_sequence
 from dpgcli.api.pressure import PressedInput
 from dpgcli.design.by_unit import size_by_unit, with_sizes
 from dpgcli.design.resolve import resolve
+from dpgcli.records import dataclass
 from dpgcli.states.patterns import inverted_units
 from dpgcli.states.units import UnitSolutions
 

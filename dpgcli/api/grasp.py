@@ -1,7 +1,6 @@
 """`grasp`: what the fingers of a gripper do with a body between them, state by state."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +38,7 @@ from dpgcli.grasping.closing import Closing
 from dpgcli.grasping.costs import Work, effort, is_moving
 from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import select

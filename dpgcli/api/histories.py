@@ -3,7 +3,6 @@
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,10 +15,11 @@ from dpgcli.design.lines import NAME, TIME
 from dpgcli.design.pressure import History, Pressure
 from dpgcli.errors import Field, Problem, SpecError, UsageError
 from dpgcli.files.csv_file import Tabular
+from dpgcli.files.histories import FEWEST_ROWS, read_history
 from dpgcli.files.places import shown
-from dpgcli.files.scene_file.histories import FEWEST_ROWS, read_history
 from dpgcli.files.scene_file.pressure import NUMBER, ramp
 from dpgcli.files.units import FACTORS, factor_of
+from dpgcli.records import dataclass
 from dpgcli.text import quoted
 
 PressureInput: TypeAlias = str | Path | Sequence[str] | Sequence[float] | Tabular

@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
 from decimal import Decimal
 from enum import StrEnum
@@ -15,14 +14,11 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias, TypeGuard, TypeVar
 
-from dpgcli.calibration.choices import MOST_RESAMPLES
-from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, SpecError, UsageError
 from dpgcli.files.access import reading
 from dpgcli.files.calibration import Calibration
-from dpgcli.files.csv_file import Choice
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
@@ -32,11 +28,11 @@ from dpgcli.files.scene_file import (
     scene_of,
     with_files,
 )
-from dpgcli.files.scene_file.models import DataSpec
 from dpgcli.files.scene_file.problems import checked_keys
 from dpgcli.files.scene_file.settings import with_settings
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.text import quoted
 
 Settings: TypeAlias = Mapping[str, object] | Sequence[str] | str
@@ -48,13 +44,11 @@ Texts: TypeAlias = Mapping[str, str] | Sequence[str] | str
 Place: TypeAlias = Sequence[float] | None
 """Two numbers in mm; None where somebody else says them."""
 
-ORIGINS = ("as given", "from the data's header", "from the spec")
 N_COORDINATES = 2
 BYTES = (bytes, bytearray, memoryview)  # whose items are numbers of letters
 MOST_ITEMS = 10**6  # of a sequence that is handed in
 LARGEST_WHOLE = 2**1000  # far beyond any seed
 NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
-FORMS = {"column": "NAME=TITLE, such as force_N=Load", "units": "QUANTITY=UNIT, such as force=kN"}
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -353,27 +347,6 @@ def check_flags(**values: bool) -> None:
             raise UsageError(Field(field), f" {quoted(value)}: expected True or False")
 
 
-def table_choice(column: Texts, skip: int | None, units: Texts) -> Choice:
-    """What of a table is read: our names and quantities with its titles and units.
-
-    >>> table_choice(["force_N=Load"], 4, {"force": "kN"})
-    Choice(columns={'force_N': 'Load'}, skip=4, units={'force': 'kN'})
-    """
-    check_whole(skip=skip)
-    return Choice(_by_name("column", column), skip, _by_name("units", units))
-
-
-def _by_name(field: str, texts: Texts) -> dict[str, str]:
-    """Texts by name. Raises UsageError for what is no "name=text"."""
-    if isinstance(texts, Mapping):
-        return {name: str(plain(text)) for name, text in by_text(field, texts).items()}
-    parts = [(text, *map(str.strip, text.partition("="))) for text in as_texts(field, texts)]
-    for text, name, _, said in parts:
-        if not name or not said:
-            raise UsageError(Field(field), f" {text}: expected {FORMS[field]}")
-    return {name: said for _, name, _, said in parts}
-
-
 def point(field: str, place: Sequence[float]) -> tuple[float, float]:
     """A place in some data, mm. Raises UsageError for what is not two numbers.
 
@@ -388,26 +361,6 @@ def point(field: str, place: Sequence[float]) -> tuple[float, float]:
             Field(field), f" {quoted(place)}: expected two numbers in mm, such as 5.375, -0.75"
         )
     return numbers[0], numbers[1]
-
-
-def frame_of(
-    given: SceneInput, known: KnownStates, first_station: Place, tip_offset: Place
-) -> tuple[Frame, str]:
-    """The frame of known states, and where it is from: options, else the data, else the spec."""
-    spec = (given.spec and given.spec.data) or DataSpec()
-    said: dict[str, tuple[Place, ...]] = {
-        "first_station": (first_station, known.first_station, spec.first_station_mm),
-        "tip_offset": (tip_offset, known.tip_offset, spec.tip_offset_mm),
-    }
-    points, words = [], []
-    for field, places in said.items():
-        pairs = zip(places, ORIGINS, strict=True)
-        found = [(place, origin) for place, origin in pairs if place is not None]
-        place, origin = found[0] if found else ((0.0, 0.0), "assumed")
-        x, y = point(field, place)
-        points.append((x, y))
-        words.append(f"{field.replace('_', ' ')} {x:g},{y:g} mm ({origin})")
-    return Frame(*points), ", ".join(words)
 
 
 def figure_path(path: str | Path) -> Path:
@@ -425,16 +378,6 @@ def table_path(path: str | Path) -> Path:
     if table.suffix.lower() in NO_TABLE:
         raise UsageError(f"path {path}: writes Parquet, give a name that ends in .parquet")
     return table
-
-
-def check_resampling(bootstrap: int, seed: int) -> None:
-    """Raise UsageError for a number of samples, or a seed, that is none; or of too many samples."""
-    check_whole(bootstrap=bootstrap, seed=seed)
-    for field, value in (("bootstrap", bootstrap), ("seed", seed)):
-        if value is None or value < 0:
-            raise UsageError(Field(field), f" {value}: expected a whole number from 0 on")
-    if bootstrap > MOST_RESAMPLES:
-        raise UsageError(Field("bootstrap"), f" {bootstrap}: expected at most {MOST_RESAMPLES:,}")
 
 
 def check_installed(what: str, package: str) -> None:

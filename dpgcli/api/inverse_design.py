@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,6 +18,7 @@ from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
+from dpgcli.records import dataclass
 from dpgcli.search.columns import body_columns, pressed_columns
 from dpgcli.search.goal import Goal
 from dpgcli.search.search import MOST_CHOICES, Limits, Searched, search

@@ -1,7 +1,6 @@
 """`jaws`: what the states of a gripper bear as jaws between its fingers open and close."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +30,7 @@ from dpgcli.grasping.jaw_table import COLUMNS, PATH_COLUMNS, by_number, jaw_rows
 from dpgcli.grasping.jaws import JawPath, jaw_path
 from dpgcli.grasping.mechanism import STUDY, Branch, Mechanism
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import select
 from dpgcli.text import counted

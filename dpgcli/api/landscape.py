@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import prod
@@ -25,6 +24,7 @@ from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column

@@ -1,7 +1,6 @@
 """`lookup`: what single pulses of all sizes do to a state."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from dpgcli.api.tables import Table
 from dpgcli.api.transitions import pressure_lines
 from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Output
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 from dpgcli.text import counted
 

@@ -3,7 +3,6 @@
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +22,7 @@ from dpgcli.files.row_source import DesignRow, RowSource, opened_rows
 from dpgcli.files.scene_file import checked
 from dpgcli.files.table_writer import write_table
 from dpgcli.files.trust import with_bases
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.sweeps.choice import Question, check_undoubted, question, selected, warnings_of
 from dpgcli.sweeps.gate import counts_of

@@ -3,13 +3,13 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dpgcli.api.inputs import check_numbers, check_texts, check_whole
 from dpgcli.cores import MOST_PROCESSES, cores
 from dpgcli.errors import Field, UsageError
+from dpgcli.records import dataclass
 from dpgcli.text import quoted
 
 if TYPE_CHECKING:

@@ -1,7 +1,6 @@
 """`predict`: the stable states of a finger or gripper."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +23,7 @@ from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
+from dpgcli.records import dataclass
 from dpgcli.states import predict as states
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.plan import Plan, Request

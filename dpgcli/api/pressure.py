@@ -1,7 +1,7 @@
 """Specs under pressure, as the functions that follow it take them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from dpgcli.actuation.pressed import Pressed
@@ -10,6 +10,7 @@ from dpgcli.design.pressure import Pressure
 from dpgcli.errors import UsageError
 from dpgcli.files.scene_file import checked, scene_of, with_files
 from dpgcli.files.scene_file.settings import changed
+from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 
 ONE_LINE: Mapping[str, Any] = {

@@ -1,7 +1,6 @@
 """`pulses`: the pulses of pressure that lead a finger from one state to another."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +27,7 @@ from dpgcli.api.transitions import failed_searches, pressure_lines
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, UsageError
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 from dpgcli.text import counted, enumerated
 

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from dpgcli.design.dimensions import UNITS
 from dpgcli.design.scene import Scene
 from dpgcli.files.scene_file import Spec, scene_of
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.search.columns import body_columns, directions, pressed_columns
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal

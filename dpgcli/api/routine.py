@@ -1,7 +1,6 @@
 """`routine`: pulses that open a gripper, close it on a body that comes, and let it go."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +48,7 @@ from dpgcli.grasping.steps import (
     schedule,
 )
 from dpgcli.mechanics.laws import PushOnly
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.text import counted
 

@@ -1,7 +1,6 @@
 """Manufacturing scatter: what the user says of it, and fingers drawn by it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TypeAlias
 
@@ -15,6 +14,7 @@ from dpgcli.errors import Field, Problem, SpecError, UsageError
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.pressure import NUMBER
 from dpgcli.files.scene_file.tolerances import beyond, share_of
+from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 from dpgcli.text import counted
 

@@ -1,7 +1,6 @@
 """`stress`: stiff and extreme cases beside extended precision."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from dpgcli.api.inputs import (
@@ -22,6 +21,7 @@ from dpgcli.hard_cases import verdicts
 from dpgcli.hard_cases.cases import Case, all_cases, check_families
 from dpgcli.hard_cases.outcomes import Outcome
 from dpgcli.hard_cases.table import STRESS_COLUMNS, FamilySummary, rows, summarized
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import gettempdir
@@ -28,6 +28,7 @@ from dpgcli.files.output import check_not_read, check_outputs, sole_use
 from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.trust import warnings_in
+from dpgcli.records import dataclass
 from dpgcli.reports.summary import DesignSpace, surely_ranked
 from dpgcli.reports.summary import doubts as ranked_doubts
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness

@@ -1,12 +1,12 @@
 """Tables as values: named columns with their units, for pandas and for Arrow."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Columns
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """`transitions`: what first happens to every stable state under pressure, and what is reached."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ from dpgcli.api.tables import Table
 from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import REACHABLE, Column
 from dpgcli.states.patterns import inverted_units, texts

@@ -6,7 +6,7 @@ that have a state. Times are of one warm call in this process.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any
@@ -34,6 +34,7 @@ from dpgcli.hard_cases.cases import check_law
 from dpgcli.hard_cases.variants import repeated
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.columns import Column, Kind

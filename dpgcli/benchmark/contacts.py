@@ -6,7 +6,6 @@ look for a minimum with the body there in full, and one elsewhere is another sta
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,6 +23,7 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.reference.bodies import Body as ExactBody
 from dpgcli.reference.bodies import RoundBody, StraightBody
 from dpgcli.reference.contact import ExtendedContact, extended_contact

@@ -4,13 +4,14 @@ It shares nothing with `mechanics` but the finger's parameters. Shapes are the f
 (B_1x, B_1y, T_1x, T_1y, B_2x, …) in mm.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 
 
 class _Strains(NamedTuple):

@@ -6,7 +6,7 @@ those of the threshold, against the fold in extended precision.
 
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from io import StringIO
 from itertools import pairwise
@@ -20,6 +20,7 @@ from dpgcli.arrays import Array
 from dpgcli.benchmark.network import SpringNetwork
 from dpgcli.benchmark.peers import springable_parts
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reference.folds import extended_fold
 from dpgcli.states.units import UnitSolutions
 

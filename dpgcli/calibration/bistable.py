@@ -5,7 +5,7 @@ are compared as they are, forces as f F(x), since dE/du = f dE/dx.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
@@ -40,6 +40,7 @@ from dpgcli.calibration.snap import snap_pressure
 from dpgcli.errors import FitError
 from dpgcli.mechanics import laws
 from dpgcli.mechanics.curve import FEWEST_POINTS
+from dpgcli.records import dataclass
 
 BISTABLE_LIMIT = (
     1.0 / 9.0

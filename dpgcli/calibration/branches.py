@@ -5,7 +5,7 @@ springs are between those of the two branches, and no record tells where.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +15,7 @@ from dpgcli.calibration.choices import LAW_KEYS, Branches
 from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.record import SMALLEST_SWING, Record
 from dpgcli.errors import Field, FitError, Message
+from dpgcli.records import dataclass
 
 FEWEST_IN_RUN = 4  # points on the way between turns, in the mean: fewer are points in no order
 SMALLEST_SHARE = 0.5  # of the travel: a branch that covers less has no fit of its own

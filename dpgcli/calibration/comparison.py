@@ -1,13 +1,12 @@
 """Predicted states beside known ones: finite elements or measurements, in their own frame."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates, lattice_states
 from dpgcli.errors import Field, Message
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 

@@ -6,7 +6,7 @@ are exact (`states.sensitivities`).
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from dpgcli.calibration.search import Parameter
 from dpgcli.design.coupling import is_bounded
 from dpgcli.errors import Field, FitError, Message
 from dpgcli.mechanics.finger import KEYS, Finger
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import texts
 from dpgcli.states.sensitivities import sensitivities

@@ -13,7 +13,7 @@ from their increments, which are means of two errors times a step (our derivatio
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.losses import influence
 from dpgcli.calibration.search import Function, Parameter, Search
 from dpgcli.errors import FitError
+from dpgcli.records import dataclass
 
 __all__ = ["CONFIDENCE", "Fit", "Loss", "Parameter", "fit", "fit_linear"]
 

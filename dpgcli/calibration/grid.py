@@ -9,7 +9,6 @@ ones have them too, so that a complex step differentiates a law.
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +21,7 @@ from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.calibration.interpolants import Multilinear, ThinPlates
 from dpgcli.design.calibrations import Estimate
 from dpgcli.errors import FitError
+from dpgcli.records import dataclass
 
 HULL_TOLERANCE = 1e-9  # of the ranges: rounding may put the hull's own corners outside it
 CONSTANT = "ln(value at reference)"

@@ -1,7 +1,7 @@
 """The stiffness of a hinge from moments over rotations, and tests of its linearity."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from dpgcli.arrays import Array
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.fits import Fit, Parameter, fit_linear
 from dpgcli.errors import FitError
+from dpgcli.records import dataclass
 
 STIFFNESS = "hinge_stiffness_N_mm_per_rad"
 SIGNIFICANT_ERRORS = 3.0  # standard errors

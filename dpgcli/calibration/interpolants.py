@@ -4,12 +4,12 @@ scipy's interpolators take real places only, and their sums depend on how many t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from dpgcli.arrays import Array, total
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """States that are known from finite elements or tests, and the lattice's own in their frame."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +7,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.settle import settle

@@ -6,13 +6,13 @@ squares, Greene, Econometric Analysis, 2012, section 9.3).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import COMPLEX_STEP, Array, Flags
 from dpgcli.calibration.choices import Target
 from dpgcli.calibration.known import Frame, KnownStates, LatticeStates
+from dpgcli.records import dataclass
 from dpgcli.states.sensitivities import Sensitivities
 
 SMALLEST_ERROR = 0.01  # of a quantity's size: no model is known to be better

@@ -1,11 +1,11 @@
 """How a dome's travel stands for a unit's opening: a mapping that no curve tells."""
 
 import re
-from dataclasses import dataclass
 from typing import Self
 
 from dpgcli.calibration.choices import Rule
 from dpgcli.errors import Field, UsageError
+from dpgcli.records import dataclass
 
 
 def parse_number(text: str) -> float | None:

@@ -7,13 +7,14 @@ All thresholds are ours; messages give the numbers behind a judgment.
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.errors import Field, FitError, Message
+from dpgcli.records import dataclass
 
 LARGEST_STEP = 0.15  # of the largest travel: nothing is known within a larger step
 NEAR_WELL = 0.05  # of the largest travel: how far around a well its shape counts

@@ -1,7 +1,7 @@
 """The search for the values at which residuals are smallest, within bounds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -10,6 +10,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.losses import TUNING, growth
 from dpgcli.errors import FitError
+from dpgcli.records import dataclass
 
 NEAR_BOUND = 1e-3  # of a parameter's size: closer than this, the bound itself is tried
 SMALLEST_SINGULAR_VALUE = (

@@ -3,9 +3,10 @@
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
+
+from dpgcli.records import dataclass
 
 # What no spelling brings past Make: characters, places where more of them have a meaning (users'
 # homes, libraries, special targets, grouped targets, members of archives), patterns of both kinds.

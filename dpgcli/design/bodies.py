@@ -3,7 +3,7 @@
 Of a batch of designs centers are (2, design), sizes (design,) and corners (2, corner, design).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.loads import GRAVITY
 from dpgcli.mechanics.aperture import ForceCurve
+from dpgcli.records import dataclass
 
 DIAMETER, GAP, HEIGHT = "disc.diameter_mm", "jaws.gap_mm", "jaws.height_mm"
 COMPLIANCE = "compliance.stiffness_N_per_mm"

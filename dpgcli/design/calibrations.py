@@ -1,10 +1,11 @@
 """Calibrations as values: numbers for one geometry, a scaling law over several, a dome's curve."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple, Protocol
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.records import dataclass
 
 PUBLISHED = "published"
 FINITE_ELEMENTS = "finite_elements"

@@ -6,7 +6,7 @@ takes stays far from overflow; the linear stiffness, a stiff limit, may reach 1e
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from dpgcli.design.geometry import chamber_width
 from dpgcli.design.loads import FORCES, MASS, MOMENT, GivenLoads
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.scene import Held
+from dpgcli.records import dataclass
 from dpgcli.text import KeyPath, dotted
 
 UNITS = "finger.units"

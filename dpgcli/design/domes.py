@@ -1,6 +1,6 @@
 """Which law the domes of a design follow, and the curve behind it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +17,7 @@ from dpgcli.design.rules import (
 )
 from dpgcli.mechanics.curve import AT_REST, FEWEST_POINTS, bridged, spline
 from dpgcli.mechanics.laws import PUBLISHED, DomeLaw, PushOnly, Tabulated
+from dpgcli.records import dataclass
 
 WHERE = ("finger", "law")
 HINT = "dpg fit bistable writes one"

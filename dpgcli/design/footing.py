@@ -1,7 +1,7 @@
 """What the lattice values of a design rest on, key by key, and which designs differ in that."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from dpgcli.design.problems import of_design
 from dpgcli.design.rules import BISTABLE_STIFFNESS, SEGMENT_HEIGHT, Value
 from dpgcli.design.scene import ORIGINS, Origin
 from dpgcli.mechanics.finger import KEYS, STUDY
+from dpgcli.records import dataclass
 
 ELSEWHERE = " (at the study's dimensions)"
 MOVED = (Origin.SCALED, Origin.EXTRAPOLATED)

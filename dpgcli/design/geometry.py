@@ -9,13 +9,13 @@ Dimensions are numbers or arrays that broadcast. The rules take complex ones too
 step differentiates them.
 """
 
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.scene import ORIGINS, Origin
+from dpgcli.records import dataclass
 
 Size = TypeVar("Size", float, Array)  # or complex ones
 

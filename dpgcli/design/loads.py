@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.design.problems import Issue, Problems, number, of_design
+from dpgcli.records import dataclass
 from dpgcli.text import KeyPath
 
 GRAVITY = 9.80665e-3  # N/g, the standard acceleration of free fall

@@ -5,10 +5,11 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from enum import StrEnum
 from typing import Any
 
+from dpgcli.records import dataclass
 from dpgcli.text import enumerated
 
 

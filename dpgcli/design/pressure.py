@@ -1,12 +1,13 @@
 """Pressure on a finger: its lines, how large domes are to it, and a history where one is given."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.curve import Spline
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

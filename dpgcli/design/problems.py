@@ -1,7 +1,7 @@
 """Problems of designs: masks of those that have one, and words, made only if asked for."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Flags
 from dpgcli.errors import Problem
+from dpgcli.records import dataclass
 from dpgcli.text import KeyPath, dotted
 
 

@@ -1,7 +1,7 @@
 """From designs to lattices: values unit by unit, their sources, and what is wrong, in one pass."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -55,6 +55,7 @@ from dpgcli.design.uncertainty import Share, tolerance_issues, tolerance_steps, 
 from dpgcli.design.values import value_of
 from dpgcli.design.volumes import swept_shape
 from dpgcli.mechanics.finger import KEYS, LOADS, Finger
+from dpgcli.records import dataclass
 from dpgcli.text import KeyPath
 
 NEARLY_RIGID = 1.0e4  # N/mm; the study names no number

@@ -4,7 +4,6 @@ Rules that the geometry yields are the study's, ours or from finite elements; se
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from dpgcli.design.dimensions import (
 )
 from dpgcli.design.problems import Issue, Problems, number, of_design
 from dpgcli.design.scene import ORIGINS, Origin
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

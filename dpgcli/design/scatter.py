@@ -6,7 +6,7 @@ bars. A key's draws depend on the seed and the key alone.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.design.snap_pressures import SNAP, SNAP_PRESSURE
 from dpgcli.design.uncertainty import tolerance_issues
 from dpgcli.mechanics.finger import KEYS, Finger
+from dpgcli.records import dataclass
 
 OF_UNITS = (  # in this order, which is that of their streams of random numbers: append only
     "dome_height_mm",

@@ -1,7 +1,6 @@
 """A scene: the finger or gripper of a spec in the model's terms; origins of its numbers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -12,6 +11,7 @@ from dpgcli.design.loads import DOWN
 from dpgcli.design.outputs import Trust
 from dpgcli.design.pressure import Pressure
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 
 
 class Origin(StrEnum):

@@ -8,11 +8,10 @@ needs none. One singular matrix spoils its own lane only, and nobody is warned o
 signs of its pivots tell.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.records import dataclass
 
 WIDE, SMALL = 8, 2**14  # of bands: depth; numbers in a column of all lanes
 

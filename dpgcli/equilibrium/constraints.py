@@ -13,7 +13,7 @@ Two ways, for the same minima:
 So constraints are terms beside others, a measure under a law, and paths know nothing of them.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Generic, Self
 
@@ -32,6 +32,7 @@ from dpgcli.equilibrium.contracts import (
     WideMeasured,
     take_lanes,
 )
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

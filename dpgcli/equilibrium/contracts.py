@@ -7,7 +7,6 @@ need is no term, rather than one that is multiplied by zero.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, Self, TypeVar, cast
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.records import dataclass
 
 Pair = tuple[int, int]
 LaneArray = TypeVar("LaneArray", bound=NDArray[Any])

@@ -5,7 +5,7 @@ rows of a measure keep their stride. What the systems share, such as a contact, 
 """
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Generic, Self, cast
 
@@ -21,6 +21,7 @@ from dpgcli.equilibrium.contracts import (
     WideMeasure,
     WideMeasured,
 )
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ What a path of equilibria needs beside gradient and Hessian is ∂g/∂λ, and s
 followed where the load turns back: those of the measure.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
@@ -25,6 +25,7 @@ from dpgcli.equilibrium.contracts import (
     take_lanes,
 )
 from dpgcli.equilibrium.potential import Potential, add, assemble, widely
+from dpgcli.records import dataclass
 
 Law = TypeVar("Law", bound="LoadedLaw", covariant=True)
 

@@ -6,7 +6,7 @@ Wright, Numerical Optimization, 2nd ed., 2006, sections 3.1 and 3.4). Lanes do n
 other: a lane's result is the same, bit for bit, in any batch.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import Factorization, backward, factorize, forward, in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.potential import Evaluation, Potential
+from dpgcli.records import dataclass
 
 SUFFICIENT_DECREASE = 1e-4  # Nocedal and Wright (2006), page 33
 SMALLEST_FRACTION = 2.0**-40  # of a step; below it a lane has stalled

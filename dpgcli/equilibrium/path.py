@@ -9,7 +9,7 @@ of the fold by ½ τ dλ/dτ, up to terms of order τ³.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from dpgcli.equilibrium.banded import in_lanes
 from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, Ways, corrected, motion_by, slope_by
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along
+from dpgcli.records import dataclass
 
 LARGEST_STEP = 0.1  # of a cell's scale
 GROWTH, SHRINKING = 2.0, 0.35

@@ -1,6 +1,5 @@
 """The potential: coordinates and the terms handed to it, assembled into gradient and Hessian."""
 
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Generic
 
@@ -15,6 +14,7 @@ from dpgcli.equilibrium.contracts import (
     Term,
     WideMeasured,
 )
+from dpgcli.records import dataclass
 
 RowsOfCells = tuple[tuple[tuple[Row, ...], int], ...]  # rows and number of cells of each measure
 

@@ -6,7 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +34,7 @@ from dpgcli.files.layout import (
 )
 from dpgcli.files.places import Location, few, in_order, located, shown
 from dpgcli.files.units import are_alike, is_same, name_and_unit, stem_and_unit
+from dpgcli.records import dataclass
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,11 +2,11 @@
 
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from dpgcli.files.layout import SheetRow, has_numbers, header_in, is_number, is_of_units
 from dpgcli.files.unit_words import are_units, together, unit_in
 from dpgcli.files.units import bare, name_and_unit
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ and put titles above the header and units below it.
 import csv
 import re
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 from dpgcli.errors import Problem
 from dpgcli.files.places import MOST_ALIKE, Location, located
 from dpgcli.files.unit_words import are_units
 from dpgcli.files.units import is_unit, name_and_unit
+from dpgcli.records import dataclass
 
 COMMENT = re.compile(r"#+\s|#$")
 SEPARATORS = (",", ";", "\t", "|", "  ", " ")  # a pair of blanks stands for two or more

@@ -1,7 +1,6 @@
 """Curves of domes and hinges and tables of geometries, read with units in column names."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from dpgcli.files.plausible import other_scales, other_springs, wrong_signs
 from dpgcli.files.sections import Geometry, expected_of
 from dpgcli.files.units import factor_of
 from dpgcli.files.yaml_file import MAX_NODES
+from dpgcli.records import dataclass
 
 TRAVELS = ("pole_travel_mm", "travel_mm")
 QUANTITIES = {"energy_mJ": "energy", "force_N": "force", "pressure_MPa": "pressure"}

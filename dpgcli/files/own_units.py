@@ -1,13 +1,13 @@
 """Columns of a table in our units, whatever units the file or its reader says they are in."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from dpgcli.arrays import Array
 from dpgcli.errors import Field, Message, Problem, SpecError, UsageError
 from dpgcli.files.csv_file import Choice, Sheet
 from dpgcli.files.places import in_order
 from dpgcli.files.units import OWN, asked_for, factor_of, listed, units_in
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -27,6 +26,7 @@ from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.trust import TRUST, WARNINGS
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.temporary import drop_orphans, temporary_file
 

@@ -3,9 +3,9 @@
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from dpgcli.errors import Problem
+from dpgcli.records import dataclass
 from dpgcli.text import MAX_SHOWN, shortened
 
 MOST_ALIKE = 100  # problems of one kind: each takes a hundred times the room of its cell

@@ -6,7 +6,6 @@ A table of states may be larger than memory: no more of it is read than a questi
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -37,6 +36,7 @@ from dpgcli.files.table_reader import (
 )
 from dpgcli.files.trust import outputs_of
 from dpgcli.files.yaml_file import Document
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 from dpgcli.sweeps.evaluation import VALUE_OF
 from dpgcli.text import printable

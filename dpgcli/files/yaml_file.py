@@ -5,7 +5,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from ruamel.yaml.reader import ReaderError
 from dpgcli.errors import Field, Problem, SpecError
 from dpgcli.files.content import MAX_BYTES, bounded, content_of, decoded
 from dpgcli.files.places import Location, in_order, located, shown
+from dpgcli.records import dataclass
 from dpgcli.text import MAX_SHOWN, KeyPath, dotted, shortened
 
 MAX_NODES = 10_000

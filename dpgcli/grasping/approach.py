@@ -5,7 +5,7 @@ unit resets (or snaps), exactly at the fold, and the finger goes downhill with t
 there; then the body goes on.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -17,6 +17,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished, relaxed
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.ties import tied
+from dpgcli.records import dataclass
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
 SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that no path leads over

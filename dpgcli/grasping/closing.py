@@ -4,7 +4,7 @@ Domes snap and reset at folds, as without a body, but those of the finger with i
 begin and end on the way.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.shapes import ContactShapes, Ramp
 from dpgcli.mechanics.pressure import DomeVolumes
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ it does not, fingers know nothing of each other, and each is a scene by itself.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,7 @@ from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.mechanics.sticking import Sticking
 from dpgcli.mechanics.terms import DeadLoad, Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 
 ROUNDING = 1e-13  # of the forces in play: a smaller push is none

@@ -1,7 +1,6 @@
 """What grasps will take, before the work: time and memory, to a factor of two or three."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,6 +8,7 @@ from dpgcli.design.bodies import Body, Disc, Jaws, Polygon, gives_way
 from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.grasp import BLOCK, LANE
+from dpgcli.records import dataclass
 
 # Measured on one core of a 2020s server, in seconds, times the square of the number of units.
 STATE_SECONDS = {Way.PLACE: 1.5e-4, Way.CLOSE: 1.5e-4, Way.INSERT: 7.5e-4}

@@ -1,7 +1,7 @@
 """What a finger, or a gripper's two, do with a body in their way."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -25,6 +25,7 @@ from dpgcli.mechanics.mirror import Axis
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status, certified, certify
 from dpgcli.states.patterns import codes_of, inverted_units

@@ -7,7 +7,7 @@ slope by the aperture is that of the path.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +24,7 @@ from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import described, placed
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
 

@@ -5,14 +5,13 @@ to where a first unit resets. One measured force gives k, for a rest aperture a_
 then the others are predictions.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from dpgcli.arrays import Array
 from dpgcli.grasping.jaws import JawPath
+from dpgcli.records import dataclass
 
 STUDY = {"11100": 0.91, "11111": 1.28}  # N, measured on a two-bar mechanism of unknown sizes
 

@@ -7,7 +7,7 @@ threshold bounds is tried once more, with its peak midway up to where pressures 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from dpgcli.actuation.pulses import Pulse, routes
 from dpgcli.arrays import Codes
 from dpgcli.grasping.clearance import Clearance
 from dpgcli.grasping.stages import Task, free, way
+from dpgcli.records import dataclass
 
 MOST_PLANS = 256
 

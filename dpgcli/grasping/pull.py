@@ -7,7 +7,7 @@ its fingers as they give way, and does not turn.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from dpgcli.grasping.payload import Contacts, payloads
 from dpgcli.grasping.release import LANES, WAYS, motion_of, opened_by, released, together
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.sticking import Sticking
+from dpgcli.records import dataclass
 
 SLIP, RESET, NONE = "slip", "reset", "none"
 

@@ -7,7 +7,7 @@ all thresholds, then that of the largest payload, or squeeze where nothing is kn
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -29,6 +29,7 @@ from dpgcli.grasping.stages import (
     way,
 )
 from dpgcli.grasping.table import Grasps, grasp_rows
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 
 

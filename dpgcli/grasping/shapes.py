@@ -1,7 +1,6 @@
 """Shapes of fingers against bodies, how bodies may move, and pressures that change."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,6 +8,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
 from dpgcli.mechanics.aperture import KeptApart, Softening
 from dpgcli.mechanics.pressure import DomeVolumes
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

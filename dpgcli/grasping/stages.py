@@ -5,7 +5,7 @@ place. What is told of each stage is a `Grasps`, a row for each lane.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -27,6 +27,7 @@ from dpgcli.grasping.release import let_go, motion_of, moved_by
 from dpgcli.grasping.shapes import ContactShapes, Ramp
 from dpgcli.grasping.table import Grasps
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 
 AWAY = 1e4  # times the length of a finger: out of everybody's way

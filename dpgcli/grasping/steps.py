@@ -1,7 +1,7 @@
 """A routine step by step: one gripper followed through its plan, or as far as it goes."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from dpgcli.grasping.routine import (
 )
 from dpgcli.grasping.stages import Parts, Task, beside, free, kept, lifted, pulsed, way
 from dpgcli.grasping.table import Grasps, grasp_rows
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 
 PRESSURES, FORCES, SHAPES = (Output.PRESSURES,), (Output.FORCES,), (Output.SHAPES,)

@@ -1,7 +1,7 @@
 """Grasps as a table: a row for each state of a finger, or for each pair of states of a gripper."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import shapely
@@ -20,6 +20,7 @@ from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.gripper import place_in_gripper

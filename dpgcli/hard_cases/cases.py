@@ -5,7 +5,6 @@ each variant, by both formulations where bars are elastic.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,6 +15,7 @@ from dpgcli.hard_cases.families import FAMILIES, PATTERNS
 from dpgcli.hard_cases.variants import Family, Start, Variant, few_patterns
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import Published
+from dpgcli.records import dataclass
 from dpgcli.states.plan import FORMULATIONS
 
 BUILT_IN, GIVEN = "built-in", "spec"

@@ -1,12 +1,12 @@
 """Answers to hard cases, and what they are worth."""
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.hard_cases.cases import Case
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 
 

@@ -1,12 +1,12 @@
 """Results of the hard cases: a table row for every case, a summary for every family."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Columns
 from dpgcli.hard_cases.outcomes import Outcome, Verdict
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 from dpgcli.states.patterns import texts
 

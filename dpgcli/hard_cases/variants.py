@@ -1,13 +1,13 @@
 """Variants of a finger among the hard cases, and what families make them of."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reference.bodies import Body
 
 LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow

@@ -1,6 +1,5 @@
 """A force between two plates by their aperture, from points: what keeps jaws apart."""
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Self
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import Response, take_lanes
+from dpgcli.records import dataclass
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

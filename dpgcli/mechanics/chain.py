@@ -7,7 +7,7 @@ angles open the dome side. Stiff bars sit on the diagonal of the Hessian, which 
 keeps its digits at any k_L (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from dpgcli.mechanics.chain_geometry import Cell, Pose, cells, internal, pose_of
 from dpgcli.mechanics.chain_measures import ELASTIC, RIGID, Opening, Position, own
 from dpgcli.mechanics.coordinates import CellShape, Internal, Springs, Stations, impossible
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The measures of a finger's energies in internal coordinates."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Self
@@ -11,6 +11,7 @@ from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.contracts import Measured, Outer, OwnCoordinate, Pair, Row, take_lanes
 from dpgcli.mechanics.chain_geometry import cells, internal, pose_of
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 
 RIGID, ELASTIC = ("a", "b"), ("e", "a", "b", "s")
 FROM_BASE = ("a", "e", "b", "s")  # what each of them moves lies beyond it

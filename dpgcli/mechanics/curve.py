@@ -1,13 +1,13 @@
 """A dimensionless energy over a dimensionless travel, twice continuously differentiable."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.records import dataclass
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

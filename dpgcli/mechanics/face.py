@@ -17,7 +17,7 @@ before q along the chain ∂²F/∂p ∂q = R ∂F/∂q if p is a corner, and 0 
 derivation).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, cached_property
 from typing import NamedTuple, Self
 
@@ -27,6 +27,7 @@ from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.chain_geometry import internal, pose_of
 from dpgcli.mechanics.coordinates import FingerCoordinates
+from dpgcli.records import dataclass
 
 
 class FaceShape(NamedTuple):

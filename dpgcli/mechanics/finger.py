@@ -1,7 +1,7 @@
 """The finger as the model sees it: lattice dimensions and spring constants."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.contracts import Response, take_lanes
 from dpgcli.mechanics.laws import HELD, PUBLISHED, Dome, DomeLaw
+from dpgcli.records import dataclass
 
 ARRAYS = (
     "segment_length",

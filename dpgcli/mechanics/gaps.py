@@ -13,7 +13,7 @@ corner w is 0, m points from it to c, and ∇²g = τ τᵀ/g (our derivation).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -24,6 +24,7 @@ from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.plates import PlateGaps, plate_gaps
+from dpgcli.records import dataclass
 
 FAR = 1e9  # mm: of a gap that is another one's
 LEVEL = 1e-4  # of the last side: what is so near to level with the finger's end

@@ -9,7 +9,6 @@ Positions in doubles resolve a stiff bar's force only down to about k_L ε times
 length (`Lattice.rounding_floor`); `mechanics.chain` has no such floor.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +29,7 @@ from dpgcli.mechanics.lattice_geometry import (
     vectors,
 )
 from dpgcli.mechanics.lattice_measures import Center, Corner, Extension
+from dpgcli.records import dataclass
 
 FINEST_TOLERANCE = 1e-12  # the relative residual that `Lattice.gradient_scale` keeps in reach
 ROUNDING_STEPS = 2.0  # of k_L ε (finger's length); see `Lattice.rounding_floor`

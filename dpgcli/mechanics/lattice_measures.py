@@ -4,7 +4,7 @@ Every measure is a function of vectors between nodes: derivatives are taken by t
 spread over the nodes whose differences they are (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Self
 
@@ -13,6 +13,7 @@ import numpy as np
 from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import Measured, Outer, Row, take_lanes
 from dpgcli.mechanics.lattice_geometry import Vectors, corners, dot, extension, left, vectors
+from dpgcli.records import dataclass
 
 BASE_BEFORE, TOP_BEFORE, BASE, TOP = -4, -2, 0, 2  # rows of x, counted from B_i's
 ENDS = {

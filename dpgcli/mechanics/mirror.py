@@ -6,7 +6,7 @@ points that move. A point c = S F is the mirror image of the other finger's node
 that beside what `gaps` says, ∇g has S m and τ has S t at F (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, Self
 
@@ -26,6 +26,7 @@ from dpgcli.mechanics.gaps import (
     slipping,
     turns_of,
 )
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ It takes corners in any coordinates. A product has ∇q = θ' ∇θ + θ ∇θ' 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.contracts import Measure, Measured, Pair, Row
+from dpgcli.records import dataclass
 
 
 class _Turns(NamedTuple):

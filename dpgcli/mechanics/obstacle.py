@@ -1,6 +1,6 @@
 """A body in the way of a finger: points with radii, and straight plates between them."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Self
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
+from dpgcli.records import dataclass
 
 STRAIGHT = 1e-12  # the sine of the turn in the middle of a straight side
 

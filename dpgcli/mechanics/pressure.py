@@ -5,7 +5,6 @@ at contact, has swept V = A D v(u/D), with D the travel of the inverted dome. Th
 A (mm²) is that of v' = 1; without a shape v the volume is A u.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple, Self
@@ -16,6 +15,7 @@ from dpgcli.arrays import Array, Indices
 from dpgcli.equilibrium.contracts import Response, take_lanes
 from dpgcli.mechanics.curve import Spline, spline_pieces
 from dpgcli.mechanics.laws import Dome
+from dpgcli.records import dataclass
 
 
 class Swept(NamedTuple):

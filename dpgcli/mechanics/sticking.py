@@ -4,7 +4,7 @@ A place F = (1 − s) F_k + s F_{k+1} of a side, s as it was, has moved by e · 
 where it was, P: linear in the nodes of the face.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -14,6 +14,7 @@ from dpgcli.arrays import Array, Indices, total
 from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
 from dpgcli.mechanics.gaps import FaceGaps, nearest
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

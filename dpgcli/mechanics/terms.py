@@ -1,7 +1,6 @@
 """A finger's energy as terms, measure × law, in either system of coordinates."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,6 +15,7 @@ from dpgcli.mechanics.finger import GRAVITY, Finger
 from dpgcli.mechanics.lattice import Lattice
 from dpgcli.mechanics.neighbors import NeighborTurns
 from dpgcli.mechanics.walls import Walled
+from dpgcli.records import dataclass
 
 Formulate = Callable[[Finger], FingerPotential]
 LOAD = "load"  # the kind of the terms of dead loads

@@ -9,7 +9,7 @@ Any system of coordinates takes walls: v comes first among the coordinates of it
 measures of the others only see their rows moved.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -26,6 +26,7 @@ from dpgcli.equilibrium.contracts import (
 )
 from dpgcli.mechanics.coordinates import FingerCoordinates, Internal, Springs, Stations
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,13 @@ with the side that these are furthest in front of; nothing else of two polygons 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from dpgcli.records import dataclass
 from dpgcli.reference.energy import Vector, cross, measured
 from dpgcli.reference.equilibria import extended
 

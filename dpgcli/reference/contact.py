@@ -7,13 +7,13 @@ The set is right where no contact pulls and no other place is penetrated.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reference.bodies import Body, ExactBody, Place, StraightBody, exact
 from dpgcli.reference.energy import Expansion
 from dpgcli.reference.equilibria import (

@@ -8,7 +8,6 @@ b = ∠c + π/2 − ∠q, its hinge turns by θ = a + b = ∠p − ∠q. Neighbo
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.records import dataclass
 from dpgcli.reference.units import Unit
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ Newton's method on the energy of `reference.energy`, with a factorization of its
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from math import ceil, log10
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reference.energy import (
     ElasticBars,
     Expansion,

@@ -4,7 +4,7 @@ Along the path of equilibria one unknown q is held, and the load λ follows from
 fold dλ/dq is zero, which the secant method finds (our derivation).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.reference.energy import ElasticBars, cells, corners
 from dpgcli.reference.equilibria import (
     Energy,

@@ -1,7 +1,6 @@
 """A finger under pressure: pressure against tip with all that happened, shapes at the holds."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
 from pathlib import Path
@@ -16,6 +15,7 @@ from dpgcli.arrays import Array, Indices
 from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.coordinates import Stations
+from dpgcli.records import dataclass
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.fingers import draw_finger, set_window, signed
 from dpgcli.reports.outlines import DrawnState, Profile, finger_shape

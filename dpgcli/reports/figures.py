@@ -1,13 +1,14 @@
 """Figures of states: a panel for each, all at one scale, or all in one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from dpgcli.records import dataclass
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.fingers import (
     MEASURE,

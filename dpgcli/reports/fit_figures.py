@@ -1,6 +1,6 @@
 """Figures of fits: the data with the fitted law, the residuals below."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from dpgcli.calibration.fits import Fit
 from dpgcli.calibration.hinge import HingeFit
 from dpgcli.calibration.known import Frame, lattice_states
 from dpgcli.files.measured import Moments
+from dpgcli.records import dataclass
 from dpgcli.reports.drawing import figure_to, titled
 
 

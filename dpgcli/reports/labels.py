@@ -1,12 +1,12 @@
 """A picture at one scale with labels on its right, which neither hide it nor each other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.records import dataclass
 from dpgcli.reports.fingers import set_window
 from dpgcli.reports.outlines import Points
 from dpgcli.reports.panels import NARROWEST, Window

@@ -8,7 +8,7 @@ proportions.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from dpgcli.design.bodies import Body, Disc
 from dpgcli.design.geometry import REFERENCE
 from dpgcli.design.scene import Chambers, Scene
 from dpgcli.mechanics.finger import STUDY
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.predict import Prediction
 

@@ -1,12 +1,12 @@
 """All states of a finger in one picture: their limiting layers, each with its pattern."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from dpgcli.records import dataclass
 from dpgcli.reports.fingers import NOTE_SIZE, WORD, draw_backdrop, signed
 from dpgcli.reports.labels import Picture
 from dpgcli.reports.outlines import DrawnState

@@ -1,12 +1,12 @@
 """Where panels are on a page, and what each shows: one window at one scale for all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil, inf, log
 
 import numpy as np
 
 from dpgcli.arrays import Array
+from dpgcli.records import dataclass
 from dpgcli.reports.outlines import DrawnState, Points
 
 LENGTHS = {"m": 1e3, "mm": 1.0, "µm": 1e-3, "nm": 1e-6}  # in mm

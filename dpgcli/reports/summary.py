@@ -6,7 +6,7 @@ Same table, same sections: what differs between runs is in run.json alone.
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from dpgcli.design.dimensions import LINEAR_STIFFNESS
 from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Origin
 from dpgcli.files.trust import trusts_in, warnings_in
+from dpgcli.records import dataclass
 from dpgcli.reports.base import bar_stiffness, base_lines
 from dpgcli.sweeps.gate import failed_searches, ranking_doubts, swept_names
 

@@ -7,7 +7,6 @@ dents included (Miettinen, Nonlinear Multiobjective Optimization, 1999, section 
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.search.lockstep import Ask, in_lockstep
 
 ROOM = 1e-6  # of its size, by which a margin is kept above zero: rounding must not break a rule

@@ -10,12 +10,12 @@ and each of its evaluations costs as much as one of all starts here.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.records import dataclass
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e9
 LOWERED, RAISED = 0.1, 4.0  # factors of λ

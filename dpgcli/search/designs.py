@@ -1,13 +1,14 @@
 """Designs that a search has come to, and which of them are the best."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.search.descent import Residuals, held
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import MapEvaluation

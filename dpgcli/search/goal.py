@@ -1,7 +1,7 @@
 """What designs are searched for: what may vary, and what states should be like."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise, product
 from math import prod
@@ -10,6 +10,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.dimensions import Design
+from dpgcli.records import dataclass
 from dpgcli.sweeps.expressions import Expression
 
 TIP = "tip"

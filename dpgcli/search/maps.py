@@ -5,7 +5,7 @@ differences, all in one batch: extremes of maps have no others where two states 
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.dimensions import Design, unit_of
+from dpgcli.records import dataclass
 from dpgcli.search.columns import evaluation_of
 from dpgcli.search.goal import Goal, Range
 from dpgcli.states.columns import Column, Group, Kind

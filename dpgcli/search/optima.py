@@ -1,12 +1,12 @@
 """From points that a search has come to, on to optima under constraints, choice by choice."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.records import dataclass
 from dpgcli.search.constrained import Local, Scalar, descend_within, last_that_hold, simplex
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal

@@ -1,13 +1,14 @@
 """One part of a search: from starts for some choices of listed values to where they lead."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from time import time
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dpgcli.arrays import Array, Columns, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.search.descent import Descent, Residuals, Step, descend
 from dpgcli.search.designs import Designs, best_of
 from dpgcli.search.goal import Goal

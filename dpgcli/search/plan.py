@@ -1,9 +1,9 @@
 """What a search will do, before any of it is done."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from dpgcli.design.outputs import Trust
+from dpgcli.records import dataclass
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import COUNTS, MapEvaluation
 from dpgcli.search.search import MOST_CHOICES, STARTS

@@ -6,13 +6,14 @@ there is a population for each alone, and one for all of them. What it finds is 
 begin: slopes do the rest.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
 from dpgcli.arrays import Array, Columns, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import MapEvaluation

@@ -5,12 +5,12 @@ it is cut depends on the goal and the limits alone, so that who does what change
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from time import time
 
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
+from dpgcli.records import dataclass
 from dpgcli.search.designs import Designs, best_of
 from dpgcli.search.goal import Goal
 from dpgcli.search.part import Clock, Found, Part, searched_part

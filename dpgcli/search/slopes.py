@@ -6,7 +6,7 @@ listed here have no exact slope.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -15,6 +15,7 @@ from dpgcli.arrays import COMPLEX_STEP, Array, Indices, total
 from dpgcli.design.dimensions import Design, Sizes
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import Gripper, Scene, Step
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 from dpgcli.states.sensitivities import Sensitivities, sensitivities
 from dpgcli.states.tip import tip

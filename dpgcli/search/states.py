@@ -5,7 +5,6 @@ body as `grasp`, under pressure as `transitions`.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from dpgcli.design.dimensions import Design
 from dpgcli.design.resolve import resolve
 from dpgcli.design.scene import Scene
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.search.columns import KINDS, Direction, body_columns, directions
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Status

@@ -1,13 +1,13 @@
 """Tables of a search: the designs found, and the steps of every search."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.dimensions import UNITS, unit_of
+from dpgcli.records import dataclass
 from dpgcli.search.columns import plain, renamed
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal, Target, suffix_of

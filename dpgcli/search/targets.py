@@ -1,7 +1,6 @@
 """Targets of many designs at once: how far each is missed, and how that changes with the keys."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from dpgcli.design.dimensions import UNITS, Design
 from dpgcli.design.resolve import resolve
 from dpgcli.errors import NothingSelectedError
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.search.columns import (
     STEPWISE,
     body_columns,

@@ -1,11 +1,11 @@
 """What a design does not meet and why: bounds in the way, and wishes that contradict."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
+from dpgcli.records import dataclass
 from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import COUNTS, MapEvaluation

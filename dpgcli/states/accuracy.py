@@ -13,7 +13,6 @@ second well, that a single unit does not show what the finger does, there is no 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +21,7 @@ from dpgcli.arrays import Array, Indices, distinct
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.guess import without_first
 from dpgcli.states.rigid_unit import single_units
 from dpgcli.states.tip import TIP_ROUNDING

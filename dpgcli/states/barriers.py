@@ -1,6 +1,5 @@
 """Barriers of states: the energy that each unit needs to flip, and which unit needs least."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices, distinct
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 from dpgcli.states.flips import Flips
 from dpgcli.states.patterns import codes_of, inverted_units

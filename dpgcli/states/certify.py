@@ -1,6 +1,6 @@
 """Whether an equilibrium is a stable state of its pattern: residual, curvature, wells, shape."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -10,6 +10,7 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.equilibrium.newton import Equilibrium
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.crossing import crosses_itself, outline
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import Wells

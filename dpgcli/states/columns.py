@@ -1,9 +1,10 @@
 """The columns of tables: name, unit, meaning, type."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from dpgcli.design.outputs import Output
+from dpgcli.records import dataclass
 
 
 class Kind(StrEnum):

@@ -6,13 +6,13 @@ derivation: a bend of radius R = L/φ meets itself after 2πR, and later if it t
 2π, since it then needs straight legs). Shorter fingers are not looked at.
 """
 
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Stations
+from dpgcli.records import dataclass
 
 FULL_TURN = 2.0 * np.pi
 FEWEST_APART = 2  # cells that share no station

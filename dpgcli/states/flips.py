@@ -1,6 +1,6 @@
 """Single units that flip, and the way of a dome that is held at any place between two states."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -12,6 +12,7 @@ from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 from dpgcli.states.scan import pulls
 from dpgcli.states.settle import settle, settle_from

@@ -1,6 +1,6 @@
 """Starting shapes of searches: units in their own wells, or opened by strokes."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.coordinates import Internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.rigid_unit import single_units, tangent_of
 from dpgcli.states.wells import ByUnit, Wells
 

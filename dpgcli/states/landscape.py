@@ -1,13 +1,13 @@
 """The energy along a way from state to state, over the saddles between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.barriers import Barriers, barriers
 from dpgcli.states.certify import Settled
 from dpgcli.states.flips import Flips, held_path

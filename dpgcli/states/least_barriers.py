@@ -5,11 +5,10 @@ add up to the least. Barriers within `barriers.TIE` are taken as equal, so that 
 nothing: of ways as good the one whose first units come first is taken, and their number is told.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, distinct
+from dpgcli.records import dataclass
 from dpgcli.states.barriers import TIE
 
 LEVELS = 2.0**40  # whole numbers, so that sums are exact

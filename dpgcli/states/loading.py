@@ -1,6 +1,5 @@
 """Fingers as their dead loads grow: followed from the unloaded state, through units that flip."""
 
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -12,6 +11,7 @@ from dpgcli.equilibrium.newton import minimize
 from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.terms import LOAD, Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 
 SHORT_STEP = 0.25  # of a step, where curves bend often: no fold is stepped over

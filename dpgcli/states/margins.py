@@ -8,12 +8,12 @@ that give way, and a dome's own curve, may keep the well at any k_θ or d; α is
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.rigid_unit import single_units
 from dpgcli.states.wells import inverted_wells
 

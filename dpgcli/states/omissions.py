@@ -1,8 +1,7 @@
 """Omissions of a plan, and their reasons."""
 
-from dataclasses import dataclass
-
 from dpgcli.design.scene import Scene
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import Exactness
 from dpgcli.states.pairs.halves import Split
 from dpgcli.states.units import UnitSolutions

@@ -6,7 +6,6 @@ sort as the texts do.
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Self
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Codes, Flags
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
+from dpgcli.records import dataclass
 
 MOST_SELECTED = 2**26  # states of a run
 MOST_COUNTED = np.uint64(2**62)  # so that the sum of two is a number of 64 bits

@@ -1,7 +1,7 @@
 """The plan of a scene, decided once: `explain` prints it, `predict` carries it out."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -12,6 +12,7 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.coordinates import FingerPotential
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import (
     DEFAULT_TOLERANCE,
     AccuracyLevel,

@@ -1,13 +1,14 @@
 """Carry out a plan: every state asked for, certified, as blocks of columns."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from time import perf_counter, process_time
 
 import numpy as np
 
 from dpgcli.arrays import Codes, Columns, Flags, keep_freed_memory
 from dpgcli.design.scene import Scene
+from dpgcli.records import dataclass
 from dpgcli.states.barriers import TIE
 from dpgcli.states.certify import Status
 from dpgcli.states.pairs.compose import paired_states

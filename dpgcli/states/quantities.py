@@ -4,7 +4,7 @@ A quantity is written here and nowhere else: tables, `--columns`, metadata and t
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, cast
 
 import numpy as np
@@ -16,6 +16,7 @@ from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.scene import Uncertainty
 from dpgcli.errors import Field, UsageError
 from dpgcli.mechanics.terms import LOAD
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import texts
 from dpgcli.states.solved import SolvedFingers, SolvedStates

@@ -1,6 +1,5 @@
 """Rows of a table of states: patterns solved, certified and told by the quantities asked for."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Columns, Flags
 from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, rows

@@ -10,7 +10,7 @@ over that top alone, and the finger stands as if the unit were in its ground sta
 push its neighbor on to where the finger's pull and its push balance (our derivation).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -20,6 +20,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.banded import backward
 from dpgcli.equilibrium.newton import Equilibrium, stationary
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled, Status
 from dpgcli.states.flips import Flips, held, held_path
 from dpgcli.states.guess import geometric_guess

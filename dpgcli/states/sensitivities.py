@@ -7,7 +7,7 @@ every value is covered by the one formula that states are solved with.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -19,6 +19,7 @@ from dpgcli.mechanics.chain_geometry import internal
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import Attached, Dome, DomeLaw, Rests
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 
 Direction = Mapping[str, Array]

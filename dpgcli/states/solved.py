@@ -1,6 +1,5 @@
 """Solved states by any method, and further quantities of those solved as whole fingers."""
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.scene import Gripper, Uncertainty
 from dpgcli.mechanics.coordinates import FingerCoordinates, Stations
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.gripper import GripperPose, place_in_gripper
 from dpgcli.states.tip import Tip, min_eigenvalues, tip

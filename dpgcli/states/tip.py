@@ -1,12 +1,11 @@
 """The tip of certified states: pose, numerical error, compliance, smallest eigenvalue."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, total
 from dpgcli.equilibrium.banded import forward
 from dpgcli.equilibrium.newton import Equilibrium
+from dpgcli.records import dataclass
 from dpgcli.states.certify import MARGINAL_CURVATURE, Settled
 
 TIP_ROUNDING = 8.0 * np.finfo(float).eps  # of the finger's length

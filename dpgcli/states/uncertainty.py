@@ -4,13 +4,13 @@ s are the derivatives of tip and aperture by what may be off, C its covariance (
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, total
 from dpgcli.design.scene import MODEL, Gripper, Step, Uncertainty
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 from dpgcli.states.sensitivities import Direction, sensitivities
 

@@ -1,6 +1,5 @@
 """Solutions of single units: wells, barriers and openings, before any pattern is solved."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.crossing import fewest_in_loop
 from dpgcli.states.guess import FirstOrder, first_order
 from dpgcli.states.wells import Wells, inverted_wells

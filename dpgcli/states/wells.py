@@ -7,7 +7,7 @@ barrier and well, and Newton's method from outside reaches each monotonically. r
 is positive. Our derivation; without the hinge the roots are u = [3β ± √(9β² − 8β)]/(4β).
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Self
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.finger import Finger
+from dpgcli.records import dataclass
 from dpgcli.states.rigid_unit import SHORT_OF_LEVER, rigid_unit, tangent_of
 from dpgcli.states.scan import MIDDLE, WIDEST, opened, pulls, scan
 from dpgcli.states.straight import energy_at_rest, straight_rest

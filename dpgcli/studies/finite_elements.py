@@ -7,7 +7,6 @@ import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -18,6 +17,7 @@ from dpgcli.calibration.fe.results import displacements, reported_error, seconds
 from dpgcli.errors import Field, SolverError, UsageError
 from dpgcli.files.access import writing
 from dpgcli.files.output import Mark, is_own, whole_file
+from dpgcli.records import dataclass
 from dpgcli.temporary import temporary_folder
 
 SOLVER = "ccx"

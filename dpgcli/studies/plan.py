@@ -1,13 +1,12 @@
 """The plan of a sweep: what it will come to, before any of it is done."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import Trust
 from dpgcli.errors import UsageError
 from dpgcli.files.sweep_file import Sweep
+from dpgcli.records import dataclass
 from dpgcli.studies.sweep import Study
 from dpgcli.sweeps.executors import chunked
 from dpgcli.sweeps.extent import ASKED_AT_ONCE, MOST_ASKED

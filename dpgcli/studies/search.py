@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +17,7 @@ from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.parts import FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
 from dpgcli.files.scene_file import canonical, canonical_json
 from dpgcli.files.table_writer import versions
+from dpgcli.records import dataclass
 from dpgcli.search.descent import Residuals
 from dpgcli.search.designs import Designs
 from dpgcli.search.part import Found, Part

@@ -6,7 +6,7 @@ import shlex
 import shutil
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
@@ -23,6 +23,7 @@ from dpgcli.files.sweep_file import Sweep
 from dpgcli.files.sweep_file.space import numbers_of
 from dpgcli.files.table_writer import SCHEMA_VERSION, read_metadata, versions, write_table
 from dpgcli.files.trust import trust_metadata, with_bases
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.studies.work import ChunkTask, reason_against
 from dpgcli.sweeps.designs import designs_at_once

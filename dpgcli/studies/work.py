@@ -1,12 +1,12 @@
 """A worker's task: evaluate a chunk of designs, store its part, send back counts."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from time import process_time
 from typing import IO, Any, NamedTuple
 
 from dpgcli.files.parts import PartStore, write_part
+from dpgcli.records import dataclass
 from dpgcli.sweeps.evaluation import DesignEvaluation, Tables
 from dpgcli.sweeps.executors import Chunk
 from dpgcli.sweeps.maker import Maker, check_maker

@@ -1,7 +1,6 @@
 """Rows chosen among those of a table: by conditions, then in an order or on a Pareto front."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, reduce
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import doubts_about
 from dpgcli.errors import Field, Message, UsageError
+from dpgcli.records import dataclass
 from dpgcli.sweeps.expressions import Expression, conjuncts
 from dpgcli.sweeps.fronts import on_front
 from dpgcli.sweeps.gate import (

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import field
 from socket import getaddrinfo
 from threading import Thread
 from time import monotonic, sleep
@@ -13,6 +13,7 @@ from traceback import format_exc
 from typing import Any, ParamSpec, TypeVar
 
 from dpgcli.errors import Field, Message, NoWorkerError, UsageError
+from dpgcli.records import dataclass
 from dpgcli.sweeps.executors import GO_ON, PERIOD, TRIALS, Backend
 
 P = ParamSpec("P")

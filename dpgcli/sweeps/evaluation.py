@@ -1,7 +1,7 @@
 """Designs of a sweep, evaluated chunk by chunk: a pure function that any process can run."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from dpgcli.design.dimensions import UNITS, Design, are_possible, unit_of
 from dpgcli.design.outputs import Trust
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import ORIGINS, Scene
+from dpgcli.records import dataclass
 from dpgcli.states.accuracy import exactnesses
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.quantities import Quantity, declared

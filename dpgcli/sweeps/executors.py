@@ -18,11 +18,12 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from time import monotonic, sleep
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from dpgcli.errors import WorkplaceError
+from dpgcli.records import dataclass
 
 T = TypeVar("T")
 R = TypeVar("R")

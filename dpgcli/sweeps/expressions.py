@@ -9,11 +9,12 @@ import ast
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from dpgcli.records import dataclass
 
 MOST_CHARACTERS = 500
 LARGEST_NUMBER = 1e300  # just below the largest double

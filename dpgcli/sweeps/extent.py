@@ -1,7 +1,6 @@
 """Extent of a sweep before it begins: longest finger, states, time, disk; and its limits."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from dpgcli.design.dimensions import MAX_UNITS, UNITS
 from dpgcli.errors import UsageError
+from dpgcli.records import dataclass
 from dpgcli.states.costs import START_SECONDS, UNIT_STATE_SECONDS
 from dpgcli.states.patterns import MOST_SELECTED
 from dpgcli.sweeps.executors import chunked

@@ -1,7 +1,6 @@
 """Requirements on a table of designs: thresholds that every design has to meet."""
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import compress, product
 
@@ -10,6 +9,7 @@ import numpy as np
 from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
+from dpgcli.records import dataclass
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.metrics import (
     METRICS,

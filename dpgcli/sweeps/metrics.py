@@ -4,7 +4,7 @@ A metric is written here and nowhere else: tables, metadata and the manual follo
 """
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.pressure import Pressure
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions

@@ -1,6 +1,5 @@
 """What pressure does to designs: thresholds of their units, and the states that pulses reach."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from dpgcli.actuation.graph import Reached, reached_from_rest, stable_states
 from dpgcli.actuation.pressed import TIE, Pressed
 from dpgcli.arrays import Array, Indices
 from dpgcli.design.pressure import Pressure
+from dpgcli.records import dataclass
 from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.units import UnitSolutions
 

@@ -1,7 +1,6 @@
 """Parameter spaces: designs as points of a grid of axes, made when they are asked for."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array
+from dpgcli.records import dataclass
 
 DesignValues = Mapping[str, NDArray[Any]]  # by key, one for each design
 SAMPLES_AT_ONCE = 2**16

@@ -1,12 +1,13 @@
 """Tips of designs: those that differ, and the hulls around them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, distinct
+from dpgcli.records import dataclass
 
 TIPS_PER_LENGTH = 10_000  # tips are told apart on a grid of this many steps a finger's length
 CELL_BITS = 21  # for each coordinate of the grid: 100 lengths either way

@@ -7,7 +7,7 @@ import pytest
 from dpgcli.errors import SpecError
 from dpgcli.files import csv_file
 from dpgcli.files.csv_file import read_sheet
-from dpgcli.files.scene_file.histories import read_history
+from dpgcli.files.histories import read_history
 
 MORE = "found something else in more than 100 places"
 

@@ -11,9 +11,9 @@ import pytest
 
 import dpgcli
 from dpgcli.errors import SpecError
+from dpgcli.files.histories import read_history
 from dpgcli.files.known_states import read_states
 from dpgcli.files.measured import read_curve, read_moments, read_table
-from dpgcli.files.scene_file.histories import read_history
 from dpgcli.files.sweep_file import read_sweep
 
 STATES = {"pattern": ["00", "11"], "tip_x_mm": [27.0, 22.0], "tip_y_mm": [0.1, -9.0]}

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dpgcli.api.data import check_resampling, table_choice
 from dpgcli.api.fits.result import (
     FitResult,
     GeometryInput,
@@ -15,17 +16,7 @@ from dpgcli.api.fits.result import (
     sizes,
     warned,
 )
-from dpgcli.api.inputs import (
-    Texts,
-    as_texts,
-    by_text,
-    check_positive,
-    check_resampling,
-    chosen,
-    files_of,
-    is_number,
-    table_choice,
-)
+from dpgcli.api.inputs import Texts, as_texts, by_text, check_positive, chosen, files_of, is_number
 from dpgcli.calibration import bistable
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, CurveQuantity, Loss

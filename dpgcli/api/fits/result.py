@@ -1,7 +1,7 @@
 """The result of a fit, and the arguments that all fits share."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
@@ -13,6 +13,7 @@ from dpgcli.errors import Field, Message, UsageError
 from dpgcli.files.calibration import Calibration, calibration_of, geometry_of, write_calibration
 from dpgcli.files.output import Mark, check_outputs
 from dpgcli.files.sections import Geometry
+from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 
 T = TypeVar("T")

@@ -1,12 +1,12 @@
 """Boxes cut along the lines of a grid into twenty-node bricks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.fe.elements import BRICK
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Decks for CalculiX as text; the same input gives the same bytes. Units: mm, N, MPa, t, s."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from dpgcli.calibration.fe.dome import DomeMesh, DomeShape
 from dpgcli.calibration.fe.energy import moduli
 from dpgcli.calibration.fe.hinge import HingeChambers, couple, layer_end, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS
+from dpgcli.records import dataclass
 
 DENSITY = 1.2e-9
 """Density in t/mm^3, that of silicones. It only sets the clock: see `pulse`."""

@@ -1,11 +1,11 @@
 """A dome on a flat annulus as an axisymmetric mesh of eight-node quadrilaterals."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

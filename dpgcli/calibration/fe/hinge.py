@@ -1,13 +1,12 @@
 """Two hollow chambers on their limiting layer, as a mesh of twenty-node bricks."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.elements import END_FACE, gauss, quad_shapes
 from dpgcli.design.geometry import WALL_THICKNESS
+from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +37,7 @@ from dpgcli.calibration.fe.pushed import MeshCells, Push, pushed_bricks
 from dpgcli.calibration.fe.pushed_deck import DeckStep, pushed_deck, pushed_words
 from dpgcli.design.geometry import snap_pressure
 from dpgcli.errors import SolverError
+from dpgcli.records import dataclass
 
 DOME_CELLS = {"coarse": (20, 3, 1), "medium": (28, 4, 2), "fine": (56, 8, 4)}
 """Cells along the cap, along the annulus and through the wall."""

@@ -6,14 +6,13 @@ that bears the dome, as at rest, and shifts and turns with chamber and lid; the 
 too long.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.calibration.fe.bricks import Bricks, bricks, grid_lines
 from dpgcli.calibration.fe.hinge import HingeChambers, is_solid, on_plane
 from dpgcli.design.geometry import WALL_THICKNESS, segment_height
+from dpgcli.records import dataclass
 
 PATCH_RADIUS = 0.21
 """Radius of the patch over the chamber's width: 4.2 mm of a chamber 20 mm wide."""

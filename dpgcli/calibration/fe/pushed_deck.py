@@ -1,7 +1,6 @@
 """The deck of chambers that pushes open and an end couple bends, step by step; mm, N, MPa."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +18,7 @@ from dpgcli.calibration.fe.cards import (
 from dpgcli.calibration.fe.hinge import HingeChambers, end_couple, on_plane
 from dpgcli.calibration.fe.pushed import End, Push, apex, clamped, loaded, patch
 from dpgcli.design.geometry import WALL_THICKNESS
+from dpgcli.records import dataclass
 
 OFF, SLACK, ON = 0.0, 0.02, 1.0
 """Temperatures of a spring that is not there, that is as long as at rest, and that pushes. They are

@@ -95,8 +95,8 @@ def bistable(
     quiet: Quiet = False,
 ) -> None:
     """Fit k_b, alpha and d of the bistable law to a dome's curve."""
+    from dpgcli.api.data import table_choice
     from dpgcli.api.fits.bistable import fit_bistable
-    from dpgcli.api.inputs import table_choice
     from dpgcli.calibration.opening import OpeningRule
 
     if travel_to_opening is None:

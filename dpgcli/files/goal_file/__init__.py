@@ -1,7 +1,7 @@
 """The file of a goal: a base spec, what may vary around it, and what is asked of the designs."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
@@ -22,6 +22,7 @@ from dpgcli.files.sweep_file import checked_base, read_base, varied
 from dpgcli.files.sweep_file.models import MOST_KEYS
 from dpgcli.files.sweep_file.space import SpaceReader, numbers_of
 from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.records import dataclass
 from dpgcli.search.goal import Goal, Objective, Range, Target
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.text import KeyPath

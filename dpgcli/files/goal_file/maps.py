@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from dpgcli.design.dimensions import Design
 from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.space import SpaceReader
+from dpgcli.records import dataclass
 from dpgcli.search.columns import NUMBERS, design_columns
 from dpgcli.search.goal import Objective
 from dpgcli.search.maps import COUNTS

@@ -1,7 +1,7 @@
 """The targets of a goal, read: quantities of states or designs, what these should be."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -13,6 +13,7 @@ from dpgcli.design.outputs import Output
 from dpgcli.errors import NothingSelectedError, UsageError
 from dpgcli.files.places import shown
 from dpgcli.files.sweep_file.space import SpaceReader
+from dpgcli.records import dataclass
 from dpgcli.search.columns import design_columns, state_columns
 from dpgcli.search.goal import OF_TIP, TIP, Target, suffix_of
 from dpgcli.states.columns import Column, Group, Kind

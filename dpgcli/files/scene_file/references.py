@@ -1,7 +1,7 @@
 """Calibration files that a spec names, read and put in the place of their names."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from dpgcli.files.content import beside, quoted_if
 from dpgcli.files.places import shown
 from dpgcli.files.scene_file.settings import SETTING, changed
 from dpgcli.files.yaml_file import Document
+from dpgcli.records import dataclass
 from dpgcli.text import KeyPath
 
 BUILT_IN = (PUBLISHED, FINITE_ELEMENTS)

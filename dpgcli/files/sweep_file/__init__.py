@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -29,6 +29,7 @@ from dpgcli.files.sweep_file.models import (
 )
 from dpgcli.files.sweep_file.space import SpaceReader
 from dpgcli.files.yaml_file import Document, read_document
+from dpgcli.records import dataclass
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.space import Space
 from dpgcli.text import KeyPath

@@ -4,7 +4,6 @@ import hashlib
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from dpgcli.files.sweep_file.models import (
     Sample,
 )
 from dpgcli.files.yaml_file import Document
+from dpgcli.records import dataclass
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.space import Axis, Range, linear, listed, logarithmic, sampled
 from dpgcli.text import KeyPath

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from dpgcli.arrays import Array, Indices, distinct
 from dpgcli.files.scene_file import spelled
+from dpgcli.records import dataclass
 from dpgcli.reports.explorer.shapes import NO_BASE, Shapes, rounded
 from dpgcli.reports.outlines import DrawnState, Points
 from dpgcli.reports.summary import METRICS, DesignSpace, extremes, varies

@@ -1,13 +1,14 @@
 """What a page needs to draw any state of a design: sizes of its chambers, poses of its units."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Indices
+from dpgcli.records import dataclass
 from dpgcli.reports.explorer.poses import StateTips, UnitPoses, are_composed, deviation, unit_poses
 from dpgcli.reports.outlines import DEEPEST, DOME_WIDTH, GAP, Sizes
 

@@ -1,13 +1,13 @@
 """States of a whole finger as pairs of half-fingers (see `halves`), streamed in blocks."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.records import dataclass
 from dpgcli.states.certify import MARGINAL_CURVATURE, SMALL_SHARE, Status
 from dpgcli.states.crossing import Outline, diagonals, is_simple
 from dpgcli.states.pairs.halves import Half, Split

@@ -14,7 +14,7 @@ is known exactly at the shared strut, and every state is certified by it (our de
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from dpgcli.equilibrium.banded import backward, factorize, forward, in_lanes
 from dpgcli.equilibrium.potential import Evaluation
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.records import dataclass
 from dpgcli.states.certify import Settled
 from dpgcli.states.crossing import Outline, outline
 from dpgcli.states.patterns import chunks, inverted_units

@@ -9,6 +9,7 @@ import pytest
 
 from dpgcli.design.scene import Origin
 from dpgcli.errors import SpecError
+from dpgcli.files.histories import read_history
 from dpgcli.files.scene_file import (
     canonical_json,
     checked,
@@ -18,7 +19,6 @@ from dpgcli.files.scene_file import (
     read_spec,
     scene_of,
 )
-from dpgcli.files.scene_file.histories import read_history
 from dpgcli.files.scene_file.problems import unknown_key
 from dpgcli.files.yaml_file import parse_document
 
