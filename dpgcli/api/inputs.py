@@ -14,11 +14,12 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias, TypeGuard, TypeVar
 
+from pydantic import BaseModel
+
 from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, SpecError, UsageError
 from dpgcli.files.access import reading
-from dpgcli.files.calibration import Calibration
 from dpgcli.files.scene_file import (
     Spec,
     canonical,
@@ -204,7 +205,7 @@ def plain(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Calibration):
+    if isinstance(value, BaseModel):
         return value.model_dump(exclude_none=True)
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in by_text("spec", value).items()}

@@ -9,8 +9,8 @@ from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, Message, Problem, SpecError, UsageError
 from dpgcli.files.access import reading
 from dpgcli.files.calibration import Calibration, read_calibration
-from dpgcli.files.scene_file import checked, recalibrated, scene_of, with_files
-from dpgcli.files.scene_file.references import BUILT_IN, EXPECTED
+from dpgcli.files.scene_file import checked, scene_of, with_files
+from dpgcli.files.scene_file.references import BUILT_IN, EXPECTED, recalibrated
 
 CalibrationInput: TypeAlias = str | Path | Calibration
 """A calibration, its file, or the name of one that is built in; a Path is never such a name."""

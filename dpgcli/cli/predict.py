@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dpgcli.cli.explain import expected
 from dpgcli.cli.options import (
     LONG,
     ColumnNames,
@@ -98,6 +97,8 @@ def predict(
     _check_sketch(printed_as, prediction.plan.n_states if sketch else 0)
     _check_outputs(given.files, output, plot)
     if prediction.plan.expected_seconds > LONG and not quiet:
+        from dpgcli.cli.explain import expected
+
         say(f"{prediction.plan.n_states:,} states: {expected(prediction.plan)}")
     rows = _progress(prediction, quiet)
     if printed_as is not None or output is None or prediction.plan.n_states <= ROWS_SHOWN:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Generic, Literal, TypeVar
 from pydantic import Field
 
 from dpgcli.design import calibrations
-from dpgcli.design.dimensions import LARGEST
 from dpgcli.files.sections import (
     BarStiffness,
+    Bounded,
     Fraction,
     Geometry,
     NotNegative,
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Samples = Annotated[list[float], Field(min_length=1)]
-Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Size = Annotated[float, Field(ge=0)]  # of an error: what data do not tell has a huge one
 Positives = Annotated[list[Positive], Field(min_length=1)]
 

@@ -7,8 +7,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.design.loads import DIRECTION, DIRECTIONS, DOWN, FORCES, MASS, MOMENT, GivenLoads
-from dpgcli.files.calibration.models import Bounded
-from dpgcli.files.sections import Section
+from dpgcli.files.sections import Bounded, Section
 
 TIP_FORCE = "tip_force_N"
 EXPECTED = {

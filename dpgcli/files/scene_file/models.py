@@ -4,11 +4,11 @@ A section or value that is null counts as absent.
 """
 
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field, PlainSerializer, SerializationInfo
 from pydantic.json_schema import SkipJsonSchema
 
 from dpgcli.design import dimensions
@@ -16,13 +16,13 @@ from dpgcli.design.calibrations import Calibration as Known
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, WALL_COMPLIANCE, Design
 from dpgcli.design.resolve import Resolution, resolve
 from dpgcli.design.scene import Held
-from dpgcli.files.calibration.models import Bounded, Calibration
 from dpgcli.files.scene_file.loads import LoadsSpec
 from dpgcli.files.scene_file.objects import ObjectSpec
 from dpgcli.files.scene_file.pressure import PressureSpec
 from dpgcli.files.scene_file.tolerances import ModelErrorSpec, Tolerances, share_of
 from dpgcli.files.sections import (
     BarStiffness,
+    Bounded,
     Geometry,
     Lattice,
     NotNegative,
@@ -32,8 +32,24 @@ from dpgcli.files.sections import (
     UnitLattice,
 )
 
-Read = SkipJsonSchema[Calibration]  # in the place of a file's name once the file is read
+if TYPE_CHECKING:
+    from dpgcli.files.calibration.models import Calibration
 
+
+def _read(value: object) -> "Calibration | None":
+    if value is None:
+        return None
+    from dpgcli.files.calibration.models import Calibration  # few specs name one
+
+    return Calibration.model_validate(value)
+
+
+def _written(value: "Calibration | None", info: SerializationInfo) -> dict[str, Any] | None:
+    return None if value is None else value.model_dump(exclude_none=info.exclude_none)
+
+
+# In the place of a file's name once the file is read.
+Read = SkipJsonSchema[Annotated[Any, AfterValidator(_read), PlainSerializer(_written)]]
 
 WallCompliance = NotNegative | None
 
@@ -69,7 +85,7 @@ class FingerSpec(Section):
         description="By how much hinges turn their neighbors, kappa in N mm/rad, less than half "
         "the hinge stiffness: 0 unless given or calibrated.",
     )
-    calibration: str | Read | list[str | Read] | None = Field(
+    calibration: str | list[str | Read] | Read | None = Field(
         default=None,
         description="Where values come from that the lattice section leaves out: published, "
         "finite_elements (with law: push_only, unless given), a file of dpg fit, or a list of "
@@ -92,7 +108,7 @@ class FingerSpec(Section):
         """Its calibrations, in order."""
         said = self.calibration if isinstance(self.calibration, list) else [self.calibration]
         parts = (part for part in said if part is not None)
-        return tuple(p.known if isinstance(p, Calibration) else p for p in parts)
+        return tuple(p if isinstance(p, str) else p.known for p in parts)
 
 
 class GripperSpec(Section):

@@ -8,8 +8,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from dpgcli.design.dimensions import MAX_UNITS, UNIT_RANGE, GivenPressure, Sizes, unit_range
 from dpgcli.design.lines import HISTORY, LINES, NAME, TIME
-from dpgcli.files.calibration.models import Bounded
-from dpgcli.files.sections import Positive, Section
+from dpgcli.files.sections import Bounded, Positive, Section
 from dpgcli.text import KeyPath
 
 UNITS = "units such as 1-3, 4 or 1,3"

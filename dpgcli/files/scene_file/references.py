@@ -26,17 +26,13 @@ SHIPPED_FILES = ("domes.yaml", "units.yaml")
 SHIPPED_LAW = "push_only"  # that of its curve
 
 
-def with_calibrations(document: Document, folder: Path) -> Document:
-    """The document with calibrations instead of their files' names, and those files.
+def with_calibrations(document: Document, said: object, folder: Path) -> Document:
+    """The document with calibrations instead of what it says, and the files that they are from.
 
     `finite_elements` names those that ship, and their law where the spec has none. Names are
     relative to the spec's folder, in `--set` to the current one. What is wrong in a
     calibration joins the document's problems.
     """
-    finger = document.data.get("finger")
-    said = finger.get("calibration") if isinstance(finger, dict) else None
-    if said is None or said == PUBLISHED:
-        return document
     origin = Path() if document.place(KEY) == SETTING else folder
     reader = _Reader(document, origin)
     value: Any = reader.listed(said) if isinstance(said, list) else reader.found(KEY, said)
