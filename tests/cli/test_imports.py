@@ -75,6 +75,11 @@ def test_predicting_loads_neither_tables_nor_figures(
     assert loaded(*arguments) & PREDICTING == set()
 
 
+def test_a_spec_that_names_no_file_loads_no_reader_of_one(loaded: Loaded) -> None:
+    found = loaded("predict", str(CONFIGS / "three_unit.yaml"))
+    assert not {"dpgcli.files.csv_file", "dpgcli.files.units", "dpgcli.files.calibration"} & found
+
+
 def test_transitions_load_neither_tables_nor_figures_nor_graphs(loaded: Loaded) -> None:
     found = loaded("transitions", str(CONFIGS / "three_unit.yaml"), "--format", "csv")
     assert found & (PREDICTING | {"networkx"}) == set()
