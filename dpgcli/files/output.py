@@ -106,8 +106,12 @@ def check_outputs(sources: Iterable[Path], *outputs: Output) -> None:
 
 
 def real(path: Path) -> Path:
-    """A path without links, as far as they lead somewhere; `Path.resolve` raises in a circle."""
-    return Path(os.path.realpath(path))
+    """A path without links, as far as they lead somewhere; `Path.resolve` raises in a circle.
+
+    A pipe that a process has open, as /dev/stdout, leads to no path: it is its own.
+    """
+    target = Path(os.path.realpath(path))
+    return path if path.exists() and not target.exists() else target
 
 
 def check_apart(paths: Iterable[Path]) -> None:
@@ -250,12 +254,12 @@ def _beside(path: Path) -> Iterator[Path]:
     """
     if control := control_character(str(path)):
         raise OSError(None, f"{control} in it")
-    if path.is_symlink():  # none is left in a real path
-        raise OSError(None, "its links lead in a circle")
     if path.is_dir():
         raise IsADirectoryError(None, "is a folder")
     if path.exists() and not path.is_file():
         raise OSError(None, "is a device or pipe, not a file")
+    if path.is_symlink():  # none is left in a real path
+        raise OSError(None, "its links lead in a circle")
     with temporary_file(path) as (temporary, handle):
         _permit(handle, path)
         yield temporary

@@ -363,3 +363,15 @@ def test_a_folder_that_cannot_be_listed_takes_files(
     with whole_file(tmp_path / "table.txt") as temporary:
         temporary.write_text("new", encoding="utf-8")
     assert names(tmp_path) == ["table.txt"]
+
+
+@pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="no such names here")
+def test_a_pipe_that_is_open_is_a_pipe() -> None:
+    """As /dev/stdout where a reader follows: it leads to no name."""
+    ends = os.pipe()
+    try:
+        with pytest.raises(OutputError, match=r"is a device or pipe, not a file"):
+            check_writable(Path(f"/dev/fd/{ends[1]}"))
+    finally:
+        for end in ends:
+            os.close(end)
