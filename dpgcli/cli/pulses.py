@@ -35,6 +35,7 @@ def pulses(
     quiet: Quiet = False,
 ) -> None:
     """Find the fewest pulses of pressure from one state to another."""
+    from dpgcli.actuation.costs import announced
     from dpgcli.api.lookup import LookupResult, lookup_of
     from dpgcli.api.pressure import pressed_input
     from dpgcli.api.pulses import PulsesResult, pulses_of
@@ -47,6 +48,9 @@ def pulses(
         raise UsageError(Field("scatter"), " goes with ", Field("end"))
     given = pressed_input(spec, settings or ())
     drawn = drawn_by(given, scatter, draws, seed)
+    expected = announced(given.pressed.finger, len(given.pressure.lines))
+    if expected and not quiet:
+        say(f"at most {expected}")  # a sequence may be found before all states are followed
     found: LookupResult | PulsesResult
     with under_way("following pulses", quiet=quiet):
         found = lookup_of(given, start) if table else pulses_of(given, end, start, drawn)

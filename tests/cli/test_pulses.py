@@ -43,6 +43,14 @@ def test_the_summary_is_no_data(call: Any) -> None:
     assert "fewest" not in result.stdout
 
 
+def test_what_may_take_long_is_said_before(call: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dpgcli.actuation.costs.LONG", 0.1)
+    said = "at most 16 directions of 8 patterns: 0 to 0 s"
+    loud, quiet = (call("pulses", "three_unit.yaml", "--to", "111", *q) for q in ((), ("-q",)))
+    assert loud.stderr.splitlines()[0] == said
+    assert quiet.stderr == ""
+
+
 @pytest.mark.parametrize(("form", "empty"), [("csv", ",".join(NAMES) + "\n"), ("json", "[]\n")])
 def test_no_sequence_is_no_rows_and_exit_code_1(call: Any, form: str, empty: str) -> None:
     result = call("pulses", "three_unit.yaml", "--to", "101", "--format", form)
