@@ -12,9 +12,6 @@ from dpgcli.mechanics import laws
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.finger import GRAVITY, Finger
-from dpgcli.mechanics.lattice import Lattice
-from dpgcli.mechanics.neighbors import NeighborTurns
-from dpgcli.mechanics.walls import Walled
 from dpgcli.records import dataclass
 
 Formulate = Callable[[Finger], FingerPotential]
@@ -96,6 +93,8 @@ def _couplings(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     finger = coordinates.finger
     if not finger.is_coupled:
         return ()
+    from dpgcli.mechanics.neighbors import NeighborTurns  # that few fingers need
+
     turns = NeighborTurns(coordinates.corners)
     return (Term("hinge coupling", turns, DeadLoad(finger.hinge_coupling)),)
 
@@ -164,10 +163,15 @@ def lattice_potential(finger: Finger) -> FingerPotential:
     >>> lattice_potential(uniform_finger(2, **STUDY, linear_stiffness=1e4)).coordinates.size
     8
     """
+    from dpgcli.mechanics.lattice import Lattice  # the chain is what is used
+
     return _potential(Lattice(finger))
 
 
 def _potential(frame: FingerCoordinates) -> FingerPotential:
     """The energy in these coordinates, and in those of walls that give way, if there are any."""
-    coordinates = Walled(frame) if frame.finger.has_walls else frame
-    return Potential(coordinates, finger_terms(coordinates))
+    if not frame.finger.has_walls:
+        return Potential(frame, finger_terms(frame))
+    from dpgcli.mechanics.walls import Walled
+
+    return Potential(walled := Walled(frame), finger_terms(walled))

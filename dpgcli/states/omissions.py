@@ -1,11 +1,15 @@
 """Omissions of a plan, and their reasons."""
 
+from typing import TYPE_CHECKING
+
 from dpgcli.design.scene import Scene
 from dpgcli.records import dataclass
 from dpgcli.states.accuracy import Exactness
-from dpgcli.states.pairs.halves import Split
 from dpgcli.states.units import UnitSolutions
 from dpgcli.text import enumerated
+
+if TYPE_CHECKING:
+    from dpgcli.states.pairs.halves import Split
 
 
 @dataclass(frozen=True)
@@ -18,7 +22,7 @@ class Omission:
 
 
 def omissions(
-    scene: Scene, units: UnitSolutions, split: Split | None, n_solves: int, exactness: Exactness
+    scene: Scene, units: UnitSolutions, split: "Split | None", n_solves: int, exactness: Exactness
 ) -> tuple[Omission, ...]:
     """Omitted terms, unknowns and solves of a scene."""
     finger = units.finger

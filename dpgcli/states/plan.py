@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,14 +27,15 @@ from dpgcli.states.chosen_columns import chosen_columns
 from dpgcli.states.columns import Group
 from dpgcli.states.costs import peak_bytes, seconds
 from dpgcli.states.omissions import Omission, omissions
-from dpgcli.states.pairs.compose import paired_states
-from dpgcli.states.pairs.halves import Split
 from dpgcli.states.patterns import MOST_SELECTED, Selection, select, too_many
 from dpgcli.states.quantities import ALWAYS, LEAST, MISSED, Quantity, declared, shares
 from dpgcli.states.rows import RowRequest
 from dpgcli.states.solved import Surroundings
 from dpgcli.states.units import UnitSolutions
 from dpgcli.text import quoted
+
+if TYPE_CHECKING:
+    from dpgcli.states.pairs.halves import Split
 
 FORMULATIONS: dict[str, Formulate] = {"chain": chain_potential, "lattice": lattice_potential}
 FEWEST_PAIRED_STATES = 2**13
@@ -77,7 +79,7 @@ class Plan:
     request: Request
     exactness: Exactness
     method: Method
-    split: Split | None
+    split: "Split | None"
     selection: Selection | None
     n_states: int
     terms: tuple[str, ...]
@@ -272,12 +274,14 @@ def _split(
     request: Request,
     is_whole: bool,
     groups: set[Group],
-) -> Split | None:
+) -> "Split | None":
     """Where to cut the finger, if all states are wanted and that is cheaper."""
     fits = groups <= {Group.STATES, Group.ENERGIES} and request.formulation == "chain"
     n_units = units.finger.n_units
     if not (is_whole and fits and 2**n_units >= FEWEST_PAIRED_STATES):
         return None
+    from dpgcli.states.pairs.halves import Split  # many states alone are made of halves
+
     n_inner = n_units // 2
     cut = n_inner * potential.coordinates.size // n_units
     shared = slice(cut if units.finger.is_rigid else cut - 1, cut)  # a strut
@@ -291,6 +295,9 @@ def _split(
 
 def _agrees(finger: Finger, n_inner: int, context: int, tolerance: float) -> bool:
     """Whether halves with that much context fit, tried on the units around the cut."""
+    from dpgcli.states.pairs.compose import paired_states
+    from dpgcli.states.pairs.halves import Split
+
     around = finger.section(n_inner - context - 1, n_inner + context + 1)
     trial = Split(UnitSolutions.of(around), context + 1, context, tolerance)
     return all((s.status != Status.NOT_CONVERGED).all() for s in paired_states(trial))

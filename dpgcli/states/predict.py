@@ -9,9 +9,7 @@ import numpy as np
 from dpgcli.arrays import Codes, Columns, Flags, keep_freed_memory
 from dpgcli.design.scene import Scene
 from dpgcli.records import dataclass
-from dpgcli.states.barriers import TIE
 from dpgcli.states.certify import Status
-from dpgcli.states.pairs.compose import paired_states
 from dpgcli.states.patterns import chunks, codes_of, inverted_units
 from dpgcli.states.plan import Plan, Request, explain
 from dpgcli.states.quantities import LEAST, MISSED, rows
@@ -82,6 +80,8 @@ class Summary:
         barriers, units = (block[column.name] for column in LEAST)
         if np.isnan(barriers).all():
             return
+        from dpgcli.states.barriers import TIE
+
         ties = barriers <= (1.0 + TIE) * np.nanmin(barriers)
         place = int(ties.argmax())  # the first pattern: which is less by rounding says nothing
         known = self.least_robust
@@ -157,6 +157,8 @@ def _blocks(plan: Plan, summary: Summary) -> Iterator[Columns]:
         for codes in _batches(plan):
             yield _solved(plan, codes, summary)
         return
+    from dpgcli.states.pairs.compose import paired_states
+
     summary.n_finger_solves += plan.split.n_solves
     for states in paired_states(plan.split):
         states = replace(states, tip_error=states.tip_error + plan.dropped_error)

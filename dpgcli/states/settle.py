@@ -11,7 +11,6 @@ from dpgcli.mechanics.coordinates import FingerPotential, Internal
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.states.certify import Settled, Status, certified
 from dpgcli.states.guess import geometric_guess, stroke_guess
-from dpgcli.states.loading import grown
 from dpgcli.states.units import UnitSolutions
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
@@ -145,6 +144,8 @@ def _followed(
     begins = np.flatnonzero(begun.status == Status.STABLE)
     if not len(begins):
         return settled
+    from dpgcli.states.loading import grown  # paths, which loads alone need
+
     lanes, few, inverted = lanes[begins], few.take_lanes(begins), inverted[:, begins]
     way = grown(few, formulate, inverted, begun.equilibrium.coordinates[:, begins])
     potential = formulate(few.finger.with_domes(inverted))
