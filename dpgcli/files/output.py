@@ -111,7 +111,8 @@ def real(path: Path) -> Path:
     A pipe that a process has open, as /dev/stdout, leads to no path: it is its own.
     """
     target = Path(os.path.realpath(path))
-    return path if path.exists() and not target.exists() else target
+    is_there, leads_on = map(os.path.exists, (path, target))  # no error for what is closed
+    return path if is_there and not leads_on else target
 
 
 def check_apart(paths: Iterable[Path]) -> None:
