@@ -10,7 +10,7 @@ from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.records import dataclass
-from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
+from dpgcli.sweeps.expressions import Expression, ExpressionError, ends_tell, expression
 from dpgcli.sweeps.metrics import (
     METRICS,
     UNKNOWN_DIRECTIONS,
@@ -115,6 +115,8 @@ def requirement(text: str, columns: Collection[str], field: str = "require") -> 
         raise UsageError(Field(field), f" {text!r}: cannot be evaluated") from error
     if not rule.is_comparison:
         raise UsageError(Field(field), f" {text!r}: expected a comparison, found a number")
+    if not rule.names:
+        raise UsageError(Field(field), f" {text!r}: expected a comparison of columns, found none")
     return rule
 
 
@@ -184,11 +186,15 @@ def failing(designs: Columns, rule: Expression) -> Indices:
 def holds(rule: Expression, columns: Columns) -> Flags:
     """In which rows a comparison holds: in none where a value is NaN, or where it has none.
 
-    Where searches failed it holds for all that may be there, as far as its ends tell.
+    Where searches failed it holds for all that may be there: if both ends of that do not tell, it
+    does not hold.
     """
     values = {name: columns[name] for name in rule.names}
     met = have_values(columns, rule.names)
     bounds = _bounds(columns, rule.names)
+    for metric, is_open in bounds:
+        if not ends_tell(rule, metric.name):
+            met &= ~is_open
     for beyond in product((False, True), repeat=len(bounds)):
         ends = {
             metric.name: np.where(is_open, metric.furthest, values[metric.name])

@@ -7,6 +7,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import NothingSelectedError, UsageError
+from dpgcli.sweeps.expressions import ends_tell
 from dpgcli.sweeps.gate import (
     check_requirements,
     failing,
@@ -53,8 +54,6 @@ def test_columns_of_text_are_no_numbers() -> None:
         ("area_mm2 > 0 or gap_mm > 0", [1, 3, 4]),  # one known value does not do
         ("height_mm > 0", [3, 4]),  # without a state nothing is met
         ("n_stable == 0", [0, 1, 2, 3, 4]),
-        ("1 < 2", [3, 4]),
-        ("2 < 1", [0, 1, 2, 3, 4]),
         ("units == 3 and n_stable ** 2 > 30", [2, 3, 4]),
     ],
 )
@@ -149,6 +148,14 @@ SEARCHED: Columns = {
         ("n_stable == 8", [2]),
         ("n_reachable < 5 and reach_max_mm < 10", [0, 2]),
         ("gap_mm < 3", [1]),  # a NaN, and no bound
+        ("n_stable != 9", [2]),  # one more may be there
+        ("not (8.5 < n_stable < 9.5)", [2]),
+        ("reach_min_mm < 2 or reach_min_mm > 4", [2]),
+        ("abs(reach_min_mm - 2) > 1", [2]),
+        ("(reach_min_mm - 2) ** 2 > 1", [2]),
+        ("1 / reach_min_mm > 0.1", [2]),
+        ("n_stable % 9 > 0", [2]),
+        ("reach_max_mm - min(reach_max_mm, 5) > 2", [2]),  # so it is, but is not seen to be
         ("area_mm2 < 4", []),
     ],
 )
@@ -156,6 +163,43 @@ def test_what_is_not_known_meets_no_bound(text: str, rows: list[int]) -> None:
     """Of states that are not found the extremes are bounds on one side."""
     rule = requirement(text, number_columns(SEARCHED))
     assert failing(SEARCHED, rule).tolist() == rows
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2 < a < 4 and a > b",
+        "not (2 < a < 4)",
+        "a < 1 or a > 2",
+        "a > 1 or b > 1",
+        "a * b > 1 and b > 0",
+        "a * a > 4",
+        "b - a > -3",
+        "b / a > 1",
+        "a / b > -1",
+        "abs(a) > 1",
+        "not max(a, b) > 3",
+        "a == 2",
+        "exp(a) - 2 * log(b) < 9",
+        "a ** 2 > 1",
+        "a % 2 < 1",
+    ],
+)
+def test_a_rule_that_holds_at_both_ends_holds_between(text: str) -> None:
+    """Where it is said to, by trying all between; where it is not, it need not."""
+    rule = requirement(text, ["a", "b"])
+    between = np.linspace(0.0, 1.0, 41)
+    starts, ends, others = np.meshgrid(*[np.linspace(-5.0, 5.0, 21)] * 3)
+    first, last = (np.asarray(rule({"a": end, "b": others})) == 1.0 for end in (starts, ends))
+    held = [np.asarray(rule({"a": starts + (ends - starts) * t, "b": others})) for t in between]
+    holds = (np.array(held) == 1.0).all(axis=0)
+    assert (first & last).any()
+    assert ends_tell(rule, "a") <= holds[first & last].all()
+
+
+def test_a_comparison_of_no_column_is_none() -> None:
+    with pytest.raises(UsageError, match=r"'1 < 2': expected a comparison of columns, found none"):
+        requirement("1 < 2", COLUMNS)
 
 
 def test_failed_searches_are_warned_of_and_shown() -> None:
