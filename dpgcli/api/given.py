@@ -21,6 +21,7 @@ from dpgcli.errors import UsageError
 from dpgcli.files.frames import frame_of
 from dpgcli.files.goal_file import GoalFile, goal_in, goal_of, read_goal
 from dpgcli.files.kind import FileKind, kind_of
+from dpgcli.files.scene_file import Spec
 from dpgcli.files.sweep_file import Sweep, read_sweep, sweep_in, sweep_of
 from dpgcli.files.yaml_file import Document, read_document, without_free_keys
 from dpgcli.mechanics.finger import Finger
@@ -45,7 +46,7 @@ the keys base and space, or a goal, with the keys base, vary and targets, found 
 mean finger?)
     """
     texts = setting_texts(settings)
-    if isinstance(given, SceneInput | Scene | Finger):
+    if isinstance(given, SceneInput | Spec | Scene | Finger):
         return scene_input(given, texts)
     if isinstance(given, Mapping):
         own = without_free_keys(by_text("spec", given))

@@ -75,8 +75,8 @@ class SceneInput:
         return "{}" if self.spec is None else canonical_json(self.spec)
 
 
-SpecInput: TypeAlias = str | Path | Mapping[str, Any] | Scene | Finger | SceneInput
-"""A spec's file, its data, or the value that it stands for."""
+SpecInput: TypeAlias = str | Path | Mapping[str, Any] | Spec | Scene | Finger | SceneInput
+"""A spec's file, its data, as `inverse_design` gives it, or the value that it stands for."""
 
 
 def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
@@ -98,6 +98,8 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
             found = f" of {scene.finger.n_units:,} units: expected at most {MAX_UNITS}"
             raise UsageError(Field("spec"), found)
         return SceneInput("scene", scene)
+    if isinstance(spec, Spec):
+        spec = spec.model_dump(exclude_none=True)
     if isinstance(spec, Mapping):
         return _scene("spec", _without_files(spec, settings), Path())
     path = path_of("spec", spec)

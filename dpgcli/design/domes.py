@@ -22,6 +22,7 @@ from dpgcli.records import dataclass
 WHERE = ("finger", "law")
 HINT = "dpg fit bistable writes one"
 NEXT_TO_NOTHING = 0.01  # of a curve's energies
+CLOSE = 0.01  # of a curve's travels: so near to rest its energy is that at rest, and a square
 NEAR_START = 4.0  # first travels: as far the slope is like that from rest to the first point
 STEEPER = 1.5  # than any slope nearby: no dome's own
 NORMALS = (BISTABLE_STIFFNESS.key, STROKE.key)
@@ -94,16 +95,29 @@ def _curve_issue(calibration: Calibration, curve: DomeCurve) -> Issue | None:
         from_rest = " from rest on" if begins_before else ""
         found = f"{n_points}{from_rest} in {calibration.source}"
         return Issue(WHERE, f"a curve of {FEWEST_POINTS} points or more", found, HINT)
-    start, energy = travels[0], energies[0]
-    if start <= 0.0 or abs(energy) <= NEXT_TO_NOTHING * np.ptp(energies):
-        return None
-    near = travels[1:] <= max(NEAR_START * start, travels[FEWEST_POINTS - 1])
-    steepest = np.abs(np.diff(energies) / np.diff(travels))[near].max()
-    if abs(energy) <= STEEPER * steepest * start:
+    if travels[0] <= 0.0 or _at_rest(travels, energies) is not None:
         return None
     expected = "a curve that begins at rest, travel 0, or whose energies are counted from there"
-    found = f"{energy:g} mJ at {start:g} mm in {calibration.source}"
+    found = f"{energies[0]:g} mJ at {travels[0]:g} mm in {calibration.source}"
     return Issue(WHERE, expected, found, "add the point at travel 0 to the curve")
+
+
+def _at_rest(travels: Array, energies: Array) -> float | None:
+    """The energy at rest (mJ) of a curve that begins beyond it; None where that is not known.
+
+    A curve that begins close to it tells it, whatever its energies are counted from: there a dome
+    has no force. One that begins further away is taken to be counted from rest, unless from there
+    to the first point is steeper than any way nearby, or energies are next to nothing.
+    """
+    start, energy = travels[0], energies[0]
+    if start <= CLOSE * np.ptp(travels):
+        apart = int(np.argmax(travels >= 2.0 * start))
+        first, second = start**2, travels[apart] ** 2
+        return float((energy * second - energies[apart] * first) / (second - first))
+    near = travels[1:] <= max(NEAR_START * start, travels[FEWEST_POINTS - 1])
+    steepest = np.abs(np.diff(energies) / np.diff(travels))[near].max()
+    is_from_rest = abs(energy) <= STEEPER * steepest * start
+    return 0.0 if is_from_rest or abs(energy) <= NEXT_TO_NOTHING * np.ptp(energies) else None
 
 
 def _no_well(calibration: Calibration) -> Issue:
@@ -148,6 +162,8 @@ def _points(curve: DomeCurve, travel: float, energy: float) -> tuple[tuple[float
     """Travels and energies over a travel and an energy, from rest on, gaps bridged."""
     travels, energies = np.array(curve.travel), np.array(curve.energy)
     if travels[0] > 0.0:
-        travels, energies = (np.concatenate(([0.0], values)) for values in (travels, energies))
+        at_rest = _at_rest(travels, energies)
+        assert at_rest is not None, "refused before"
+        travels, energies = np.append(0.0, travels), np.append(0.0, energies - at_rest)
     travels, energies = bridged(travels, energies, curve.gaps)
     return tuple((travels / travel).tolist()), tuple((energies / energy).tolist())

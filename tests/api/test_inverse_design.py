@@ -41,6 +41,7 @@ def test_each_design_is_what_predict_finds_for_its_spec(goal: Callable[..., Goal
         assert spec_text(spec, "a test")
         data = spec.model_dump(exclude_none=True)
         states = dpg.predict(data, patterns=row.target_1_pattern).to_pandas()
+        assert dpg.predict(spec, patterns=row.target_1_pattern).to_pandas().equals(states)
         assert states["status"].tolist() == ["stable"]
         for name in ("tip_x_mm", "tip_y_mm"):
             assert states[name][0] == pytest.approx(getattr(row, f"target_1_{name}"), abs=1e-9)

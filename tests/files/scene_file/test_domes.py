@@ -284,13 +284,28 @@ def test_energies_are_counted_from_rest_wherever_a_curve_begins(scene, law, firs
 @pytest.mark.parametrize("law", ["tabulated", "push_only"])
 @pytest.mark.parametrize("offset", [-100.0, 30.0, 100.0])
 def test_an_energy_that_no_dome_has_so_near_rest_is_not_counted_from_there(problem, law, offset):
-    travel = TRAVEL[1:]
+    travel = TRAVEL[3:]
     said = problem(law, dome=calibration(travel.tolist(), (polynomial(travel) + offset).tolist()))
     assert said.startswith(
         "x.yaml:5:3: finger.law: expected a curve that begins at rest, travel 0, or whose "
-        f"energies are counted from there, found {polynomial(0.125) + offset:g} mJ at 0.125 mm"
+        f"energies are counted from there, found {polynomial(0.375) + offset:g} mJ at 0.375 mm"
     )
     assert said.endswith("in dome.yaml (add the point at travel 0 to the curve)")
+
+
+@pytest.mark.parametrize("law", ["tabulated", "push_only"])
+@pytest.mark.parametrize("start", [1e-4, 0.01, 0.125])
+@pytest.mark.parametrize("offset", [-300.0, -0.3, 0.01, 0.3, 3.0, 300.0])
+def test_close_to_rest_it_does_not_matter_what_energies_are_counted_from(scene, law, start, offset):
+    """Nor for any force: at the first point a dome has next to none."""
+    travel = np.append(start, TRAVEL[2:])
+    dome = calibration(travel.tolist(), (polynomial(travel) + offset).tolist())
+    found, expected = scene(law, dome=dome).finger, scene(law).finger
+    places = FACTOR * np.linspace(0.0, 14.0, 200)
+    one, other = (f.springs(places[None]) for f in (found, expected))
+    scale = np.abs(other.force).max()
+    assert np.abs(one.energy - other.energy).max() < 1e-3 * np.abs(other.energy).max()
+    assert np.abs(one.force - other.force).max() < 0.01 * scale
 
 
 @pytest.mark.parametrize("start", [1, 4, 16, 40])
