@@ -8,12 +8,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from dpgcli.design.calibrations import PUBLISHED
 from dpgcli.errors import SpecError
-from dpgcli.files.scene_file.forces import with_forces
 from dpgcli.files.scene_file.histories import with_history
 from dpgcli.files.scene_file.models import Spec
 from dpgcli.files.scene_file.problems import checked, checked_keys
-from dpgcli.files.scene_file.references import recalibrated, with_calibrations
 from dpgcli.files.scene_file.scenes import scene_of
 from dpgcli.files.scene_file.settings import changed, with_settings
 from dpgcli.files.yaml_file import FREE, Document, read_document
@@ -29,7 +28,6 @@ __all__ = [
     "read_scene",
     "read_spec",
     "reason_against",
-    "recalibrated",
     "scene_in",
     "scene_of",
     "spelled",
@@ -72,7 +70,18 @@ def with_files(document: Document, folder: Path) -> Document:
 
     Names are relative to the spec's folder.
     """
-    return with_forces(with_history(with_calibrations(document, folder), folder), folder)
+    finger = document.data.get("finger")
+    said = finger.get("calibration") if isinstance(finger, dict) else None
+    if said is not None and said != PUBLISHED:
+        from dpgcli.files.scene_file.references import with_calibrations
+
+        document = with_calibrations(document, said, folder)
+    document = with_history(document, folder)
+    if "object" in document.data:
+        from dpgcli.files.scene_file.forces import with_forces
+
+        document = with_forces(document, folder)
+    return document
 
 
 def folder_of(path: str | Path) -> Path:

@@ -10,8 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from dpgcli.design.bodies import FRICTION, MASS, PLACES, Body, Disc, Friction, Jaws, Polygon
 from dpgcli.design.problems import Issue, number
-from dpgcli.files.calibration.models import Bounded
-from dpgcli.files.sections import NotNegative, Positive, Section
+from dpgcli.files.sections import Bounded, NotNegative, Positive, Section
 from dpgcli.mechanics.aperture import FEWEST_POINTS, ForceCurve
 from dpgcli.text import KeyPath
 
