@@ -160,6 +160,44 @@ def margins(rule: Expression) -> tuple[Expression, ...]:
     return tuple(expression(_with_digits(ast.unparse(node))) for node in found)
 
 
+def ends_tell(rule: Expression, name: str) -> bool:
+    """Whether a rule that holds at both ends of a range of one name holds in between.
+
+    As far as one sees it: where each comparison that has to hold has the name on one side, once,
+    and that side only grows or only falls with it.
+
+    >>> [ends_tell(expression(text), "a") for text in ("2 < a < 4 and a > b", "a > 1 or b > 1")]
+    [True, True]
+    >>> [ends_tell(expression(text), "a") for text in ("a != 4", "a < 1 or a > 2", "abs(a) > 1")]
+    [False, False, False]
+    """
+    parts = _joined(_body(_without_digits(rule.text)))
+    return all(_is_monotone(each, name) for part in parts for each in _margins(part) or [part])
+
+
+def _is_monotone(node: ast.expr, name: str) -> bool:
+    """Whether a value only grows, or only falls, with a name, the others being what they are."""
+    if _constant(node) is not None or _dotted(node):
+        return True
+    with_it = [part for part in _parts(node) if name in _names(part, MOST_LEVELS)]
+    if not with_it:
+        return True
+    is_bent = (
+        (
+            isinstance(node, ast.Compare)
+            and (isinstance(node.ops[0], ast.Eq | ast.NotEq) or node.ops[1:])
+        )
+        or (isinstance(node, ast.Call) and _dotted(node.func) == "abs")
+        or (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow | ast.Mod))
+        or (
+            isinstance(node, ast.BinOp)
+            and isinstance(node.op, ast.Div)
+            and with_it[0] is node.right
+        )
+    )
+    return len(with_it) == 1 and not is_bent and _is_monotone(with_it[0], name)
+
+
 class Bounds(NamedTuple):
     """Between what numbers a name has to be; whether it may be these themselves."""
 
