@@ -15,7 +15,7 @@ from dpgcli.errors import Problem, SpecError
 from dpgcli.files.content import beside
 from dpgcli.files.goal_file.maps import MapReader
 from dpgcli.files.goal_file.models import ASKED, MOST_ASKED, VARIED, GoalSpec
-from dpgcli.files.goal_file.targets import TargetReader
+from dpgcli.files.goal_file.targets import MOST_STATES, TargetReader
 from dpgcli.files.places import in_order, shown
 from dpgcli.files.scene_file import Spec
 from dpgcli.files.sweep_file import checked_base, read_base, varied
@@ -24,6 +24,7 @@ from dpgcli.files.sweep_file.space import SpaceReader, numbers_of
 from dpgcli.files.yaml_file import Document, read_document
 from dpgcli.records import dataclass
 from dpgcli.search.goal import Goal, Objective, Range, Target
+from dpgcli.search.maps import MapEvaluation
 from dpgcli.sweeps.expressions import Expression
 from dpgcli.text import KeyPath
 
@@ -99,8 +100,23 @@ def goal_in(
         raise SpecError(in_order(problems))
     right = tuple(target for target in targets if target is not None)
     goal = Goal(base_spec.design, ranges, lists, right, constraints, objectives, known)
+    if problem := _too_many_states(document, goal):
+        raise SpecError((problem,))
     files = tuple(dict.fromkeys((*own, *base.files)))
     return GoalFile(goal, base_spec, base, files, dict(document.data))
+
+
+def _too_many_states(document: Document, goal: Goal) -> Problem | None:
+    """Of designs all of whose states matter, for each of very many designs."""
+    longest = int(max(goal.lists.get(UNITS, (goal.base.units,))))
+    of_all = MapEvaluation(goal).names or any(not target.pattern for target in goal.targets)
+    if not of_all or 2**longest <= MOST_STATES:
+        return None
+    most = MOST_STATES.bit_length() - 1
+    expected = f"at most {most} units, as what is asked for is about all states of a design"
+    path: KeyPath = ("vary", UNITS) if UNITS in goal.lists else ("base",)
+    hint = f"{2**longest:,} states; a sweep takes longer fingers"
+    return document.problem(path, expected, f"{longest}", hint)
 
 
 def _listed(document: Document, key: str) -> list[Any]:
