@@ -47,10 +47,10 @@ def spec_text(spec: Spec, about: str) -> str:
     return text
 
 
-def write_spec(path: Path, spec: Spec, about: str) -> None:
-    """Write a spec as `spec_text` has it, in the place of nothing but such a file."""
+def write_spec(path: Path, spec: Spec, about: str, mark: Mark = Mark.SPEC) -> None:
+    """Write a spec as `spec_text` has it, in the place of nothing but such a file, by its mark."""
     text = spec_text(spec, about)
-    with whole_file(path, Mark.SPEC) as temporary:
+    with whole_file(path, mark) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -26,9 +26,16 @@ NamedTable = tuple[str, tuple[Column, ...], Columns]
 def check_folder(folder: Path, given: GoalFile) -> None:
     """Raise OutputError or UsageError for a folder that tables cannot go into, before the work.
 
+    Nor may there be specs of designs that no search wrote: what it finds would take their names.
     Whoever calls has the folder to himself, here and below.
     """
-    check_outputs(given.files, *((folder / name, Mark.TABLE) for name in (BEST, TRACE)))
+    tables = ((folder / name, Mark.TABLE) for name in (BEST, TRACE))
+    check_outputs(given.files, *tables, *((path, Mark.FOUND) for path in _specs(folder)))
+
+
+def _specs(folder: Path) -> list[Path]:
+    with writing(folder):
+        return sorted(path for path in folder.iterdir() if SPEC_NAME.fullmatch(path.name))
 
 
 def write_designs(
@@ -42,9 +49,8 @@ def write_designs(
 
     Specs of more designs that an earlier search left there are removed.
     """
+    check_folder(folder, given)
     own = {folder / f"design_{number}.yaml": spec for number, spec in enumerate(specs, start=1)}
-    marked = [*((folder / name, Mark.TABLE) for name, *_ in tables), *((p, Mark.SPEC) for p in own)]
-    check_outputs(given.files, *marked)
     metadata = {
         "dpg.schema_version": str(SCHEMA_VERSION),
         "dpg.goal": json.dumps(given.said, sort_keys=True),
@@ -56,9 +62,8 @@ def write_designs(
         described = with_bases(schema(columns), metadata)
         write_table(folder / name, described, [record_batch(columns, rows)], metadata)
     for number, (path, spec) in enumerate(own.items(), start=1):
-        write_spec(path, spec, f"design {number} of {tables[0][0]}")
-    with writing(folder):
-        for path in folder.iterdir():
-            is_old = SPEC_NAME.fullmatch(path.name) and path not in own
-            if is_old and path.is_file() and is_own(path, Mark.SPEC):
+        write_spec(path, spec, f"design {number} of {BEST}", Mark.FOUND)
+    for path in _specs(folder):
+        with writing(path):
+            if path not in own and path.stat().st_size and is_own(path, Mark.FOUND):
                 path.unlink()

@@ -41,6 +41,7 @@ class Mark(Enum):
     GRAPH = rb"\A<\?xml [^>]*>\n<!-- written by dpg -->\n<graphml "
     CALIBRATION = rb"\Acalibration_version: .*\nmade_by: dpg "
     SPEC = rb"\A# Written by dpg: "
+    FOUND = rb"\A# Written by dpg: design \d+ of best\.parquet\n"
     DEPFILE = rb"\A# dpg sweep: "
     DECK = rb"\A\*\* dpg fe "
     CURVE = rb"\A# dpg fe "
@@ -244,7 +245,8 @@ def _check_replaceable(target: Path, mark: Mark) -> None:
         raise PermissionError(None, "it is write-protected")
     if not is_own(target, mark):
         hint = "move it away, or give another name"
-        raise FileExistsError(None, f"it is there and not of dpg; {hint}")
+        whose = "of dpg, but another kind of file" if marks_of(target) else "not of dpg"
+        raise FileExistsError(None, f"it is there and {whose}; {hint}")
 
 
 @contextmanager

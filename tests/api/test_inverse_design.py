@@ -92,15 +92,45 @@ def test_specs_of_an_earlier_search_go_and_those_of_people_stay(
 ) -> None:
     folder = tmp_path / "found"
     found = dpg.inverse_design(goal(vary={STROKE: {"from": 3, "to": 4}}), folder)
-    old = folder / "design_1.yaml"
-    (folder / "design_98.yaml").write_bytes(old.read_bytes())
-    (folder / "design_99.yaml").write_text("finger: {}\n")
+    own = (folder / "design_1.yaml").read_text()
+    (folder / "design_98.yaml").write_text(own)
+    (folder / "design_97.yaml").touch()
     found.save(folder)
     assert not (folder / "design_98.yaml").exists()
-    assert (folder / "design_99.yaml").read_text() == "finger: {}\n"
-    old.write_text("finger: {}\n")
-    with pytest.raises(dpg.OutputError, match="not of dpg"):
-        found.save(folder)
+    assert (folder / "design_97.yaml").exists()
+
+
+@pytest.mark.parametrize("first", ["finger: {}", "# Written by dpg: design 99 of the sweep x"])
+@pytest.mark.parametrize("name", ["design_1.yaml", "design_99.yaml"])
+def test_specs_that_no_search_wrote_are_asked_about_before(
+    goal: Callable[..., Goal],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    first: str,
+) -> None:
+    monkeypatch.setattr("dpgcli.api.inverse_design.search", None)  # nothing is begun
+    (tmp_path / name).write_text(f"{first}\n")
+    with pytest.raises(dpg.OutputError, match=f"{name}: it is there and (not )?of dpg"):
+        dpg.inverse_design(goal(), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == f"{first}\n"
+
+
+def test_a_base_that_an_earlier_search_found_is_not_replaced(
+    goal: Callable[..., Goal], tmp_path: Path
+) -> None:
+    folder = tmp_path / "found"
+    dpg.inverse_design(goal(vary={STROKE: {"from": 3, "to": 4}}), folder)
+    base = (folder / "design_1.yaml").rename(folder / "design_9.yaml")
+    (tmp_path / "goal.yaml").write_text(
+        "base: found/design_9.yaml\n"
+        f"vary: {{{HINGE}: {{from: 15, to: 40}}}}\n"
+        "targets: [{pattern: '111', quantity: tip, value: [35, -19], tolerance_mm: 1}]\n"
+    )
+    with pytest.raises(UsageError, match=r"design_9\.yaml is the spec or data that is read"):
+        dpg.inverse_design(tmp_path / "goal.yaml", folder)
+    assert base.exists()
 
 
 def test_what_is_asked_of_maps_is_certified_too(goal: Callable[..., Goal]) -> None:

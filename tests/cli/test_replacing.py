@@ -98,7 +98,7 @@ def test_a_file_of_another_kind_is_not_replaced(call: Call, inputs: Path, own: s
     before = everything(inputs)
     result = call(*RUN, "--depfile", own)
     assert result.exit_code == ExitCode.USAGE
-    assert f"cannot write {own}: it is there and not of dpg" in result.stderr
+    assert f"cannot write {own}: it is there and of dpg, but another kind of file" in result.stderr
     assert everything(inputs) == before
 
 

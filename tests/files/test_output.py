@@ -188,6 +188,7 @@ KNOWN = {
     Mark.CALIBRATION: [b"calibration_version: 1\nmade_by: dpg 0.1.0, numpy 2" + LONG],
     Mark.DEPFILE: [b"# dpg sweep: what\na/states.parquet a/designs.parquet: b.yaml\n"],
     Mark.SPEC: [b"# Written by dpg: design 3 of the sweep around a.yaml\nfinger:\n" + LONG],
+    Mark.FOUND: [b"# Written by dpg: design 3 of best.parquet\nfinger:\n" + LONG],
     Mark.DECK: [b"** dpg fe hinge" + LONG],
     Mark.CURVE: [b"# dpg fe hinge: a simulation"],
     Mark.CONTROLLER: [b"# dpg routine: pressures of lines by time\ntime_s,A_MPa\n"],
@@ -228,7 +229,8 @@ def test_files_are_known_by_their_marks(tmp_path: Path, mark: Mark) -> None:
     for kind, contents in KNOWN.items():
         for content in contents:
             path.write_bytes(content)
-            assert is_own(path, mark) == (mark in (kind, Mark.ANY)), content[:40]
+            is_one = mark in (kind, Mark.ANY) or (mark, kind) == (Mark.SPEC, Mark.FOUND)
+            assert is_own(path, mark) == is_one, content[:40]
     for content in STRANGE:
         path.write_bytes(content)
         assert is_own(path, mark) == (mark is Mark.ANY), content[:40]
