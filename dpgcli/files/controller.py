@@ -6,13 +6,14 @@ from pathlib import Path
 
 from dpgcli.design.lines import TIME
 from dpgcli.design.pressure import History
+from dpgcli.files.histories import LINE, PRESSURE, UNIT
 from dpgcli.files.output import Mark, whole_file
 
-HEAD = "# dpg routine: pressures of lines by time, straight from one row to the next\n"
+HEAD = "# dpg routine: pressures of lines by time, straight from one row of a line to the next\n"
 
 
 def write_controller(path: Path, lines: Sequence[str], history: History) -> None:
-    """Write a row for each time: time_s, and the pressure of each line, such as A_MPa."""
+    """Write a row for each time and line: time_s, line, pressure_MPa."""
     assert history.time is not None, "controllers go by time"
     with (
         whole_file(path, Mark.CONTROLLER) as temporary,
@@ -20,6 +21,9 @@ def write_controller(path: Path, lines: Sequence[str], history: History) -> None
     ):
         stream.write(HEAD)
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([TIME, *(f"{line}_MPa" for line in lines)])
+        writer.writerow([TIME, LINE, f"{PRESSURE}{UNIT}"])
         for time, row in zip(history.time.tolist(), history.pressure.tolist(), strict=True):
-            writer.writerow([f"{time:g}", *(f"{value:.10g}" for value in row)])
+            writer.writerows(
+                [f"{time:.10g}", line, f"{value:.10g}"]
+                for line, value in zip(lines, row, strict=True)
+            )
