@@ -302,4 +302,4 @@ def test_shares_no_code_with_the_solver(module: ModuleType) -> None:
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     own = {name for name in modules if name and name.startswith("dpgcli")}
     others = {energy.__name__, units_module.__name__}
-    assert own - others <= {"dpgcli.arrays", "dpgcli.mechanics.finger"}
+    assert own - others <= {"dpgcli.arrays", "dpgcli.mechanics.finger", "dpgcli.records"}
