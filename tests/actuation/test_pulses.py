@@ -160,6 +160,7 @@ def test_a_look_up_table_is_that_of_hysterons(
         assert not rows.is_tie.any()
 
 
+@pytest.mark.slow
 def test_routes_are_the_shortest_to_every_state(study: Study, pressed: Made) -> None:
     own = pressed(study(3, np.inf).changed(stroke=STROKES[:3]))
     line, reach = np.array([0, 1, 0]), thresholds_alone(own).reach

@@ -46,6 +46,7 @@ def test_grasps_tell_the_body_as_it_was(tmp_path: Path) -> None:
     assert json.loads(said["spec"])["object"]["disc"] == {"diameter_mm": 10.0}
 
 
+@pytest.mark.slow
 def test_jaws_tell_their_apertures(tmp_path: Path) -> None:
     said = chosen(dpg.jaws(SPEC, gaps=(20.0, 24.0), at=(20.0, 0.0), patterns="00"), tmp_path)
     assert json.loads(said["gaps_mm"]) == [20.0, 24.0]

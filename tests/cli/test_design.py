@@ -133,6 +133,7 @@ def test_explain_says_how_a_goal_is_searched_for(run: Run, goal: Callable[[str],
     assert facts["slopes"] == {"tip_x_mm": "exact", "tip_y_mm": "exact"}
 
 
+@pytest.mark.slow
 def test_processes_and_where_they_are(run: Run, goal: Callable[[str], str]) -> None:
     name = goal("[36, -16]")
     done = run("design", name, "-o", "found", "-j", "2", "-q")

@@ -178,6 +178,7 @@ def test_both_parts_of_a_place_stand_for_it(
     assert (said in result.stdout + result.stderr) is not is_whole
 
 
+@pytest.mark.slow
 def test_settings_are_those_of_the_body_that_is_said(call: Any, folder: Path, gripper: str) -> None:
     """Whether the spec has an object or not, and the place may be one of them."""
     chosen = ("--pattern", "11100", "--object", "disc:40")
@@ -204,6 +205,7 @@ def test_wrong_settings_of_the_body_that_is_said(call: Any, gripper: str) -> Non
         assert result.exit_code == ExitCode.USAGE and wrong in result.stderr, result.stderr
 
 
+@pytest.mark.slow
 def test_jaws_of_a_file_have_their_forces_beside_it(call: Any, folder: Path, gripper: str) -> None:
     (folder / "bodies").mkdir()
     own = folder / "bodies" / "own.yaml"

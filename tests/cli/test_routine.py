@@ -34,6 +34,7 @@ def spec(folder: Path) -> str:
     return "g.yaml"
 
 
+@pytest.mark.slow
 def test_rows_and_files(call: Any, folder: Path, spec: str) -> None:
     files = "--output", "r.parquet", "--controller", "r.csv", "--plot", "r.svg"
     times = "--ramp", "500s", "--move", "2m"

@@ -35,7 +35,7 @@ def scene(n_units: int, held: Held = Held.FIXED) -> Scene:
         pytest.param(Held.FREE, "place", False, marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.parametrize("size", [1, 3])
+@pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_rows_are_the_same_in_blocks_of_any_size(
     monkeypatch: pytest.MonkeyPatch, held: Held, way: str, both: bool, size: int
 ) -> None:

@@ -71,6 +71,7 @@ def test_a_worker_that_dies_once_costs_nothing(deadly: Any, tmp_path: Path) -> N
     assert Chunk(4, 8) in runner.deaths
 
 
+@pytest.mark.slow
 def test_a_worker_that_starts_while_the_pool_breaks_is_not_waited_for(
     deadly: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
