@@ -16,7 +16,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import Measured, ScalarLaw, WideMeasured, take_lanes
 from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, follow
+from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.records import dataclass
 
 FURTHEST = 10.0  # strokes: no unit goes as far

@@ -18,7 +18,7 @@ from dpgcli.actuation.domes import PressedDomes
 from dpgcli.arrays import Array, Flags
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.loaded import LoadedPotential, along
-from dpgcli.equilibrium.path import AWAY
+from dpgcli.equilibrium.steps import AWAY
 from dpgcli.mechanics.coordinates import FingerCoordinates
 
 NO_RATE = 1e-9  # of the largest rate: less is rounding, or of second order

@@ -23,8 +23,9 @@ from dpgcli.design.pressure import Pressure
 from dpgcli.equilibrium.contracts import ScalarLaw, Term
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, Watch, follow
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, Watch, follow
 from dpgcli.equilibrium.potential import Potential
+from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.curve import Spline
 from dpgcli.mechanics.finger import Finger

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.path import Ends, PathEnd, Walk, to_events
+from dpgcli.equilibrium.path import Ends, to_events
+from dpgcli.equilibrium.walk import PathEnd, Walk
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished, relaxed
 from dpgcli.grasping.shapes import ContactShapes

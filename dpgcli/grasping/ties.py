@@ -6,8 +6,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import Term
 from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import AT_KINK
 from dpgcli.equilibrium.potential import Potential
+from dpgcli.equilibrium.steps import AT_KINK
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import TOLERANCE
 from dpgcli.grasping.shapes import ContactShapes

@@ -8,7 +8,8 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import Measure
 from dpgcli.equilibrium.loaded import LoadedPotential, Unchanged
 from dpgcli.equilibrium.newton import minimize
-from dpgcli.equilibrium.path import LARGEST_STEP, Ends, PathEnd, follow
+from dpgcli.equilibrium.path import LARGEST_STEP, Ends, follow
+from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.terms import LOAD, Formulate
 from dpgcli.records import dataclass

@@ -15,7 +15,7 @@ from dpgcli.actuation.staircase import Way, driven
 from dpgcli.arrays import Array
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.loaded import along
-from dpgcli.equilibrium.path import AWAY
+from dpgcli.equilibrium.steps import AWAY
 from dpgcli.mechanics.finger import Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dpgcli.arrays import Array
-from dpgcli.equilibrium import corrector, path
+from dpgcli.equilibrium import corrector, path, steps, walk
 from dpgcli.grasping import approach as approaching
 from dpgcli.mechanics.finger import Finger
 
@@ -120,7 +120,7 @@ def test_steps_do_not_matter(
     finger = reference_finger(2, 1e4)
     coarse = grown(finger, *RESETS)
     monkeypatch.setattr(path, "LARGEST_STEP", 0.5 * path.LARGEST_STEP)
-    monkeypatch.setattr(path, "FIRST_STEP", 0.5 * path.FIRST_STEP)
+    monkeypatch.setattr(walk, "FIRST_STEP", 0.5 * walk.FIRST_STEP)
     monkeypatch.setattr(corrector, "STRAYING", 0.1 * corrector.STRAYING)
     fine = grown(finger, *RESETS)
     assert fine.shapes.coordinates == pytest.approx(coarse.shapes.coordinates, abs=1e-11)
@@ -138,11 +138,11 @@ def test_events_are_where_secants_find_them(
     by_newton = grown(finger, patterns, *TWO_SIDES[1:])
     asked: list[bool] = []
 
-    def by_secants(walk: path.Walk, trial: Any, cell: Array, is_away: Array) -> Array:
+    def by_secants(_: walk.Walk, trial: Any, cell: Array, is_away: Array) -> Array:
         asked.extend(cell >= 0)
-        return np.full(len(cell), path.BY_SECANTS)
+        return np.full(len(cell), walk.BY_SECANTS)
 
-    monkeypatch.setattr(path, "_to_meet", by_secants)
+    monkeypatch.setattr(steps, "_to_meet", by_secants)
     found = grown(finger, patterns, *TWO_SIDES[1:])
     assert any(asked)
     assert found.shapes.coordinates == pytest.approx(by_newton.shapes.coordinates, abs=1e-11)
@@ -162,7 +162,7 @@ def test_newton_meets_an_event(reference_finger: Fingers, begun: Grow, is_held: 
     family, x = obstructed.family(shapes.inverted, shapes.active), obstructed.stacked(shapes)
     depth, nobody = max(family.column_depths), np.array([-1])
     first = path.follow(family, x, np.array([0.2]), np.array([1.0]))
-    assert first.outcome == path.PathEnd.EVENT
+    assert first.outcome == walk.PathEnd.EVENT
     cell = np.array([0 if is_held and shapes.active.any() else -1])
     target = family.followed(x).value[cell]
     ways = corrector.Ways(np.zeros(1, bool), first.cell)
