@@ -144,7 +144,7 @@ def followed(
     """
     stuck, begun = _stuck(own, shapes, friction)
     freed = released(stuck, begun)
-    is_lost = np.isfinite(_reset_at(freed)) | ~_stick(stuck, freed)
+    is_lost = np.isfinite(_reset_at(freed)) | ~_stick(stuck, freed, 1.0)
     stands = freed.shapes.is_there & ~is_lost
     assert stuck.motion is not None, "a body that may move"
     pulled = replace(stuck, motion=replace(stuck.motion, hold=-pull))  # beyond 1 it pulls
@@ -152,7 +152,7 @@ def followed(
     begin = replace(freed.shapes, is_there=stands)
     came = approach(pulled, begin, once, 2.0 * once, to_reset=True)
     reset_at = _reset_at(came)
-    slips_at = np.where(_stick(stuck, came), np.inf, came.load)
+    slips_at = np.where(_stick(stuck, came, 2.0), np.inf, came.load)
     is_known = is_lost | np.isfinite(reset_at) | (stands & came.shapes.is_there)
     share = np.where(is_lost, 0.0, np.minimum(reset_at, slips_at) - 1.0)
     is_reset = np.isfinite(np.where(is_lost, _reset_at(freed), reset_at))
@@ -167,9 +167,10 @@ def _reset_at(came: Approach) -> Array:
     return load
 
 
-def _stick(stuck: Obstructed, came: Approach) -> Flags:
-    """Which lanes all places stick in."""
-    return np.asarray((came.shapes.active | ~stuck.are_kept).all(axis=0))
+def _stick(stuck: Obstructed, came: Approach, end: float) -> Flags:
+    """Which lanes all places stick in, up to a load; one that ends before has slipped, or reset."""
+    sticks = (came.shapes.active | ~stuck.are_kept).all(axis=0)
+    return np.asarray(sticks & (came.load >= end))
 
 
 def _stuck(

@@ -258,3 +258,22 @@ def test_nothing_of_payloads_is_there_without_friction(tmp_path: Path) -> None:
         [sys.executable, "run.py"], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert ran.stdout.splitlines() == ["[]", "[]", "[]"]
+
+
+def test_less_friction_bears_no_more() -> None:
+    """Down to none, with which a body that is pushed along its pull gets away at once."""
+    sizes = {"dome_height_mm": 6.5, "dome_thickness_mm": 0.75, "unit_cell_mm": 22}
+    sizes |= {"chamber_length_mm": 9, "channel_width_mm": 10, "limiting_layer_thickness_mm": 1.5}
+    sizes |= {"unit_separation_mm": 3, "elastic_modulus_MPa": 26}
+    finger = {"units": 3, "calibration": "published", "geometry": sizes}
+    can = {"disc": {"diameter_mm": 26}, "at_mm": [35, 0], "friction": 0.5}
+    spec = {"finger": finger, "gripper": {"base_spacing_mm": 34}, "object": can}
+    spec |= {"loads": {"gravity_direction": "x"}}
+    borne = []
+    for friction in (0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.3, 0.6):
+        found = dpg.grasp(spec, patterns="011", settings={"object.friction": friction})
+        borne.append(found.table.to_pandas().payload_N.item())
+        failing = found.table.to_pandas().fails_first.item()
+        assert failing == "slip" or friction > 0.3
+    assert borne[:-1] == [0.0] * 7
+    assert borne[-1] > 0.5
