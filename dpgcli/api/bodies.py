@@ -34,6 +34,7 @@ SMALLEST, LARGEST = 1e-3, 1e4  # mm: of what a text says
 JAW_HEIGHT = 40.0  # mm, unless the text says it
 SUFFIXES = (".yaml", ".yml")
 OWN = "object."  # settings of the body
+NO_BODY = ": expected a body such as disc:40, here or as object in the spec"
 KINDS = (
     "expected disc and its diameter in mm such as disc:40, jaws and their gap such as jaws:30 or "
     f"jaws:30x40 with their height, each from {SMALLEST:g} to {LARGEST:g}, or a .yaml file"
@@ -69,9 +70,8 @@ def with_body(
         if known is None and scene.gripper is not None and place is None:
             return given
         if known is None:
-            what = ": expected a body such as disc:40, here or as object in the spec"
             hint = "" if scene.gripper is not None else "; two fingers, of a gripper, go without"
-            raise UsageError(Field("object"), what + hint)
+            raise UsageError(Field("object"), NO_BODY + hint)
         body = known if place is None else replace(known, center=place)
         return replace(given, scene=replace(scene, body=body))
     whole = _document(said)

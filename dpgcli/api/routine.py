@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dpgcli.api.bodies import (
+    NO_BODY,
     check_body,
     force_lines,
     own_settings,
@@ -158,14 +159,20 @@ class RoutineResult:
         payload = self.rows["payload_N"][-1] if "payload_N" in self.rows else 0.0
         return {
             "collides": f"body and fingers meet with the body at {x:.4g},{y:.4g} mm",
-            NO_PULSES: f"no pulses up to {self.routine.search.known.reach:.4g} MPa lead on from "
-            f"{self.rows['pattern_after'][-1]}",
+            NO_PULSES: f"no pulses up to {self.routine.search.known.reach:.4g} MPa lead "
+            f"{self._on_to(last.stage)} from {self.rows['pattern_after'][-1]}",
             "not_touched": "not both fingers touch the body after the pulses that close them",
             "slips": "the body slips as soon as its support is gone",
             "not_held": "let go of, the body leaves the fingers",
             "too_heavy": f"{payload:.4g} N are borne of a weight of {weight:.4g} N",
             "in_touch": "after the pulses that let go the fingers still touch the body",
         }.get(last.status, f"{last.stage} ends {last.status}")
+
+    def _on_to(self, stage: Stage) -> str:
+        closed = self.routine.search.known.closed
+        if stage is not Stage.CLOSE or closed is None:
+            return "on"
+        return f"to {closed:0{self.given.scene.finger.n_units}b}, as without the body,"
 
     def _unchecked(self) -> Iterator[str]:
         lifts = self.routine.task.scene.held is not Held.FIXED
@@ -300,7 +307,8 @@ def planned(
     ]
     given = with_body(pressed.given, body, at, of_body)
     known = given.scene.body
-    assert known is not None, "a scene with a body"
+    if known is None:
+        raise UsageError(Field("object"), NO_BODY)
     check_body(given.scene, known)
     if gives_way(known):
         raise UsageError(
@@ -308,6 +316,10 @@ def planned(
         )
     if (begin == known.center).all():
         raise UsageError(Field("approach_from"), ": expected another place than that of the body")
+    nearest = float(known.nearest_x)
+    if nearest + begin[0] - known.center[0] < min(0.0, nearest):
+        expected = ": expected a place in front of the gripper's base, found one behind it, at "
+        raise UsageError(Field("approach_from"), f"{expected}x = {begin[0]:g} mm")
     keep_freed_memory()
     found = prospect(Task(given.scene, pressed.pressed, begin), *codes)
     if not len(found.graph.code):

@@ -101,8 +101,12 @@ def routine(
         found = found_routine(given, known, *times)
     if output is not None:
         found.save(output)
-    if controller is not None and found.exists:
-        found.save_controller(controller)
+    if controller is not None:
+        if found.exists:
+            found.save_controller(controller)
+        else:
+            old = ": what is there is of another run" if controller.exists() else ""
+            say(f"{controller} is not written{old}")
     if plot is not None and found.routine.steps:
         found.draw(plot)
     print_rows(found.columns, found.rows, printed_as)

@@ -152,7 +152,7 @@ def failing(**changes: Any) -> RoutineResult:
     ("changes", "step", "status", "reason"),
     [
         ({"gripper.base_spacing_mm": 26}, "approach", "collides", "meet with the body at "),
-        ({"closed": "101"}, "close", "no_pulses", "lead on from 000"),
+        ({"closed": "101"}, "close", "no_pulses", "lead to 101, as without the body, from 000"),
         pytest.param(
             *({"at": (70.0, 0.0)}, "close", "not_touched", "not both fingers touch"),
             marks=pytest.mark.slow,

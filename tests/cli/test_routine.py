@@ -50,7 +50,7 @@ def test_rows_and_files(call: Any, folder: Path, spec: str) -> None:
     assert json.loads(told["dpg.object"])["disc"] == {"diameter_mm": 26.0}
     lines = (folder / "r.csv").read_text().splitlines()
     assert lines[0].startswith("# dpg routine: ")
-    assert lines[1] == "time_s,A_MPa"
+    assert lines[1] == "time_s,line,pressure_MPa"
     assert [line.split(",")[0] for line in lines[2:]] == [
         *("0", "120", "620", "1120", "1240", "1740", "2240", "2360")
     ]
@@ -71,6 +71,7 @@ def test_what_cannot_be_done_is_exit_1_with_rows(call: Any, folder: Path, spec: 
     assert "collides" in result.stdout.splitlines()[2]
     assert "approach: collides in 2 open states" in result.stderr
     assert not (folder / "r.csv").exists()
+    assert "r.csv is not written\n" in result.stderr
     assert "2 approach collides" in (folder / "r.svg").read_text()
     quiet = call("routine", spec, *BODY, *options[:2], "--quiet")
     assert (quiet.exit_code, quiet.stderr) == (ExitCode.REQUIREMENT, "")
@@ -83,6 +84,11 @@ def test_what_cannot_be_done_is_exit_1_with_rows(call: Any, folder: Path, spec: 
         (("--ramp", "fast"), "--ramp fast: expected a time in s, m or h"),
         (("--ramp", "0s"), "--ramp 0: expected a number > 0"),
         (("--approach-from", "20,0"), "--approach-from: expected another place"),
+        (
+            ("--approach-from", "-90,0"),
+            "expected a place in front of the gripper's base, found one",
+        ),
+        (("--approach-from", "0,0"), "found one behind it, at x = 0 mm"),
         (("--open", "2"), "--open 2: expected 2 digits, 0 or 1"),
         (("--output", "r.csv"), "--output r.csv: writes Parquet"),
         (("--plot", "r.pdf"), "--plot r.pdf: expected a name"),
@@ -93,6 +99,22 @@ def test_refusals(call: Any, spec: str, options: tuple[str, str], said: str) -> 
     result = call("routine", spec, *BODY, *options)
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr
+
+
+def test_an_old_file_for_a_controller_is_told_of(call: Any, folder: Path, spec: str) -> None:
+    (folder / "r.csv").write_text("# dpg routine: of another one\n")
+    options = "--set", "gripper.base_spacing_mm=27", "--controller", "r.csv", "--quiet"
+    result = call("routine", spec, *BODY, *options)
+    assert result.exit_code == ExitCode.REQUIREMENT
+    assert result.stderr == "r.csv is not written: what is there is of another run\n"
+
+
+def test_a_body_is_needed(call: Any, spec: str) -> None:
+    result = call("routine", spec, *BODY[-2:])
+    assert result.exit_code == ExitCode.USAGE
+    assert (
+        "--object: expected a body such as disc:40, here or as object in the spec" in result.stderr
+    )
 
 
 def test_a_place_to_come_from_is_needed(call: Any, spec: str) -> None:
