@@ -393,9 +393,9 @@ def check_positive(field: str, value: float | None) -> None:
     """Raise UsageError for a number, if there is one, that is not above zero or out of reach."""
     check_numbers(**{field: value})
     if value is not None and not SMALLEST <= value <= LARGEST:
-        raise UsageError(
-            Field(field), f" {value:g}: expected a number > 0, from {SMALLEST:g} to {LARGEST:g}"
-        )
+        found = f"{value:g}" if isinstance(value, float) else quoted(value)
+        expected = f"expected a number > 0, from {SMALLEST:g} to {LARGEST:g}"
+        raise UsageError(Field(field), f" {found}: {expected}")
 
 
 def chosen(kind: type[E], field: str, value: str) -> E:

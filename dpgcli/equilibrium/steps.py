@@ -72,7 +72,8 @@ def one_step(
         ending[is_fold] = PathEnd.FOLD
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
-    is_rough = (step < ROUGHLY * to_fold) & ~walk.is_beyond
+    may_be_rough = family.may_kink is not None  # of contacts; pressures are told of at each point
+    is_rough = may_be_rough & (step < ROUGHLY * to_fold) & ~walk.is_beyond
     trial = _tried(family, walk, step, end, towards, depth, is_rough)
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
@@ -102,7 +103,7 @@ def one_step(
     if by_load.any():
         go_by_load(walk, by_load)
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
-    walk.meeting = _to_meet(walk, trial, np.where(is_event, event_cell, -1), is_away)
+    walk.meeting = _to_meet(family, walk, trial, np.where(is_event, event_cell, -1), is_away)
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
@@ -133,8 +134,20 @@ def _crossed(before: Array, after: Array, is_away: Flags) -> Array:
     return np.where(is_crossed, np.where(is_new, -0.5, by_secant), 0.0)
 
 
-def _to_meet(walk: Walk, trial: _Trial, cell: Indices, is_away: Flags) -> Indices:
-    """The cell whose margin is to be met next, of those that have been crossed, −1 for none."""
+def _to_meet(
+    family: LoadedPotential[Coordinates, LoadedLaw],
+    walk: Walk,
+    trial: _Trial,
+    cell: Indices,
+    is_away: Flags,
+) -> Indices:
+    """The cell whose margin is to be met next, of those that have been crossed, −1 for none.
+
+    Newton's method meets contacts; margins of other laws, which have kinks of their own, are come
+    near to by secants.
+    """
+    if family.may_kink is None:
+        return np.full(len(cell), BY_SECANTS)
     is_lost = trial.is_meeting & ~trial.is_fine
     by_secants = is_lost | (walk.meeting == BY_SECANTS)
     is_met = (cell >= 0) & is_away[np.maximum(cell, 0), np.arange(len(cell))] & ~by_secants

@@ -138,7 +138,7 @@ def test_events_are_where_secants_find_them(
     by_newton = grown(finger, patterns, *TWO_SIDES[1:])
     asked: list[bool] = []
 
-    def by_secants(_: walk.Walk, trial: Any, cell: Array, is_away: Array) -> Array:
+    def by_secants(_: Any, own: walk.Walk, trial: Any, cell: Array, is_away: Array) -> Array:
         asked.extend(cell >= 0)
         return np.full(len(cell), walk.BY_SECANTS)
 
