@@ -76,15 +76,13 @@ def routine(
     """Find pulses that open a gripper, close it on a body, carry it and let it go."""
     from dpgcli.api.inputs import check_positive
     from dpgcli.api.routine import found_routine, planned, seconds_of
-    from dpgcli.errors import UsageError
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.sweeps.extent import time_text
 
     if plot is not None:
         check_plot(plot)
     check_table_name(output)
-    if controller is not None and controller.suffix.lower() != ".csv":
-        raise UsageError(f"--controller {controller}: expected a name that ends in .csv")
+    _check_controller(controller)
     times = [seconds(f"--{name}", text) for name, text in (("ramp", ramp), ("move", move))]
     for name, time in zip(("ramp", "move"), times, strict=True):
         check_positive(name, time)
@@ -101,12 +99,11 @@ def routine(
         found = found_routine(given, known, *times)
     if output is not None:
         found.save(output)
-    if controller is not None:
-        if found.exists:
-            found.save_controller(controller)
-        else:
-            old = ": what is there is of another run" if controller.exists() else ""
-            say(f"{controller} is not written{old}")
+    if controller is not None and found.exists:
+        found.save_controller(controller)
+    elif controller is not None:
+        old = ": what is there is of another run" if controller.exists() else ""
+        say(f"{controller} is not written{old}")
     if plot is not None and found.routine.steps:
         found.draw(plot)
     print_rows(found.columns, found.rows, printed_as)
@@ -116,3 +113,11 @@ def routine(
             say(line)
     if not found.exists:
         raise typer.Exit(ExitCode.REQUIREMENT)
+
+
+def _check_controller(path: Path | None) -> None:
+    """Raise UsageError for a name that promises another kind of file."""
+    from dpgcli.errors import UsageError
+
+    if path is not None and path.suffix.lower() != ".csv":
+        raise UsageError(f"--controller {path}: expected a name that ends in .csv")
