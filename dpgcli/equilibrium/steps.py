@@ -72,9 +72,9 @@ def one_step(
         ending[is_fold] = PathEnd.FOLD
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
-    may_be_rough = family.may_kink is not None  # of contacts; pressures are told of at each point
-    is_rough = may_be_rough & (step < ROUGHLY * to_fold) & ~walk.is_beyond
-    trial = _tried(family, walk, step, end, towards, depth, is_rough)
+    trial = _tried(
+        family, walk, step, end, towards, depth, _may_be_rough(family, walk, step, to_fold)
+    )
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
     dip = _first_dip(family, walk, trial, towards)
@@ -115,6 +115,17 @@ def one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _may_be_rough(
+    family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array, to_fold: Array
+) -> Flags:
+    """Which points need not be exact: among contacts, well before folds and events.
+
+    Those under pressure are told of, each of them.
+    """
+    is_on_the_way = (step < ROUGHLY * to_fold) & ~walk.is_beyond
+    return is_on_the_way & (family.may_kink is not None)
 
 
 def _by_guess(trial: _Trial, nearer: Array) -> Array:
