@@ -72,9 +72,7 @@ def one_step(
         ending[is_fold] = PathEnd.FOLD
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
-    trial = _tried(
-        family, walk, step, end, towards, depth, _may_be_rough(family, walk, step, to_fold)
-    )
+    trial = _tried(family, walk, step, end, towards, depth, _rough(family, walk, step, to_fold))
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
     dip = _first_dip(family, walk, trial, towards)
@@ -117,7 +115,7 @@ def one_step(
     return ending
 
 
-def _may_be_rough(
+def _rough(
     family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array, to_fold: Array
 ) -> Flags:
     """Which points need not be exact: among contacts, well before folds and events.
