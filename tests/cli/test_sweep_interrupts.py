@@ -233,7 +233,8 @@ def test_an_interrupt_under_way_says_how_to_go_on(
 def test_an_interrupt_while_the_workers_start(
     launch: Launch, folder: Path, mark: str, way: str
 ) -> None:
-    """Workers that find their pool gone end without a word."""
+    """Workers that find their pool gone end without a word; there is more work than time."""
+    (folder / "sweep.yaml").write_text(SWEEP.replace("count: 12", "count: 240"))
     code, _ = WAYS[way]
     for delay in (0.0, 0.03, 0.06, 0.1, 0.15):
         process = launch("-j", "2")
