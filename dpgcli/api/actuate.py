@@ -28,7 +28,7 @@ from dpgcli.api.inputs import (
     table_path,
 )
 from dpgcli.api.pressure import PressedInput, pressed_input
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, Field, UsageError
@@ -50,7 +50,7 @@ WHY = {
 
 
 @dataclass(frozen=True)
-class ActuateResult:
+class ActuateResult(TableResult):
     """What happened to a finger under pressure, and where it ended.
 
     `given` is the spec with its lines, `history` the pressures by step, `way` what was followed.

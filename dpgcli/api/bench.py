@@ -20,7 +20,7 @@ from dpgcli.api.inputs import (
     scene_input,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.benchmark.bench import COLUMNS, Bench, BenchRow, as_columns
 from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
@@ -38,7 +38,7 @@ MOST_REPEATS = 1000
 
 
 @dataclass(frozen=True)
-class BenchResult:
+class BenchResult(TableResult):
     """Measurements, a row for each method and size; `recorded` are rows of an earlier record.
 
     `files` are those that were read.

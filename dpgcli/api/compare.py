@@ -9,7 +9,7 @@ import numpy as np
 from dpgcli.api.data import frame_of
 from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, scene_input
 from dpgcli.api.recalibration import CalibrationInput, recalibrated_scene
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns
 from dpgcli.benchmark.timing import measured
 from dpgcli.calibration import comparison
@@ -27,7 +27,7 @@ REPEATS = 5
 
 
 @dataclass(frozen=True)
-class CompareResult:
+class CompareResult(TableResult):
     """Known states and the lattice's own, `calibrated` by another calibration if there is one.
 
     `calibrated_law` is that of its domes, in words; `frame_words` say where the `frame` of the data

@@ -27,7 +27,7 @@ from dpgcli.api.inputs import (
     scene_input,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
 from dpgcli.design.bodies import Friction
 from dpgcli.design.loads import direction_text
@@ -45,8 +45,6 @@ from dpgcli.states.patterns import select
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from dpgcli.api.histories import PressureInput
 
 MOST_ROWS, MOST_LANES, MOST_BYTES = 2**20, 2**14, 2**30
@@ -54,7 +52,7 @@ MOST_DRAWN = 64
 
 
 @dataclass(frozen=True)
-class GraspResult:
+class GraspResult(TableResult):
     """Fingers at rest against a body, and what happened on the way there."""
 
     given: SceneInput
@@ -151,14 +149,6 @@ class GraspResult:
         )
         if n_less := int((payload[is_known] < weight).sum()):
             yield f"warning: {counted(n_less, 'state')} not bearing the weight of {weight:.4g} N"
-
-    def to_arrow(self) -> Any:
-        """The rows as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The rows as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write the rows to a Parquet file, the bytes of `dpg grasp --output`.

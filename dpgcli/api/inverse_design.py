@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from dpgcli.api.given import GoalInput, goal_input
 from dpgcli.api.inputs import Settings, check_flags, check_numbers, check_whole, path_of
 from dpgcli.api.reached import reached
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import doubts_about
@@ -35,7 +35,7 @@ MOST_NAMED = 3  # designs in a line
 
 
 @dataclass(frozen=True)
-class InverseDesignResult:
+class InverseDesignResult(TableResult):
     """The best designs, each certified anew from its spec, and how they were found.
 
     `specs` are those of the designs, the best first, and `reached` what their states come to.

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from dpgcli.api.inputs import (
     scene_input,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Held, Scene
@@ -36,7 +36,7 @@ from dpgcli.states.patterns import select
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 MOST_STATES = 1024
 HEIGHT = 40.0  # mm, of jaws that the spec says nothing of
@@ -44,7 +44,7 @@ NARROWEST, WIDEST = 1e-3, 1e4  # mm
 
 
 @dataclass(frozen=True)
-class JawsResult:
+class JawsResult(TableResult):
     """What each state bears as jaws open and close, and its force by their aperture."""
 
     given: SceneInput
@@ -109,14 +109,6 @@ class JawsResult:
             f"the study's mechanism, at rest at {rest:g} mm (assumed), {fitted.stiffness:.3g} N/mm "
             f"fitted to the {force} N of {known}: {other} holds {said} (study: {measured} N)"
         )
-
-    def to_arrow(self) -> Any:
-        """The rows as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The rows as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write force by aperture to a Parquet file, the bytes of `dpg grasp --jaws --output`.

@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dpgcli.api.inputs import (
     SceneInput,
@@ -19,7 +19,7 @@ from dpgcli.api.inputs import (
     scene_input,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
@@ -35,13 +35,13 @@ from dpgcli.states.units import UnitSolutions
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 MOST_UNITS = 12  # seconds of work
 
 
 @dataclass(frozen=True)
-class LandscapeResult:
+class LandscapeResult(TableResult):
     """States and saddles on the path of least barriers, and the energy between them.
 
     `graph` has all states and barriers, `landscape` those on the path from `start` over `via` to
@@ -99,14 +99,6 @@ class LandscapeResult:
             if trust.output is Output.BARRIERS:
                 yield f"barriers: {trust.basis_text}, {trust.source}; error {trust.known_error}"
         yield from (f"warning: {warning}" for warning in scene.warnings)
-
-    def to_arrow(self) -> Any:
-        """The states and saddles as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The states and saddles as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write states and saddles to a Parquet file, the bytes of `dpg landscape --output`.

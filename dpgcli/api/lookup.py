@@ -11,7 +11,7 @@ from dpgcli.actuation.pulses import Intervals, intervals
 from dpgcli.api.inputs import Settings, SpecInput
 from dpgcli.api.pressed_states import check_state, code_of, pattern_of, patterns_of
 from dpgcli.api.pressure import PressedInput, pressed_input
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.api.transitions import pressure_lines
 from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Output
@@ -31,7 +31,7 @@ INTERVAL_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class LookupResult:
+class LookupResult(TableResult):
     """The look-up table of a controller: what single pulses do to a state, line by line."""
 
     given: PressedInput

@@ -5,14 +5,14 @@ from collections import Counter
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dpgcli.api.check import DesignsInput
 from dpgcli.api.designs import table_of, tables_beside
 from dpgcli.api.inputs import as_texts, check_flags, check_whole, path_of, table_path
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, Flags
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.design_spec import SWEEP, write_spec
@@ -29,7 +29,7 @@ from dpgcli.sweeps.gate import counts_of
 from dpgcli.text import counted, printable
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 KEPT = ("dpg.schema_version", "dpg.law", "dpg.versions", "dpg.base", "dpg.trust", "dpg.warnings")
 PICK = "dpg.pick"
@@ -38,7 +38,7 @@ EXCLUDED = "it does not meet the sweep's constraints"
 
 
 @dataclass(frozen=True)
-class PickResult:
+class PickResult(TableResult):
     """The rows that were chosen, in their order; `lines` say what became of the others.
 
     `warnings` name the columns that nothing should be chosen by, as far as the table says it;
@@ -57,14 +57,6 @@ class PickResult:
     def table(self) -> Table:
         """A row for each that was chosen."""
         return Table.of(self.columns, self.rows)
-
-    def to_arrow(self) -> Any:
-        """The rows as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The rows as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write the rows to a Parquet file.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dpgcli.api.inputs import (
     SceneInput,
@@ -18,7 +18,7 @@ from dpgcli.api.inputs import (
     spec_or_design,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Trust
 from dpgcli.design.scene import Scene
@@ -31,15 +31,13 @@ from dpgcli.states.predict import Prediction, Summary
 from dpgcli.text import quoted
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from dpgcli.reports.outlines import DrawnState
 
 MOST_DRAWN = 64  # shapes that one can tell apart
 
 
 @dataclass(frozen=True)
-class PredictResult:
+class PredictResult(TableResult):
     """Every state that was asked for, certified; what happened to one is its row's status.
 
     `prediction` has the plan and a summary, `blocks` the rows in the plan's columns.
@@ -73,14 +71,6 @@ class PredictResult:
     def table(self) -> Table:
         """A row for each state."""
         return Table.of(self.plan.columns, *self.blocks)
-
-    def to_arrow(self) -> Any:
-        """The states as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The states as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write the states to a Parquet file, the bytes of `dpg predict --output`.

@@ -22,7 +22,7 @@ from dpgcli.api.scatter import (
     drawn_by,
     share_interval,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.api.transitions import failed_searches, pressure_lines
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output
@@ -84,7 +84,7 @@ class ScatteredPulses:
 
 
 @dataclass(frozen=True)
-class PulsesResult:
+class PulsesResult(TableResult):
     """The shortest sequence of pulses from a state to another, or why there is none.
 
     `given` is the spec with its lines; `start` and `end` are patterns. `reasons` say why no

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from dpgcli.api.inputs import (
 from dpgcli.api.pressed_states import code_of
 from dpgcli.api.pressure import pressed_input
 from dpgcli.api.pulses import check_size
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.api.transitions import failed_searches
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.bodies import gives_way
@@ -54,13 +54,13 @@ from dpgcli.states.columns import Column
 from dpgcli.text import counted
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 RAMP, MOVE = 1.0, 5.0  # s
 
 
 @dataclass(frozen=True)
-class RoutineResult:
+class RoutineResult(TableResult):
     """A routine step by step, or how far the best plan comes and what is in its way."""
 
     given: SceneInput
@@ -195,14 +195,6 @@ class RoutineResult:
                 f"rests on the friction of {friction.coefficient:g} that is given"
                 + ("" if friction.weight is not None else "; no mass_g says what has to be borne")
             )
-
-    def to_arrow(self) -> Any:
-        """The steps as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The steps as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def save(self, path: str | Path) -> None:
         """Write the steps to a Parquet file, the bytes of `dpg routine --output`.

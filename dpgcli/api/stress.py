@@ -14,7 +14,7 @@ from dpgcli.api.inputs import (
     setting_texts,
     table_path,
 )
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.study_tables import write_stress
 from dpgcli.hard_cases import verdicts
@@ -25,7 +25,7 @@ from dpgcli.records import dataclass
 
 
 @dataclass(frozen=True)
-class StressResult:
+class StressResult(TableResult):
     """Outcomes of hard cases, each the answer of the solver and what it is worth."""
 
     outcomes: tuple[Outcome, ...]

@@ -1,5 +1,6 @@
 """Tables as values: named columns with their units, for pandas and for Arrow."""
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,3 +64,28 @@ class Table:
 
     def __repr__(self) -> str:
         return f"Table({len(self)} rows: {', '.join(self.names)})"
+
+
+class TableResult(ABC):
+    """A result with a `table`, for Arrow and for pandas as well.
+
+    >>> class Tips(TableResult):
+    ...     @property
+    ...     def table(self):
+    ...         return Table.of((Column("tip_x_mm", "mm", "x"),), {"tip_x_mm": np.array([40.5])})
+    >>> Tips().to_pandas()["tip_x_mm"].tolist()
+    [40.5]
+    """
+
+    @property
+    @abstractmethod
+    def table(self) -> Table:
+        """The rows, with a unit for each column."""
+
+    def to_arrow(self) -> Any:
+        """The rows of `table` as a `pyarrow.Table`."""
+        return self.table.to_arrow()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The rows of `table` as a `pandas.DataFrame`."""
+        return self.table.to_pandas()

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_p
 from dpgcli.api.predict import MOST_DRAWN
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.scatter import Draws, ScatterInput, drawn_by
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, Flags, keep_freed_memory
 from dpgcli.design.outputs import Output
 from dpgcli.errors import Field, UsageError
@@ -31,7 +31,6 @@ from dpgcli.text import counted
 
 if TYPE_CHECKING:
     import networkx as nx
-    import pandas as pd
 
 MOST_UNITS = 16  # minutes of work
 MOST_SCATTERED = 2_000_000  # thresholds: minutes of work, too
@@ -40,7 +39,7 @@ OF_STATES = ("pattern", "status", "energy_mJ", "tip_x_mm", "tip_y_mm", "tip_angl
 
 
 @dataclass(frozen=True)
-class TransitionsResult:
+class TransitionsResult(TableResult):
     """What first happens to every stable state on each line, up and down.
 
     `given` is the spec with its lines, `graph` what was found. `draws` are scattered fingers whose
@@ -124,14 +123,6 @@ class TransitionsResult:
         if self.draws is not None:
             yield from self.draws.lines
         yield from pressure_lines(self.given)
-
-    def to_arrow(self) -> Any:
-        """The transitions as a `pyarrow.Table`."""
-        return self.table.to_arrow()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The transitions as a `pandas.DataFrame`."""
-        return self.table.to_pandas()
 
     def to_networkx(self) -> "nx.MultiDiGraph[str]":
         """States as nodes, transitions as edges, with what is known of both as attributes."""

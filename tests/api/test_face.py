@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import dpgcli as dpg
+from dpgcli.api.tables import TableResult
 from dpgcli.cli.spelling import option_of, with_options
 from dpgcli.errors import DpgError, Field, Message, UsageError, respelled
 
@@ -47,6 +48,20 @@ def test_every_public_name_is_there(name: str) -> None:
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_function_has_an_example(name: str) -> None:
     assert ">>> " in (inspect.getdoc(getattr(dpg, name)) or "")
+
+
+def test_every_result_with_a_table_is_for_pandas_and_arrow() -> None:
+    """Whatever a function returns: a table alone is of no use to those who know pandas."""
+    back = [str(inspect.signature(getattr(dpg, name)).return_annotation) for name in FUNCTIONS]
+    named = {name for text in back for name in re.findall(r"\w+Result", text)}
+    homes = [
+        importlib.import_module(f"dpgcli.api.{p.stem}") for p in (PACKAGE / "api").glob("*.py")
+    ]
+    homes.append(importlib.import_module("dpgcli.api.fits.result"))
+    results = {n: c for home in homes for n, c in inspect.getmembers(home, inspect.isclass)}
+    tables = {name for name in named if hasattr(results[name], "table")}
+    assert len(tables) > 12
+    assert {n for n in tables if not issubclass(results[n], TableResult)} == set()
 
 
 def test_other_names_are_not_there() -> None:

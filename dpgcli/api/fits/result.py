@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
 from dpgcli.api.inputs import check_positive, figure_path, keys_of, path_of, setting_texts
-from dpgcli.api.tables import Table
+from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns
 from dpgcli.calibration.choices import Loss
 from dpgcli.errors import Field, Message, UsageError
@@ -28,7 +28,7 @@ NO_GEOMETRY = Message(
 
 
 @dataclass(frozen=True)
-class FitResult(Generic[T]):
+class FitResult(TableResult, Generic[T]):
     """A fit and the calibration that it makes.
 
     `found` is the fit itself, `columns` and `rows` its values with their errors, `warnings` what
