@@ -45,11 +45,19 @@ def with_forces(document: Document, folder: Path, path: KeyPath = ("object", *TA
 
 
 def _concealed(problem: Problem) -> Problem:
-    """The problem without what the file says there: who names it need not be allowed to read it."""
-    if problem.key == "file" or problem.found in WITHOUT_CONTENT:
+    """The problem without words of the file: who names it need not be allowed to read it."""
+    if problem.key == "file" or problem.found in WITHOUT_CONTENT or _is_number(problem.found):
         return problem
     key = problem.key if problem.key in QUANTITIES else "header"
     return replace(problem, key=key, found="something else", hint="")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def read_forces(source: Tabular) -> dict[str, Array]:

@@ -89,6 +89,8 @@ class ForceTableSpec(Section):
         gaps = self.jaw_gap_mm
         if len(self.force_N) != len(gaps):
             yield Issue((FORCE,), f"{len(gaps):,} forces, as apertures", f"{len(self.force_N):,}")
+        if gaps[0] < 0.0:
+            yield Issue((GAP, 0), "an aperture >= 0 in mm", number(gaps[0]))
         falls = [place for place in range(1, len(gaps)) if gaps[place] <= gaps[place - 1]]
         for place in falls[:1]:
             expected = f"an aperture above {number(gaps[place - 1])} mm"

@@ -85,7 +85,10 @@ def test_names_in_settings_are_from_where_one_is(
         ("jaw_gap_mm,force_N\n20,secret\n30,0\n", "2: force_N: expected a number, found something"),
         ("jaw_gap_mm,force_N\n20,\n30,0\n", '2: force_N: expected a number, found ""'),
         ("jaw_gap_mm,force_N\n20,1\n", "file: expected 2 to 10,000 rows, found 1"),
-        ("jaw_gap_mm,force_N\n20,1\n30,0\n30,0\n", "4: jaw_gap_mm: expected an aperture above 30"),
+        (
+            "jaw_gap_mm,force_N\n20,1\n30,0\n30,0\n",
+            "4: jaw_gap_mm: expected an aperture above 30 mm, found 30",
+        ),
         ("jaw_gap_mm,force_N\n30,1\n20,0\n21,0\n", "4: jaw_gap_mm: expected an aperture below 20"),
         ("jaw_gap_mm (cm),force_N\n2,1\n3,0\n", "jaw_gap_mm: expected mm, as the name has it"),
         ("jaw_gap (V),force_N\n2,1\n3,0\n", "jaw_gap_mm: expected a unit of travel: mm, m"),
@@ -121,6 +124,10 @@ def test_a_file_that_is_not_there(spec: Path) -> None:
         (
             f"{TABLE}={{jaw_gap_mm: [20, 10], force_N: [1, 0]}}",
             "table.jaw_gap_mm.1: expected an aperture above 20 mm, found 10",
+        ),
+        (
+            f"{TABLE}={{jaw_gap_mm: [-2, 31], force_N: [1, 0]}}",
+            "table.jaw_gap_mm.0: expected an aperture >= 0 in mm, found -2",
         ),
         (
             f"{TABLE}={{jaw_gap_mm: [20, a], force_N: [1, 0]}}",
