@@ -99,7 +99,7 @@ class InverseDesignResult(TableResult):
         meets = "meets" if n_met < 2 else "meet"
         front = "; they are a front" if len(goal.objectives) > 1 and n_met > 1 else ""
         yield f"{met} {meets} all that is asked{front}; each is certified anew from its spec"
-        yield from self._tables.standing(found.best, 0).lines(is_stopped=found.is_stopped)
+        yield from self._tables.standing(found.best, 0).lines()
         tried = (
             f"{counted(found.n_starts, 'start')}, {counted(found.n_evaluated, 'design')} evaluated"
         )
@@ -111,7 +111,7 @@ class InverseDesignResult(TableResult):
 
     @property
     def _tables(self) -> GoalTables:
-        return GoalTables(self.given.goal, self.searched.is_stopped)
+        return GoalTables(self.given.goal, not self.searched.best.are_finished.all())
 
     def save(self, folder: str | Path) -> None:
         """Write the designs, the trace and a spec for each design into a folder.

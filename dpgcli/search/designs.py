@@ -129,7 +129,8 @@ class Designs:
 def best_of(goal: Goal, every: Designs) -> Designs:
     """The best of all designs, each once: what meets most, then by objective or misfit.
 
-    With several objectives the front of what meets all, along the first.
+    With several objectives the front of what meets all, along the first. Of searches that a limit
+    ended, those alone that have come further than what is finished: others were on their way.
     """
     every = every.take(np.flatnonzero(every.exist))
     broken, misfit = every.n_broken(goal), np.rint(every.misfits / SAME)
@@ -151,6 +152,8 @@ def best_of(goal: Goal, every: Designs) -> Designs:
     for place in order.tolist():
         if len(kept) == most:
             break
+        if not (is_front or every.are_finished[place]) and every.are_finished[kept].any():
+            continue
         apart = np.abs(every.points[:, kept] - every.points[:, [place]]).max(axis=0, initial=0.0)
         alike = (listed[:, kept] == listed[:, [place]]).all(axis=0) & (apart <= ALIKE)
         if is_front:

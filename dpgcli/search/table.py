@@ -56,10 +56,11 @@ class Reached:
 
 @dataclass(frozen=True)
 class GoalTables:
-    """The columns and rows of a goal's tables; `is_stopped` where limits ended searches."""
+    """The columns and rows of a goal's tables; `has_unfinished` where limits ended
+    the search of one."""
 
     goal: Goal
-    is_stopped: bool = False
+    has_unfinished: bool = False
 
     @cached_property
     def quantities(self) -> Mapping[str, Column]:
@@ -112,7 +113,7 @@ class GoalTables:
         """The columns of the designs found."""
         misfit = (MISFIT,) if self.goal.targets else ()
         own = (DESIGN, *self.value_columns, *self.map_columns, *misfit, MEETS)
-        return (*own, *self._of_targets(), ACTIVE, *((FINISHED,) if self.is_stopped else ()))
+        return (*own, *self._of_targets(), ACTIVE, *((FINISHED,) if self.has_unfinished else ()))
 
     def _of_targets(self) -> Iterator[Column]:
         for number, target in enumerate(self.goal.targets, start=1):
@@ -152,7 +153,7 @@ class GoalTables:
             rows[next(told).name] = misses[:, place]
         standings = [self.standing(designs, place) for place in range(n)]
         rows["active"] = np.array([each.active for each in standings], np.str_)
-        return rows | ({"finished": designs.are_finished} if self.is_stopped else {})
+        return rows | ({"finished": designs.are_finished} if self.has_unfinished else {})
 
     def standing(self, designs: Designs, place: int) -> Standing:
         """How one of the designs stands."""

@@ -66,8 +66,8 @@ class Standing:
         bounds = [self._bound(k) for k in np.flatnonzero(self.bounds).tolist()]
         return ", ".join([*bounds, *(wish.name for wish in self.wishes if wish.is_active)])
 
-    def lines(self, *, is_stopped: bool = False) -> Iterator[str]:
-        """What is not met, by how much, and what is in the way of a search, stopped or not."""
+    def lines(self) -> Iterator[str]:
+        """What is not met, by how much, and what is in the way."""
         wishes = self.wishes
         unmet = [wish for wish in wishes if not wish.is_met]
         if not unmet:
@@ -86,7 +86,8 @@ class Standing:
         if pair := self._contradiction(wishes):
             yield f"{pair[0]} and {pair[1]} pull against each other: what helps one harms the other"
         elif not in_the_way:
-            ended = "the limit ended the search" if is_stopped else "this is a local optimum"
+            is_finished = bool(self.design.are_finished[0])
+            ended = "this is a local optimum" if is_finished else "the limit ended the search"
             yield f"no bound is in the way: {ended}, and further starts may find a better one"
 
     def _targets(self) -> Iterator[Wish]:

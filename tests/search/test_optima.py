@@ -256,6 +256,18 @@ def test_alike_designs_are_one(goal: Make) -> None:
     assert len(best_of(made, one)) == 2
 
 
+def test_unfinished_searches_are_told_where_they_have_come_further(goal: Make) -> None:
+    target = "targets: [{pattern: '11100', quantity: tip, value: [52, -38], tolerance_mm: 0.5}]\n"
+    made = goal(TWO + target)
+    every = Designs.at(made, {}, np.array([[0.3, 0.4, 0.5], [0.4, 0.4, 0.4]]))
+    order = np.argsort(every.misfits)
+    for finished, told in (((1, 1, 1), 3), ((1, 0, 0), 1), ((0, 1, 0), 2), ((0, 0, 0), 3)):
+        flags = np.zeros(3, bool)
+        flags[order] = finished
+        best = best_of(made, every.with_finished(flags))
+        assert best.misfits.tolist() == sorted(every.misfits)[:told]
+
+
 def test_of_maps_only_what_matters_is_computed(goal: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """Snap pressures without the graph of states, and constraints on shapes without pressure."""
 
