@@ -17,8 +17,9 @@ from dpgcli.records import dataclass
 from dpgcli.search.columns import evaluation_of
 from dpgcli.search.goal import Goal, Range
 from dpgcli.states.columns import Column, Group, Kind
+from dpgcli.sweeps.comparisons import keeps_unit, margins
 from dpgcli.sweeps.evaluation import VALUE_OF, DesignStatus
-from dpgcli.sweeps.expressions import Expression, keeps_unit, margins
+from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.metrics import METRICS
 
 DIFFERENCE = 1e-4  # of a range, either way

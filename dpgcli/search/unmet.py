@@ -10,8 +10,8 @@ from dpgcli.search.designs import Designs
 from dpgcli.search.goal import Goal
 from dpgcli.search.maps import COUNTS, MapEvaluation
 from dpgcli.search.targets import TargetEvaluation
+from dpgcli.sweeps.comparisons import margins
 from dpgcli.sweeps.evaluation import short_names
-from dpgcli.sweeps.expressions import margins
 from dpgcli.text import enumerated
 
 SHARE = 0.1  # of a range, by which a bound is moved in words

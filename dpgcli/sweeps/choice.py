@@ -9,7 +9,8 @@ from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import doubts_about
 from dpgcli.errors import Field, Message, UsageError
 from dpgcli.records import dataclass
-from dpgcli.sweeps.expressions import Expression, conjuncts
+from dpgcli.sweeps.comparisons import conjuncts
+from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.fronts import on_front
 from dpgcli.sweeps.gate import (
     Trusts,

@@ -10,7 +10,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -92,7 +92,7 @@ class Expression:
         """
         undefined: list[Any] = []
         with np.errstate(all="ignore"):
-            value = _value(_body(_without_digits(self.text)), values, undefined)
+            value = _value(tree(self), values, undefined)
         is_undefined = reduce(np.logical_or, undefined, np.False_)
         return np.where(is_undefined, np.nan, value) if np.any(is_undefined) else value
 
@@ -111,8 +111,8 @@ def expression(text: str) -> Expression:
     if "#" in text:
         raise ExpressionError("# would hide what stands behind it: there are no comments here")
     try:
-        body = _body(_without_digits(text.strip()))
-        names = frozenset(_names(body, MOST_LEVELS))
+        body = _body(text.strip())
+        names = frozenset(names_in(body))
     except ExpressionError:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -120,165 +120,13 @@ def expression(text: str) -> Expression:
     return Expression(text.strip(), names, _is_comparison(body))
 
 
-def conjuncts(rule: Expression) -> list[Expression]:
-    """The parts of an expression that all have to hold, those that `and` joins.
-
-    >>> [part.text for part in conjuncts(expression("a > 1 and (b < 2 and not (c > 3 and d > 4))"))]
-    ['a > 1', 'b < 2', 'not (c > 3 and d > 4)']
-    """
-    spelled = _without_digits(rule.text)
-    texts = (ast.get_source_segment(spelled, node) for node in _joined(_body(spelled)))
-    return [expression(_with_digits(text or "")) for text in texts]
+def tree(rule: Expression) -> ast.expr:
+    """What an expression is made of, names as `name_at` reads them."""
+    return _body(rule.text)
 
 
-def _joined(node: ast.expr) -> list[ast.expr]:
-    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-        return [part for value in node.values for part in _joined(value)]
-    return [node]
-
-
-def _body(spelled: str) -> ast.expr:
-    return ast.parse(spelled, mode="eval").body
-
-
-def margins(rule: Expression) -> tuple[Expression, ...]:
-    """What has to be above zero for a comparison to hold, or at zero; none where that does not say.
-
-    As of `or`, `not`, `==` and `!=`.
-
-    >>> [margin.text for margin in margins(expression("2 < a.b <= 4 and c > 1"))]
-    ['a.b - 2', '4 - a.b', 'c - 1']
-    >>> margins(expression("a > 1 or b > 1"))
-    ()
-    """
-    found: list[ast.expr] = []
-    for part in _joined(_body(_without_digits(rule.text))):
-        own = _margins(part)
-        if not own:
-            return ()
-        found += own
-    return tuple(expression(_with_digits(ast.unparse(node))) for node in found)
-
-
-def ends_tell(rule: Expression, name: str) -> bool:
-    """Whether a rule that holds at both ends of a range of one name holds in between.
-
-    As far as one sees it: where each comparison that has to hold has the name on one side, once,
-    and that side only grows or only falls with it.
-
-    >>> [ends_tell(expression(text), "a") for text in ("2 < a < 4 and a > b", "a > 1 or b > 1")]
-    [True, True]
-    >>> [ends_tell(expression(text), "a") for text in ("a != 4", "a < 1 or a > 2", "abs(a) > 1")]
-    [False, False, False]
-    """
-    parts = _joined(_body(_without_digits(rule.text)))
-    return all(_is_monotone(each, name) for part in parts for each in _margins(part) or [part])
-
-
-def _is_monotone(node: ast.expr, name: str) -> bool:
-    """Whether a value only grows, or only falls, with a name, the others being what they are."""
-    if _constant(node) is not None or _dotted(node):
-        return True
-    with_it = [part for part in _parts(node) if name in _names(part, MOST_LEVELS)]
-    if not with_it:
-        return True
-    is_bent = (
-        (
-            isinstance(node, ast.Compare)
-            and (isinstance(node.ops[0], ast.Eq | ast.NotEq) or node.ops[1:])
-        )
-        or (isinstance(node, ast.Call) and _dotted(node.func) == "abs")
-        or (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow | ast.Mod))
-        or (
-            isinstance(node, ast.BinOp)
-            and isinstance(node.op, ast.Div)
-            and with_it[0] is node.right
-        )
-    )
-    return len(with_it) == 1 and not is_bent and _is_monotone(with_it[0], name)
-
-
-class Bounds(NamedTuple):
-    """Between what numbers a name has to be; whether it may be these themselves."""
-
-    low: float = -np.inf
-    high: float = np.inf
-    has_low: bool = True
-    has_high: bool = True
-
-    @property
-    def are_met(self) -> bool:
-        """Whether any number is between them."""
-        return self.low < self.high or (self.low == self.high and self.has_low and self.has_high)
-
-    def within(self, other: "Bounds") -> "Bounds":
-        """Those of what is within both."""
-        low, high = max(self.low, other.low), min(self.high, other.high)
-        has_low = all(each.has_low for each in (self, other) if each.low == low)
-        has_high = all(each.has_high for each in (self, other) if each.high == high)
-        return Bounds(low, high, has_low, has_high)
-
-
-def bounds(rule: Expression) -> tuple[str, Bounds] | None:
-    """The name that a comparison is about, and its bounds; None where these are not plain to see.
-
-    >>> bounds(expression("2 < a <= 4"))
-    ('a', Bounds(low=2.0, high=4.0, has_low=False, has_high=True))
-    >>> bounds(expression("a > 1 or a < 0")), bounds(expression("a * a > 1"))
-    (None, None)
-    """
-    if len(rule.names) != 1:
-        return None
-    (name,) = rule.names
-    found, parts = Bounds(), margins(rule)
-    for margin in parts:
-        at = [float(margin({name: x})) for x in (0.0, 1.0, 2.0)]
-        slope = at[1] - at[0]
-        if abs(slope) != 1.0 or at[2] - at[1] != slope:  # no bound of the name itself
-            return None
-        end = -at[0] / slope
-        own = Bounds(low=end) if slope > 0.0 else Bounds(high=end)
-        found = found.within(own)
-    ends = [bool(rule({name: end})) if np.isfinite(end) else True for end in found[:2]]
-    return (name, Bounds(found.low, found.high, *ends)) if parts else None
-
-
-def keeps_unit(rule: Expression) -> bool:
-    """Whether an expression of names of one unit has that unit: a sum of them, and of numbers.
-
-    >>> [keeps_unit(expression(text)) for text in ("a - 2 * b", "min(a, b) / 2", "a * b", "log(a)")]
-    [True, True, False, False]
-    """
-    return _keeps_unit(_body(_without_digits(rule.text)))
-
-
-def _keeps_unit(node: ast.expr) -> bool:
-    if _constant(node) is not None or _dotted(node):
-        return True
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
-        first, second = node.left, node.right
-        is_times = isinstance(node.op, ast.Mult) and _constant(first) is not None
-        return (is_times or _constant(second) is not None) and all(map(_keeps_unit, _parts(node)))
-    is_sum = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)
-    is_same = isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not)
-    is_one_of = isinstance(node, ast.Call) and _dotted(node.func) in ("min", "max", "abs")
-    return (is_sum or is_same or is_one_of) and all(map(_keeps_unit, _parts(node)))
-
-
-def _margins(node: ast.expr) -> list[ast.expr]:
-    """Those of a comparison; none where it says nothing of above or below."""
-    if not isinstance(node, ast.Compare):
-        return []
-    sides = zip(node.ops, [node.left, *node.comparators[:-1]], node.comparators, strict=True)
-    found: list[ast.expr] = []
-    for op, left, right in sides:
-        if isinstance(op, ast.Lt | ast.LtE):
-            found.append(ast.BinOp(right, ast.Sub(), left))
-        elif isinstance(op, ast.Gt | ast.GtE):
-            found.append(ast.BinOp(left, ast.Sub(), right))
-        else:
-            return []
-    return found
+def _body(text: str) -> ast.expr:
+    return ast.parse(spelled(text), mode="eval").body
 
 
 def _is_comparison(node: ast.expr) -> bool:
@@ -312,35 +160,35 @@ def _hint(text: str) -> str:
     return ""
 
 
-def _without_digits(text: str) -> str:
+def spelled(text: str) -> str:
     """Parts of dotted names that are numbers, `overrides.4-5.`, spelled as Python names."""
 
-    def spelled(match: re.Match[str]) -> str:
+    def as_name(match: re.Match[str]) -> str:
         return f".{DIGITS_PREFIX}{match[1].replace('-', 'to')}."
 
-    return re.sub(r"(?<=[A-Za-z_])\.(\d+(?:-\d+)?)\.(?=[A-Za-z_])", spelled, text)
+    return re.sub(r"(?<=[A-Za-z_])\.(\d+(?:-\d+)?)\.(?=[A-Za-z_])", as_name, text)
 
 
-def _with_digits(spelled: str) -> str:
+def restored(text: str) -> str:
     """The same, as it was written."""
     parts = rf"\.{DIGITS_PREFIX}(\d+)(?:to(\d+))?\."
-    return re.sub(parts, lambda m: f".{m[1]}-{m[2]}." if m[2] else f".{m[1]}.", spelled)
+    return re.sub(parts, lambda m: f".{m[1]}-{m[2]}." if m[2] else f".{m[1]}.", text)
 
 
-def _names(node: ast.expr, depth: int) -> list[str]:
+def names_in(node: ast.expr, depth: int = MOST_LEVELS) -> list[str]:
     """Names in an expression; refuses every node that is not in the language."""
     if depth == 0:
         raise ExpressionError(f"nested more than {MOST_LEVELS} levels deep")
-    if (number := _constant(node)) is not None:
+    if (number := constant(node)) is not None:
         if not abs(number) < LARGEST_NUMBER:
             raise ExpressionError("a number beyond double precision")
         return []
-    if name := _dotted(node):
+    if name := name_at(node):
         return [name]
-    return [name for part in _parts(node) for name in _names(part, depth - 1)]
+    return [name for part in parts_of(node) for name in names_in(part, depth - 1)]
 
 
-def _parts(node: ast.expr) -> list[ast.expr]:
+def parts_of(node: ast.expr) -> list[ast.expr]:
     """Operands of a node of the language."""
     if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC:
         return [node.left, node.right]
@@ -364,7 +212,8 @@ def _parts(node: ast.expr) -> list[ast.expr]:
     raise SyntaxError(f"{type(node).__name__} is not of this language")
 
 
-def _constant(node: ast.expr) -> int | float | None:
+def constant(node: ast.expr) -> int | float | None:
+    """The number that a node is; None if it is none."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return None if isinstance(node.value, bool) else node.value
     return None
@@ -374,12 +223,12 @@ def _takes(function: str, n_values: int) -> bool:
     return n_values > 1 if function in ("min", "max") else n_values == 1
 
 
-def _dotted(node: ast.expr) -> str:
+def name_at(node: ast.expr) -> str:
     """A name, its parts joined by dots; empty if the node is none."""
     if isinstance(node, ast.Name):
         return node.id
     if isinstance(node, ast.Attribute):
-        parent = _dotted(node.value)
+        parent = name_at(node.value)
         part = (
             node.attr.removeprefix(DIGITS_PREFIX).replace("to", "-")
             if DIGITS_PREFIX in node.attr
@@ -399,11 +248,11 @@ def _as_number(value: Any) -> Any:
 
 def _value(node: ast.expr, values: Operands, undefined: list[Any]) -> Any:
     """The value of a node; `undefined` collects flags of finite parts without a finite value."""
-    if (number := _constant(node)) is not None:
+    if (number := constant(node)) is not None:
         return float(number)
-    if name := _dotted(node):
+    if name := name_at(node):
         return values[name]
-    parts = [_value(part, values, undefined) for part in _parts(node)]
+    parts = [_value(part, values, undefined) for part in parts_of(node)]
     if isinstance(node, ast.BinOp | ast.Call):
         parts = list(map(_as_number, parts))
     if isinstance(node, ast.BinOp):

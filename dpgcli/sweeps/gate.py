@@ -10,7 +10,8 @@ from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.records import dataclass
-from dpgcli.sweeps.expressions import Expression, ExpressionError, ends_tell, expression
+from dpgcli.sweeps.comparisons import ends_tell
+from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.metrics import (
     METRICS,
     UNKNOWN_DIRECTIONS,

@@ -7,7 +7,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.errors import NothingSelectedError, UsageError
-from dpgcli.sweeps.expressions import ends_tell
+from dpgcli.sweeps.comparisons import ends_tell
 from dpgcli.sweeps.gate import (
     check_requirements,
     failing,

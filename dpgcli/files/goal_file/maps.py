@@ -15,14 +15,9 @@ from dpgcli.records import dataclass
 from dpgcli.search.columns import NUMBERS, design_columns
 from dpgcli.search.goal import Objective
 from dpgcli.search.maps import COUNTS
+from dpgcli.sweeps.comparisons import Bounds, bounds
 from dpgcli.sweeps.evaluation import short_names
-from dpgcli.sweeps.expressions import (
-    Bounds,
-    Expression,
-    ExpressionError,
-    bounds,
-    expression,
-)
+from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.metrics import METRICS
 from dpgcli.text import KeyPath
 
