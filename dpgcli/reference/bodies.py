@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from dpgcli.records import dataclass
-from dpgcli.reference.energy import Vector, cross, measured
 from dpgcli.reference.equilibria import extended
+from dpgcli.reference.vectors import Vector, cross, measured
 
 if TYPE_CHECKING:
     from mpmath import mpf

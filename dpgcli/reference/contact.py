@@ -15,7 +15,6 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
 from dpgcli.reference.bodies import Body, ExactBody, Place, StraightBody, exact
-from dpgcli.reference.energy import Expansion
 from dpgcli.reference.equilibria import (
     Energy,
     ExtendedArray,
@@ -26,6 +25,7 @@ from dpgcli.reference.equilibria import (
     long_doubles,
     pose_in_pattern,
 )
+from dpgcli.reference.expansion import Expansion
 from dpgcli.reference.units import Unit, extended_units
 
 if TYPE_CHECKING:

@@ -7,100 +7,34 @@ p = T_{i-1} − B_{i-1} (near) and q = T_i − B_i (far). Its corners open by a 
 b = ∠c + π/2 − ∠q, its hinge turns by θ = a + b = ∠p − ∠q. Neighboring hinges may have −κ θ θ'.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.records import dataclass
+from dpgcli.reference.expansion import ExactResponse, Expansion, Rate, linear
 from dpgcli.reference.units import Unit
+from dpgcli.reference.vectors import (
+    ExactCell,
+    Vector,
+    cells,
+    corners,
+    cross,
+    direction_rates,
+    dot,
+    left,
+    measured,
+    times,
+)
 
 if TYPE_CHECKING:
     from mpmath import mpf
 
-
-Vector = tuple["mpf", "mpf"]
-Rate = dict[int, "mpf"]
-
-
-class ExactCell(NamedTuple):
-    """The vectors c, t, p and q of a unit."""
-
-    chord: Vector
-    top: Vector
-    near: Vector
-    far: Vector
-
-
 ENDS = ExactCell((-4, 0), (-2, 2), (-4, -2), (0, 2))  # x rows of what they join, from B_i's
-
-
-def cells(base: Sequence["mpf"], nodes: Sequence["mpf"]) -> Iterator[ExactCell]:
-    """The vectors of every unit by the nodes of the base station and the others."""
-    stations = [base, *(nodes[k : k + 4] for k in range(0, len(nodes), 4))]
-    for before, after in pairwise(stations):
-        yield ExactCell(
-            (after[0] - before[0], after[1] - before[1]),
-            (after[2] - before[2], after[3] - before[3]),
-            (before[2] - before[0], before[3] - before[1]),
-            (after[2] - after[0], after[3] - after[1]),
-        )
-
-
-def _dot(v: Vector, w: Vector) -> "mpf":
-    return v[0] * w[0] + v[1] * w[1]
-
-
-def cross(v: Vector, w: Vector) -> "mpf":
-    """The cross product of two plane vectors."""
-    return v[0] * w[1] - v[1] * w[0]
-
-
-def _left(v: Vector) -> Vector:
-    return -v[1], v[0]
-
-
-def _times(factor: "mpf", v: Vector) -> Vector:
-    return factor * v[0], factor * v[1]
-
-
-def _rates(vector: Vector) -> tuple[Vector, Vector]:
-    """Derivatives m/ℓ of a vector's direction and n/ℓ of log ℓ, n along it and m to the left."""
-    stretch = _times(1 / _dot(vector, vector), vector)
-    return _left(stretch), stretch
-
-
-def measured(vector: Vector) -> tuple["mpf", Vector]:
-    """Length and direction."""
-    from mpmath import sqrt
-
-    length = sqrt(_dot(vector, vector))
-    return length, _times(1 / length, vector)
-
-
-def corners(cell: ExactCell) -> Vector:
-    """The angles a and b."""
-    from mpmath import atan2
-
-    chord, near, far = cell.chord, cell.near, cell.far
-    a = atan2(-_dot(chord, near), cross(chord, near))
-    return a, atan2(_dot(chord, far), cross(chord, far))
-
-
-class ExactResponse(NamedTuple):
-    """A spring's energy, force and stiffness."""
-
-    energy: "mpf"
-    force: "mpf"
-    stiffness: "mpf"
-
-
-def linear(stiffness: "mpf", x: "mpf") -> ExactResponse:
-    """E = ½ k x²."""
-    return ExactResponse(stiffness * x * x / 2, stiffness * x, stiffness)
 
 
 def corner_under(unit: Unit, angle: "mpf", moment: "mpf") -> ExactResponse:
@@ -117,59 +51,6 @@ def bistable(unit: Unit, x: "mpf") -> ExactResponse:
         stiffness * x * (1 + softening * (2 * u * u - 3 * u)) - unit.push,
         stiffness * (1 + 6 * softening * (u * u - u)),
     )
-
-
-class Expansion:
-    """An energy with its gradient and Hessian, summed up element by element.
-
-    `band[i][k]` is the Hessian's entry (i, i−k). Where walls give way, each unit has a row more,
-    before its own `width`; in rates the walls are rows −1, −2, ….
-    """
-
-    def __init__(self, size: int, bandwidth: int, width: int = 0) -> None:
-        from mpmath import mpf
-
-        self.width = width
-        self.energy = mpf(0)
-        self.gradient = [mpf(0)] * size
-        self.band = [[mpf(0)] * (min(row, bandwidth) + 1) for row in range(size)]
-
-    def row(self, row: int) -> int:
-        """Where a row of a rate stands."""
-        if not self.width:
-            return row
-        if row < 0:
-            return (self.width + 1) * (-1 - row)
-        unit, rest = divmod(row, self.width)
-        return (self.width + 1) * unit + 1 + rest
-
-    def add(self, response: ExactResponse, rate: Rate) -> None:
-        """Add E, F r and K r rᵀ of a spring whose coordinate has the gradient r, `rate`.
-
-        The rate's own derivatives, F ∇r, are added by `add_square` and `add_bend`.
-        """
-        self.energy += response.energy
-        for row, slope in rate.items():
-            self.gradient[self.row(row)] += response.force * slope
-        self.add_square(response.stiffness, rate)
-
-    def add_square(self, factor: "mpf", rate: Rate) -> None:
-        """Add factor · r rᵀ to the Hessian."""
-        placed = {self.row(row): slope for row, slope in rate.items()}
-        for row, slope in placed.items():
-            scaled = factor * slope
-            for column, other in placed.items():
-                if column <= row:
-                    self.band[row][row - column] += scaled * other
-
-    def add_bend(self, factor: "mpf", first: Rate, second: Rate) -> None:
-        """Add factor · (r sᵀ + s rᵀ) to the Hessian."""
-        first, second = ({self.row(row): v for row, v in rate.items()} for rate in (first, second))
-        for row in first:
-            r, s = factor * first[row], factor * second[row]
-            for column in first:
-                if column <= row:
-                    self.band[row][row - column] += r * second[column] + s * first[column]
 
 
 def _spread(unit: int, *parts: tuple[Vector, Vector]) -> Rate:
@@ -232,9 +113,9 @@ class ElasticBars:
         strokes = []
         changes = cells([0] * 4, step)
         for unit, cell, change in zip(self.units, cells(self.base, unknowns), changes, strict=True):
-            turns = [_dot(_rates(v)[0], w) for v, w in zip(cell, change, strict=True)]
+            turns = [dot(direction_rates(v)[0], w) for v, w in zip(cell, change, strict=True)]
             opening = max(abs(turns[2] - turns[0]), abs(turns[3] - turns[0]))
-            stretch = _dot(_rates(cell.top)[1], change.top)
+            stretch = dot(direction_rates(cell.top)[1], change.top)
             strokes.append(opening * max(unit.height / unit.stroke, 1))
             strokes.append(abs(stretch) * unit.length / unit.stroke)
         return max(strokes)
@@ -266,7 +147,7 @@ def _add_springs(expansion: Expansion, i: int, unit: Unit, cell: ExactCell, wall
     for ends, vector, rest, law, more in laws:
         length, direction = measured(vector)
         spring = law(length - rest)
-        across = _spread(i, (ends, _left(direction)))
+        across = _spread(i, (ends, left(direction)))
         expansion.add(spring, {**_spread(i, (ends, direction)), **more})
         expansion.add_square(spring.force / length, across)
 
@@ -277,13 +158,13 @@ def _add_corners(expansion: Expansion, i: int, unit: Unit, cell: ExactCell) -> N
     M turns its sign with θ, at the far strut; g and h are the `_rates`.
     """
     a, b = corners(cell)
-    turn, stretch = _rates(cell.chord)
+    turn, stretch = direction_rates(cell.chord)
     chord, along_chord = (_spread(i, (ENDS.chord, rate)) for rate in (turn, stretch))
     sides = ((a, ENDS.near, cell.near, unit.moment), (-b, ENDS.far, cell.far, -unit.moment))
     for angle, ends, vector, moment in sides:
         corner = corner_under(unit, angle, moment)
-        rates = _rates(vector)
-        expansion.add(corner, _spread(i, (ends, rates[0]), (ENDS.chord, _times(-1, turn))))
+        rates = direction_rates(vector)
+        expansion.add(corner, _spread(i, (ends, rates[0]), (ENDS.chord, times(-1, turn))))
         expansion.add_bend(-corner.force, *(_spread(i, (ends, rate)) for rate in rates))
         expansion.add_bend(corner.force, chord, along_chord)
 
@@ -293,7 +174,7 @@ def _add_couplings(expansion: Expansion, coupling: "mpf", shape: list[ExactCell]
     turns = [sum(corners(cell)) for cell in shape]
     struts = [
         [
-            [_spread(i, (ends, rate)) for rate in _rates(vector)]
+            [_spread(i, (ends, rate)) for rate in direction_rates(vector)]
             for ends, vector in ((ENDS.near, cell.near), (ENDS.far, cell.far))
         ]
         for i, cell in enumerate(shape)
@@ -336,16 +217,16 @@ def _add_swings(expansion: Expansion, shape: list[ExactCell]) -> None:
         pull = (pull[0] + x + tip[0], pull[1] + y + tip[1])
         bars = ((ENDS.chord, shape[i].chord, pull), (ENDS.far, shape[i].far, tip))
         for ends, vector, beyond in bars:
-            turn, stretch = (_spread(i, (ends, rate)) for rate in _rates(vector))
+            turn, stretch = (_spread(i, (ends, rate)) for rate in direction_rates(vector))
             expansion.add_bend(cross(vector, beyond), turn, stretch)
-            expansion.add_square(-_dot(vector, beyond), turn)
+            expansion.add_square(-dot(vector, beyond), turn)
 
 
 def _swung(vector: Vector, change: Vector) -> Vector:
     """The vector turned and stretched at the rates of a change of it."""
     from mpmath import cos, sin
 
-    turn, stretch = (_dot(rate, change) for rate in _rates(vector))
+    turn, stretch = (dot(rate, change) for rate in direction_rates(vector))
     along, across = (1 + stretch) * cos(turn), (1 + stretch) * sin(turn)
     return along * vector[0] - across * vector[1], across * vector[0] + along * vector[1]
 
@@ -396,14 +277,14 @@ class RigidBars:
             spring = bistable(unit, length - unit.length + (walls[i] if walls else 0))
             behind: Rate = {-1 - i: 1} if unit.wall else {}
             slopes = {2 * i: (lean_near, rise_near), 2 * i + 1: (lean_far, -rise_far)}
-            across = {row: _dot(_left(n), slope) for row, slope in slopes.items()}
-            rate = {row: _dot(n, slope) for row, slope in slopes.items()}
+            across = {row: dot(left(n), slope) for row, slope in slopes.items()}
+            rate = {row: dot(n, slope) for row, slope in slopes.items()}
             expansion.add(spring, {**rate, **behind})
             expansion.add_square(spring.force / length, across)
             bends = {2 * i: (-rise_near, lean_near), 2 * i + 1: (-rise_far, -lean_far)}
             for (row, bend), angle in zip(bends.items(), (a, b), strict=True):
                 expansion.add(corner_under(unit, angle, unit.moment), {row: 1})
-                expansion.add_square(spring.force * _dot(n, bend), {row: 1})
+                expansion.add_square(spring.force * dot(n, bend), {row: 1})
         turns = [sum(unknowns[2 * i : 2 * i + 2]) for i in range(len(self.units))]
         for i, pair in enumerate(pairwise(turns) if self.coupling else ()):
             rates = {2 * i: 1, 2 * i + 1: 1}, {2 * i + 2: 1, 2 * i + 3: 1}
@@ -443,14 +324,14 @@ def _add_pulls(expansion: Expansion, units: list[Unit], nodes: list["mpf"]) -> N
             for k in (0, 2)
             if j >= i
         ]
-        expansion.energy -= sum(_dot(pull, node) for pull, node in pulled[:2])
+        expansion.energy -= sum(dot(pull, node) for pull, node in pulled[:2])
         for row, (x, y) in ((2 * i, stations[i]), (2 * i + 1, stations[i + 1])):
             away = [(pull, (node[0] - x, node[1] - y)) for pull, node in pulled]
             place = expansion.row(row)
             expansion.gradient[place] -= sum(cross(pull, arm) for pull, arm in away)
             for column in range(row + 1):
                 depth = place - expansion.row(column)
-                expansion.band[place][depth] += sum(_dot(pull, arm) for pull, arm in away)
+                expansion.band[place][depth] += sum(dot(pull, arm) for pull, arm in away)
 
 
 @dataclass(frozen=True)

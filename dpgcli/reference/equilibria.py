@@ -13,22 +13,15 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
-from dpgcli.reference.energy import (
-    ElasticBars,
-    Expansion,
-    RigidBars,
-    YieldingWalls,
-    cells,
-    corners,
-    cross,
-    measured,
-)
+from dpgcli.reference.energy import ElasticBars, RigidBars, YieldingWalls
+from dpgcli.reference.expansion import Expansion
 from dpgcli.reference.units import (
     Unit,
     extended_units,
     inverted_rest,
     spring_barrier,
 )
+from dpgcli.reference.vectors import cells, corners, cross, measured
 
 if TYPE_CHECKING:
     from mpmath import mpf

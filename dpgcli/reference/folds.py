@@ -13,7 +13,7 @@ import numpy as np
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
-from dpgcli.reference.energy import ElasticBars, cells, corners
+from dpgcli.reference.energy import ElasticBars
 from dpgcli.reference.equilibria import (
     Energy,
     ExtendedArray,
@@ -26,6 +26,7 @@ from dpgcli.reference.equilibria import (
     solved,
 )
 from dpgcli.reference.units import Unit, extended_units
+from dpgcli.reference.vectors import cells, corners
 
 if TYPE_CHECKING:
     from mpmath import mpf

@@ -15,7 +15,7 @@ from dpgcli.mechanics.finger import ARRAYS, Finger, uniform_finger
 from dpgcli.mechanics.finger import STUDY as REFERENCE
 from dpgcli.mechanics.laws import bistable
 from dpgcli.mechanics.terms import chain_potential
-from dpgcli.reference import energy, equilibria
+from dpgcli.reference import energy, equilibria, expansion, vectors
 from dpgcli.reference import units as units_module
 from dpgcli.reference.energy import ElasticBars, RigidBars
 from dpgcli.reference.equilibria import ExtendedStates, extended_states
@@ -26,6 +26,7 @@ from dpgcli.states.units import UnitSolutions
 
 FOLD = 0.0964682337467354  # α at which the reference unit with rigid bars loses its second well
 LONG_DOUBLE = 4.0 * float(np.finfo(np.longdouble).eps)
+OWN = (energy, expansion, vectors, units_module)
 
 
 def finger_of(n_units: int, linear_stiffness: float = np.inf, **changes: float) -> Finger:
@@ -296,10 +297,10 @@ def test_wrong_shapes_are_refused() -> None:
         extended_states(finger, units_of("10"), np.zeros((8, 2)))
 
 
-@pytest.mark.parametrize("module", [equilibria, energy, units_module])
+@pytest.mark.parametrize("module", [equilibria, *OWN])
 def test_shares_no_code_with_the_solver(module: ModuleType) -> None:
     tree = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8"))
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    own = {name for name in modules if name and name.startswith("dpgcli")}
-    others = {energy.__name__, units_module.__name__}
-    assert own - others <= {"dpgcli.arrays", "dpgcli.mechanics.finger", "dpgcli.records"}
+    used = {name for name in modules if name and name.startswith("dpgcli")}
+    others = {each.__name__ for each in OWN}
+    assert used - others <= {"dpgcli.arrays", "dpgcli.mechanics.finger", "dpgcli.records"}
