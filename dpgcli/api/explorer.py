@@ -30,7 +30,8 @@ from dpgcli.reports.explorer.shapes import (
     Shapes,
 )
 from dpgcli.reports.outlines import around_body, notes, sizes
-from dpgcli.reports.summary import N_UNITS, DesignSpace
+from dpgcli.reports.space import DesignSpace
+from dpgcli.reports.summary import N_UNITS
 from dpgcli.studies.sweep import DESIGNS, STATES
 
 WITHOUT_BODY = "as they are without the body: dpg grasp draws them on it"

@@ -11,7 +11,8 @@ from dpgcli.files.output import Mark, is_own, whole_file
 from dpgcli.files.table_reader import read_designs
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
-from dpgcli.reports.summary import DesignSpace, ranked_metrics
+from dpgcli.reports.space import DesignSpace
+from dpgcli.reports.summary import ranked_metrics
 from dpgcli.studies.sweep import DESIGNS, REPORT
 from dpgcli.sweeps.gate import check_beyond_doubt
 from dpgcli.text import quoted

@@ -29,8 +29,9 @@ from dpgcli.files.parts import FINGERPRINT, PartStore
 from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.trust import warnings_in
 from dpgcli.records import dataclass
-from dpgcli.reports.summary import DesignSpace, surely_ranked
+from dpgcli.reports.space import DesignSpace
 from dpgcli.reports.summary import doubts as ranked_doubts
+from dpgcli.reports.summary import surely_ranked
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE, check_exactness
 from dpgcli.states.columns import Kind
 from dpgcli.studies.run import run

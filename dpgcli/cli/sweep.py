@@ -37,7 +37,7 @@ from dpgcli.cores import MOST_PROCESSES, cores
 if TYPE_CHECKING:
     from dpgcli.api.place import Place
     from dpgcli.arrays import Columns
-    from dpgcli.reports.summary import DesignSpace
+    from dpgcli.reports.space import DesignSpace
     from dpgcli.studies.sweep import Progress, Shard, Study
     from dpgcli.sweeps.expressions import Expression
     from dpgcli.sweeps.gate import RequirementVerdict

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from dpgcli.reports.drawing import own_figure, svg_text, titled
-from dpgcli.reports.summary import METRICS, DesignSpace, varies
+from dpgcli.reports.space import DesignSpace
+from dpgcli.reports.summary import METRICS, varies
 
 COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels

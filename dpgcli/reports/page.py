@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dpgcli.reports.explorer import explorer, policy, style
 from dpgcli.reports.explorer.content import Explored, shown_rows
 from dpgcli.reports.explorer.drawings import best_designs
+from dpgcli.reports.space import DesignSpace
 from dpgcli.reports.summary import (
     MOST_ROWS,
-    DesignSpace,
     PageSection,
     PageTable,
     sections,

@@ -9,7 +9,7 @@ import pytest
 
 from dpgcli.arrays import Columns
 from dpgcli.reports.maps import figures
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.space import DesignSpace
 
 INF, NAN = float("inf"), float("nan")
 

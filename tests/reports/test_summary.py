@@ -19,7 +19,8 @@ from dpgcli.arrays import Columns
 from dpgcli.reports.page import _html, _markdown, verdicts_markdown
 from dpgcli.reports.page import html as html_of
 from dpgcli.reports.page import markdown as markdown_of
-from dpgcli.reports.summary import DesignSpace, PageSection, PageTable, in_short
+from dpgcli.reports.space import DesignSpace
+from dpgcli.reports.summary import PageSection, PageTable, in_short
 from dpgcli.sweeps.gate import check_requirements, requirement
 from dpgcli.text import printable
 

@@ -11,7 +11,7 @@ from functools import cache
 from importlib import resources
 
 from dpgcli.reports.explorer.content import Explored, content
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.space import DesignSpace
 
 SCRIPTS = ("columns.js", "plots.js", "shapes.js", "design.js", "controls.js")
 

@@ -12,7 +12,8 @@ from dpgcli.files.scene_file import spelled
 from dpgcli.records import dataclass
 from dpgcli.reports.explorer.shapes import NO_BASE, Shapes, rounded
 from dpgcli.reports.outlines import DrawnState, Points
-from dpgcli.reports.summary import METRICS, DesignSpace, extremes, varies
+from dpgcli.reports.space import DesignSpace
+from dpgcli.reports.summary import METRICS, extremes, varies
 from dpgcli.text import printable, shortened
 
 MOST_DESIGNS = 10_000

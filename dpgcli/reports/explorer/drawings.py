@@ -8,7 +8,7 @@ import numpy as np
 from dpgcli.reports.explorer.content import BestDesign
 from dpgcli.reports.outlines import FingerShape, Points
 from dpgcli.reports.panels import Window
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.space import DesignSpace
 from dpgcli.text import printable
 
 LEGEND = (

@@ -20,7 +20,7 @@ from dpgcli.files.table_writer import read_metadata
 from dpgcli.files.yaml_file import parse_document
 from dpgcli.reports.outlines import drawn_states
 from dpgcli.reports.page import html
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.space import DesignSpace
 from dpgcli.states.plan import Request
 from dpgcli.states.predict import predict
 from tests.reports.explorer.conftest import drawn

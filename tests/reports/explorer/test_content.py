@@ -12,7 +12,7 @@ import pytest
 
 from dpgcli.reports.explorer.content import Explored, best_rows, content, shown_rows
 from dpgcli.reports.page import html
-from dpgcli.reports.summary import DesignSpace
+from dpgcli.reports.space import DesignSpace
 
 INF, NAN = float("inf"), float("nan")
 
