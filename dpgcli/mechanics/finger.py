@@ -143,6 +143,10 @@ class Finger:
         """
         return self.changed(**dict.fromkeys(LOADS, np.zeros((1, 1)))) if self.is_loaded else self
 
+    def with_share_of_loads(self, share: float) -> "Finger":
+        """The finger under a share of its dead loads."""
+        return self.changed(**{name: share * getattr(self, name) for name in LOADS})
+
     @property
     def n_designs(self) -> int:
         """Number of fingers in the batch."""

@@ -50,7 +50,8 @@ class Status(IntEnum):
 
 _MEANINGS = {
     Status.STABLE: "certified: residual, curvature, wells and shape",
-    Status.MARGINAL: "an equilibrium whose curvature is not safely positive",
+    Status.MARGINAL: "an equilibrium whose curvature is not safely positive: next to a fold, or a "
+    "saddle, as a finger that is straight under more than it buckles at",
     Status.ANOTHER_PATTERN: "the search ended in the minimum of another pattern, or in a ripple of "
     "a dome's curve",
     Status.NOT_BISTABLE: "a unit that the pattern inverts has no second well",

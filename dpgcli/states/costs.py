@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 UNIT_STATE_SECONDS = {"chain": 1.0e-6, "lattice": 2.5e-6}
 PAIR_SECONDS = 1.0e-6
 EIGENVALUE_SECONDS = 4e-9  # times the cube of the number of unknowns
-LOADED_SECONDS = 2e-7  # times the cube of the number of units, which loads all couple
+LOADED_SECONDS = 1.5e-5  # times the square of the number of units: loads are followed
 BARRIER_SECONDS = 1.0e-5  # times the square of the number of units
 START_SECONDS = 0.3
 LIBRARY_BYTES = 96 * 2**20  # bytes
@@ -36,7 +36,7 @@ def seconds(
         return START_SECONDS + split.n_solves * length * per_unit + n_states * PAIR_SECONDS
     eigenvalue = EIGENVALUE_SECONDS * (4 * n) ** 3 if Group.EIGENVALUE in groups else 0.0
     barrier = BARRIER_SECONDS * n * n if Group.BARRIERS in groups else 0.0
-    load = LOADED_SECONDS * n**3 if is_loaded else 0.0
+    load = LOADED_SECONDS * n * n if is_loaded else 0.0
     return START_SECONDS + n_states * (n * per_unit + load + eigenvalue + barrier)
 
 

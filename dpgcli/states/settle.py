@@ -1,5 +1,6 @@
 """From patterns to certified states: guess, minimize, certify."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -15,6 +16,7 @@ from dpgcli.states.units import UnitSolutions
 
 FINEST_TOLERANCE = 1e-15  # of the forces in play: rounding's
 HELD_FROM = (1.0, 0.0)  # strokes: corners open first, or soft bars give way first
+STRAIGHT = 0.1  # of the way of the openings: halves of loads that differ by less are alike
 UNITS_AT_ONCE = 15_000  # keeps a batch in the processor's second cache; measured
 
 
@@ -32,9 +34,9 @@ def settle(
     `units` have one design, or one for each lane; `formulate` gives the potential of a finger,
     loads and all. `tolerance` is the largest residual over the forces in play. The search begins
     at the shape `start`, or else at a guess that puts each unit into its own well; what goes
-    astray from there between bars that give way is looked for again, with domes held open first;
-    under dead loads it is followed from the unloaded state instead, as far as it keeps its place.
-    `own` are the units that must have reached their wells.
+    astray from there between bars that give way is looked for again, with domes held open first.
+    Under dead loads a state is what its unloaded state becomes as they grow. `own` are the units
+    that must have reached their wells.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
@@ -47,10 +49,12 @@ def settle(
     walk = partial(settle_from, units, potential, inverted, tolerance=tolerance, own=own)
     if start is not None:
         return walk(potential.coordinates.of_shape(start))
-    guess = geometric_guess(units.finger, inverted, units.first_order)
-    settled = walk(potential.coordinates.of_shape(guess))
+    guess = potential.coordinates.of_shape(
+        geometric_guess(units.finger, inverted, units.first_order)
+    )
     if units.finger.is_loaded:
-        return _followed(units, formulate, settled, tolerance, own)
+        return _under_load(units, formulate, walk, inverted, guess, tolerance, own)
+    settled = walk(guess)
     for strokes in HELD_FROM:
         lanes = _worth_a_search(settled, units)
         if not len(lanes):
@@ -125,34 +129,53 @@ def _searched_again(
     return certified(units, settled.potential, settled.inverted, there, tolerance, own)
 
 
-def _followed(
-    units: UnitSolutions, formulate: Formulate, settled: Settled, tolerance: float, own: slice
+def _under_load(
+    units: UnitSolutions,
+    formulate: Formulate,
+    walk: Callable[[Array], Settled],
+    inverted: Flags,
+    guess: Array,
+    tolerance: float,
+    own: slice,
 ) -> Settled:
-    """Follow lanes without a state from their unloaded states, where they have one, and certify.
+    """What unloaded states become as loads grow, in another pattern perhaps, certified.
 
-    What is folded in its own wells is so however it got there. The others end in what the finger
-    has become under its full load, in another pattern perhaps.
+    Where openings grow in proportion to the loads Newton's method does; all else is followed, since
+    it might step over a fold, or onto another branch. What has no unloaded state, or folds onto
+    itself on the way, is a state that is found from the guess under the full loads.
     """
-    is_elsewhere = ((settled.reached != settled.inverted) | settled.strayed).any(axis=0)
-    is_missed = (settled.status != Status.STABLE) & (is_elsewhere | ~settled.is_folded)
-    lanes = np.flatnonzero(is_missed)
-    if not len(lanes):
-        return settled
-    few, inverted = units.take_lanes(lanes), np.take(settled.inverted, lanes, axis=1)
-    bare = replace(few, finger=few.finger.unloaded)
+    bare = replace(units, finger=units.finger.unloaded)
     begun = settle(bare, formulate, inverted, tolerance, own=own)
-    begins = np.flatnonzero(begun.status == Status.STABLE)
-    if not len(begins):
+    has_begun = begun.status == Status.STABLE
+    half = formulate(units.finger.with_share_of_loads(0.5).with_domes(inverted))
+    there = minimize(half, begun.equilibrium.coordinates, tolerance).coordinates
+    settled = walk(np.where(has_begun, there, guess))
+    full = settled.equilibrium.coordinates
+    coordinates = settled.potential.coordinates
+    ways = (begun.equilibrium.coordinates, there, full)
+    openings = (coordinates.springs(x).extension for x in ways)
+    is_sure = (settled.status <= Status.MARGINAL) & _are_straight(*openings)
+    lanes = np.flatnonzero(has_begun & ~is_sure)
+    if not len(lanes):
         return settled
     from dpgcli.states.loading import grown  # paths, which loads alone need
 
-    lanes, few, inverted = lanes[begins], few.take_lanes(begins), inverted[:, begins]
-    way = grown(few, formulate, inverted, begun.equilibrium.coordinates[:, begins])
-    potential = formulate(few.finger.with_domes(inverted))
-    again = settle_from(few, potential, inverted, way.coordinates, tolerance, own)
-    found = np.flatnonzero(way.arrived)
-    there = settled.equilibrium.with_lanes(lanes[found], again.equilibrium, found)
-    return certified(units, settled.potential, settled.inverted, there, tolerance, own)
+    few, begins = units.take_lanes(lanes), np.take(inverted, lanes, axis=1)
+    way = grown(few, formulate, begins, begun.equilibrium.coordinates[:, lanes])
+    start = np.where(way.arrived, way.coordinates, guess[:, lanes])
+    potential = formulate(few.finger.with_domes(begins))
+    again = settle_from(few, potential, begins, start, tolerance, own)
+    found = settled.equilibrium.with_lanes(lanes, again.equilibrium, np.arange(len(lanes)))
+    return certified(units, settled.potential, inverted, found, tolerance, own)
+
+
+def _are_straight(begin: Array, middle: Array, end: Array) -> Flags:
+    """Whether openings, (unit, lane), move about as far in the one half of a load as in the other.
+
+    Up to a fold the openings move by as the root of what is left does: 0.41 of the whole way more.
+    """
+    bend = np.abs(end - 2.0 * middle + begin).max(axis=0)
+    return np.asarray(bend <= STRAIGHT * np.abs(end - begin).max(axis=0))
 
 
 def lanes_at_once(n_units: int) -> int:

@@ -1,13 +1,16 @@
 """Fingers under dead loads: closed forms, other minimizers, 50 digits, and units that reset."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize, minimize_scalar
 
 from dpgcli.arrays import Array, Flags
-from dpgcli.mechanics.finger import STUDY, Finger
+from dpgcli.equilibrium import newton
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
+from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
 from dpgcli.states.barriers import barriers
@@ -295,6 +298,46 @@ def test_what_a_search_finds_is_where_growing_loads_lead(
     assert (is_stable == (way.unit < 0)).all()
     off = way.coordinates - direct.equilibrium.coordinates
     assert np.abs(off[:, is_stable]).max() < 1e-9
+
+
+@pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
+def test_a_state_under_loads_is_on_the_branch_of_its_unloaded_state(
+    formulate: Formulate, units_of: UnitsOf
+) -> None:
+    """Domes at rest that only push have no well: a search may stay in a pattern and be elsewhere.
+
+    Two hundred small steps of the load, each from the minimum before, are told from the search.
+    """
+    own = {"segment_length": 9.57, "segment_height": 7.76, "stroke": 5.71, "hinge_stiffness": 5.88}
+    own |= {"bistable_stiffness": 29.2, "force_linearity": 0.0777, "linear_stiffness": 4.4e5}
+    bare = uniform_finger(6, **own).changed(wall_compliance=np.array([[5.45e-4]]))
+    finger = loaded(replace(bare, law=PushOnly(PUBLISHED)), tip_force_x=-0.123, tip_force_y=0.146)
+    patterns = units_of("001101", "010011", "010100", "111111")
+    here = stable(finger.unloaded, patterns, formulate).equilibrium.coordinates
+    openings: list[Array] = []
+    for part in np.linspace(0.0, 1.0, 201)[1:]:
+        potential = formulate(finger.with_share_of_loads(part).with_domes(patterns))
+        there = newton.minimize(potential, here, 1e-12, largest_step=0.05)
+        assert (there.curvature > 0.0).all()
+        here = there.coordinates
+        openings.append(potential.coordinates.springs(here).extension)
+    assert np.abs(np.diff(openings, axis=0)).max() < 0.5
+    found = stable(finger, patterns, formulate).equilibrium.coordinates
+    springs = potential.coordinates.springs(found)
+    assert springs.extension == pytest.approx(openings[-1], abs=1e-6)
+
+
+@pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
+@pytest.mark.parametrize("force", [-0.3, -0.8])
+def test_which_way_a_straight_finger_buckles_is_not_told(
+    formulate: Formulate, force: float, units_of: UnitsOf, reference_finger: Fingers
+) -> None:
+    """Along itself it is pushed beyond where straight is a minimum; a little aside decides."""
+    finger = replace(reference_finger(5, 1e4), law=PushOnly(PUBLISHED))
+    aside = loaded(finger, tip_force_x=force, tip_force_y=1e-6)
+    for bent, status in ((finger, Status.MARGINAL), (aside, Status.STABLE)):
+        settled = solved(loaded(bent, tip_force_x=force), units_of("00000"), formulate)
+        assert settled.status.tolist() == [status]
 
 
 @pytest.mark.parametrize("moment", [-12.0, 6.0])
