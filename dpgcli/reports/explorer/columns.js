@@ -1,7 +1,7 @@
 // The columns of the page's table, their scales, and which designs pass. What the page shows stands
 // as JSON in it; nothing is fetched, and text of the data becomes text of the page (textContent) or
-// of a canvas, never markup. These files are one script: columns, plots, shapes, design,
-// controls.
+// of a canvas, never markup. These files are one script: columns, plots, scatter, parallel, shapes,
+// design, controls.
 "use strict";
 
 const BEST = { largest: (v) => v, smallest: (v) => -v, "nearest zero": (v) => -Math.abs(v) };
@@ -56,25 +56,11 @@ for (const column of numbers) {
     const value = start + share * span;
     return column.isLog ? Math.exp(value) : value;
   };
-  column.places = Float64Array.from(column.values, (v) => (v === null ? NaN : column.place(v)));
+  column.inside = (value) => Math.min(column.high, Math.max(column.low, value));
+  const each = (place) => Float64Array.from(column.values, (v) => (v === null ? NaN : place(v)));
+  column.finite = each(column.inside);
+  column.places = each(column.place);
 }
-
-const ticks = (column) => {
-  if (column.high === column.low) return [column.low];
-  const power = (value) => 10 ** Math.floor(Math.log10(value));
-  if (column.isLog) {
-    const found = [];
-    const step = 10 ** Math.ceil(Math.log10(column.high / column.low) / 8);
-    for (let v = power(column.low); v <= column.high * 1.001; v *= step)
-      if (v >= column.low * 0.999) found.push(v);
-    return found;
-  }
-  const rough = (column.high - column.low) / 5;
-  const step = [1, 2, 5, 10].map((m) => m * power(rough)).find((s) => s >= rough);
-  const first = Math.ceil(column.low / step);
-  const count = Math.floor(column.high / step + 1e-9) - first + 1;
-  return Array.from({ length: count }, (_, k) => (first + k) * step);
-};
 
 // ---- what passes, and the front of it
 

@@ -1,25 +1,30 @@
-// What is drawn once a frame; lists and fields, and what mouse and keys do.
+// What is drawn again; lists and fields, and what mouse and keys do.
 
 const MOST_LISTED = 20;
-const DRAG = 4; // pixels: less is a click
 
-// ---- all of it again, once a frame
+// ---- all of it again, once for all that changes at once
 
 let isWaiting = false;
 const redraw = () => {
   if (isWaiting) return;
   isWaiting = true;
-  requestAnimationFrame(draw);
+  queueMicrotask(draw); // Bokeh waits for the frame
+};
+
+const rebuild = () => {
+  scatter = parallel = null;
+  redraw();
 };
 
 const draw = () => {
   isWaiting = false;
   judge();
   const onFront = front();
-  const nPassing = passes.reduce((sum, is) => sum + is, 0);
+  const rows = [];
+  for (let i = 0; i < n; i++) if (passes[i]) rows.push(i);
   const name = selected < 0 ? "none" : columns[0].values[selected];
   at("count").textContent =
-    `${nPassing.toLocaleString("en")} of ${n.toLocaleString("en")} designs pass the filters; ` +
+    `${rows.length.toLocaleString("en")} of ${n.toLocaleString("en")} designs pass the filters; ` +
     `${onFront.length.toLocaleString("en")} on the Pareto front. Selected design: ${name}.`;
   at("scatter").setAttribute(
     "aria-label",
@@ -29,17 +34,16 @@ const draw = () => {
     "aria-label",
     `Parallel coordinates of ${[...axes].map((c) => c.label).join(", ")}`,
   );
-  drawScatter(onFront);
-  drawParallel();
-  listPassing();
+  drawScatter(rows, onFront);
+  drawParallel(rows);
+  listPassing(rows);
   showFilters();
 };
 
-const listPassing = () => {
+const listPassing = (passing) => {
   const merit = BEST[at("y-best").value];
   const { values } = chosen.y;
-  const rows = [];
-  for (let i = 0; i < n; i++) if (passes[i] && values[i] !== null) rows.push(i);
+  const rows = passing.filter((i) => values[i] !== null);
   rows.sort((a, b) => merit(values[b]) - merit(values[a]) || a - b);
   const some = [columns[0], ...new Set([...columns.filter((c) => c.key), chosen.x, chosen.y])];
   const head = made(
@@ -138,6 +142,7 @@ const filterRow = (column) => {
   box.addEventListener("change", () => {
     if (box.checked) axes.add(column);
     else axes.delete(column);
+    parallel = null;
     redraw();
   });
   return [cell(box), ...column.fields.map((field) => cell(field))];
@@ -160,6 +165,7 @@ const buildControls = () => {
     const choose = () => {
       chosen[axis] = numbers[Number(choice.value)];
       best.value = chosen[axis].best;
+      scatter = null;
       redraw();
     };
     choice.value = String(numbers.indexOf(chosen[axis]));
@@ -184,96 +190,14 @@ const buildControls = () => {
   });
 };
 
-// Call back with where a drag began and is; `click` where it did not move.
-const onDrag = (canvas, drag, click) => {
-  let start = null;
-  const place = ({ offsetX, offsetY }) => [offsetX, offsetY];
-  const hasMoved = (end) => Math.hypot(end[0] - start[0], end[1] - start[1]) > DRAG;
-  canvas.addEventListener("pointerdown", (event) => {
-    start = place(event);
-    canvas.setPointerCapture(event.pointerId);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    if (start && hasMoved(place(event))) drag(start, place(event));
-  });
-  canvas.addEventListener("pointerup", (event) => {
-    if (start && !hasMoved(place(event))) click(start);
-    start = null;
-  });
-};
-
-const between = (column, a, b) =>
-  [Math.min(a, b), Math.max(a, b)].map((s) =>
-    s <= 0 ? -Infinity : s >= 1 ? Infinity : column.value(s),
-  );
-
-const listenToScatter = () => {
-  const canvas = at("scatter");
-  const shares = ([x, y]) => {
-    const room = inside(canvas);
-    return [(x - frame.left) / room.width, 1 - (y - frame.top) / room.height];
-  };
-  const drag = (start, end) => {
-    const [a, b] = [shares(start), shares(end)];
-    filters.set(chosen.x, between(chosen.x, a[0], b[0]));
-    if (chosen.x !== chosen.y) filters.set(chosen.y, between(chosen.y, a[1], b[1]));
-    redraw();
-  };
-  const click = (place) => {
-    const [x, y] = shares(place);
-    const room = inside(canvas);
-    let [nearest, least] = [-1, Infinity];
-    for (let i = 0; i < n; i++) {
-      const distance = Math.hypot(
-        (chosen.x.places[i] - x) * room.width,
-        (chosen.y.places[i] - y) * room.height,
-      );
-      if (passes[i] && distance < least) [nearest, least] = [i, distance];
-    }
-    if (nearest >= 0) select(nearest);
-  };
-  onDrag(canvas, drag, click);
-  canvas.addEventListener("keydown", (event) => {
-    const moves = {
-      ArrowRight: ["x", 1],
-      ArrowLeft: ["x", -1],
-      ArrowUp: ["y", 1],
-      ArrowDown: ["y", -1],
-    };
-    if (!moves[event.key]) return;
-    event.preventDefault();
-    const [axis, step] = moves[event.key];
-    const { places } = chosen[axis];
-    const rows = [];
-    for (let i = 0; i < n; i++)
-      if (passes[i] && !Number.isNaN(chosen.x.places[i] + chosen.y.places[i])) rows.push(i);
-    rows.sort((a, b) => places[a] - places[b] || a - b);
-    const here = rows.indexOf(selected);
-    if (rows.length)
-      select(rows[here < 0 ? 0 : Math.min(rows.length - 1, Math.max(0, here + step))]);
-  });
-};
-
-const listenToParallel = () => {
-  const canvas = at("parallel");
-  const nearest = (x) =>
-    axisPlaces(canvas).reduce((a, b) => (Math.abs(b.x - x) < Math.abs(a.x - x) ? b : a)).column;
-  const share = (y) => 1 - (y - bar.top) / (canvas.clientHeight - bar.top - bar.bottom);
-  const drag = (start, end) => {
-    const column = nearest(start[0]);
-    filterBy(column, between(column, share(start[1]), share(end[1])));
-  };
-  onDrag(canvas, drag, (start) => filterBy(nearest(start[0]), null));
-};
-
 document.querySelectorAll("[data-row]").forEach((button) => (button.hidden = false));
 at("shown").textContent = data.shown;
 document.getElementById("explorer").hidden = false;
 buildControls();
-listenToScatter();
-listenToParallel();
-window.addEventListener("resize", redraw);
-window.addEventListener("beforeprint", draw);
+window.addEventListener("resize", () => {
+  parallel = null; // its labels are wrapped anew
+  redraw();
+});
 for (const media of ["(prefers-color-scheme: dark)", "print"])
-  matchMedia(media).addEventListener("change", draw);
+  matchMedia(media).addEventListener("change", rebuild);
 select(data.selected);

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dpgcli.reports import explorer as module
 from dpgcli.reports.explorer.content import Explored, best_rows, content, shown_rows
 from dpgcli.reports.page import html
 from dpgcli.reports.space import DesignSpace
@@ -131,6 +132,14 @@ def test_the_only_script_is_the_one_that_the_policy_names() -> None:
     assert f"script-src 'sha256-{digest}';" in reader.policy
     assert "default-src 'none'" in reader.policy
     assert "unsafe-eval" not in reader.policy
+
+
+def test_without_bokeh_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "find_spec", lambda name: None)
+    page = html(space())
+    assert "No explorer: it needs Bokeh, pip install bokeh." in page
+    assert not re.search(r"<script|<select", page)
+    assert "<h2>Best and worst" in page
 
 
 def test_an_empty_space_has_no_explorer() -> None:
