@@ -27,6 +27,7 @@ def report(
     from dpgcli.api.report import PAGES, page, write_page
     from dpgcli.errors import UsageError
     from dpgcli.files.output import Mark, check_outputs
+    from dpgcli.reports.explorer import NO_BOKEH, is_drawable
     from dpgcli.reports.summary import doubts
 
     kind = ".md" if output is None else output.suffix.lower()
@@ -35,6 +36,8 @@ def report(
     check_outputs((folder / "designs.parquet",), (output, Mark.REPORT))
     space, text = page(folder, kind, strict=strict)
     say_warnings(doubts(space))
+    if kind == ".html" and not is_drawable():
+        say_warnings([NO_BOKEH])
     if output is None:
         put(text, end="")
     else:

@@ -69,7 +69,8 @@ def test_a_report_of_a_hostile_table(call: Any, folder: Path, tables: str) -> No
     assert result.exit_code == ExitCode.DONE, result.exception
     page = (folder / "page.html").read_text(encoding="utf-8")
     assert not obeyed(page)
-    assert "<b>" not in page
+    before, _, rest = page.partition("<script>")  # Bokeh's script has markup of its own
+    assert "<b>" not in before + rest.partition("</script>")[2]
     assert "<svg" in page
 
 

@@ -55,7 +55,7 @@ const layer = (plot, level, Glyph, fields, look) => {
 // are called back in data of the plot: where a drag began and is, where a click was.
 const stage = (id, drag, click) => {
   const place = at(id);
-  let [view, last, start] = [null, Promise.resolve(), null];
+  let [views, view, start, last] = [new Map(), null, null, Promise.resolve()];
   const inData = ([x, y]) => [view.frame.x_scale.invert(x), view.frame.y_scale.invert(y)];
   const hasMoved = (end) => Math.hypot(end[0] - start[0], end[1] - start[1]) > DRAG;
   place.addEventListener("pointerdown", ({ offsetX, offsetY, pointerId }) => {
@@ -71,10 +71,11 @@ const stage = (id, drag, click) => {
     start = null;
   });
   const show = async (plot) => {
-    view?.remove();
+    views.clear();
     const own = new Bokeh.Document();
     own.add_root(plot);
-    [view] = await Bokeh.embed.add_document_standalone(own, place);
+    views = await Bokeh.embed.add_document_standalone(own, place);
+    [view] = views;
     view.el.inert = true; // mouse and focus are the place's
   };
   return (plot) => (last = last.then(() => show(plot)));

@@ -37,6 +37,7 @@ const buildScatter = () => {
       editable: false,
       fill_color: null,
       line_color: color("text"),
+      line_alpha: 1,
       line_dash: [5, 4],
     }),
   };

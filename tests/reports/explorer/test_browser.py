@@ -38,6 +38,13 @@ SPACE = [
     {"key": OVER, "values": [0.6, 0.75]},
 ]
 N_DESIGNS, N_UNITS = 24, 5
+FILLED = """
+return ["scatter", "parallel"].map((name) => {
+  const {clientWidth, clientHeight} = document.getElementById(`explorer-${name}`);
+  return [...Bokeh.index].some(({model}) =>
+    model.outer_width === clientWidth && model.outer_height === clientHeight);
+});
+"""
 PLACE = """
 const place = document.getElementById(arguments[0]);
 place.scrollIntoView({block: "center"});
@@ -153,11 +160,13 @@ def test_what_passes_is_drawn(page: Any, swept: Path) -> None:
     fill(page, "dome_height_mm, lowest", "6")
     assert passing(page) == 12
     plots = page.execute_script(
-        "return [...Bokeh.index].map(({model}) => model.renderers.map(({data_source}) =>"
+        "const plots = [...Bokeh.index].map(({model}) => model).filter((m) => m.renderers);"
+        "return plots.map((plot) => plot.renderers.map(({data_source}) =>"
         "  Object.entries(data_source.data).map(([name, values]) => [name, [...values].map("
         "    (value) => typeof value === 'number' ? value : [...value])])))"
     )
-    scatter, parallel = ([dict(layer) for layer in plot] for plot in plots)
+    layers = ([dict(layer) for layer in plot] for plot in plots)
+    scatter, parallel = sorted(layers, key=lambda found: "xs" in found[0])
     dots, squares, front, cross = scatter
     designs = read_designs(swept / "designs.parquet").columns
     is_high = designs["dome_height_mm"] > 6
@@ -411,6 +420,8 @@ def test_every_control_and_picture_has_a_name(page: Any) -> None:
         page.set_window_size(width, 1000)
         drawn(page)
         assert page.execute_script(wide) <= 0
+        drawn(page)
+        assert page.execute_script(FILLED) == [True, True]
     page.set_window_size(1280, 1000)
 
 
