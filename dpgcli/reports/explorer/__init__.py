@@ -1,8 +1,7 @@
 """The explorer of a design space: a part of a page with its own data and script.
 
-Its plots are Bokeh's, whose script is in the page. What a brush changes lies on a canvas of its own
-there, so that it takes 1.7 times as long as pixels drawn by hand; with Bokeh's own selection it
-takes 5 times as long, with Vega's as well, with Plotly's 200 times. The manual has the numbers.
+Its plots are drawn by Bokeh, whose script is in the page. What a brush changes lies on a canvas of
+its own there; the manual has what that takes, and what other libraries would.
 """
 
 import base64

@@ -1,5 +1,5 @@
 // What both plots share: Bokeh's models, and the look of the page. What a brush changes lies on the
-// level "overlay", which Bokeh draws on a canvas of its own: the 10,000 dots below are drawn once.
+// level "overlay", which Bokeh draws on a canvas of its own: what lies below is drawn once.
 
 Bokeh.logger.set_level("warn");
 const DRAG = 4; // pixels: less is a click
@@ -33,7 +33,6 @@ const emptyPlot = (ranges, settings) => {
     toolbar_location: null,
     background_fill_color: null,
     border_fill_color: null,
-    lod_threshold: null,
     output_backend: matchMedia("print").matches ? "svg" : "canvas",
     ...settings,
   });
@@ -46,6 +45,7 @@ const layer = (plot, level, Glyph, fields, look) => {
   const data_source = new Bokeh.ColumnDataSource({
     data: Object.fromEntries(fields.map((field) => [field, []])),
   });
+  // one look, whatever Bokeh holds to be selected
   const looks = { glyph, selection_glyph: glyph, nonselection_glyph: glyph, muted_glyph: glyph };
   plot.add_renderers(new Bokeh.GlyphRenderer({ data_source, level, ...looks }));
   return data_source;

@@ -45,6 +45,13 @@ return ["scatter", "parallel"].map((name) => {
     model.outer_width === clientWidth && model.outer_height === clientHeight);
 });
 """
+LOOK = """
+const styles = getComputedStyle(document.documentElement);
+const plots = [...Bokeh.index].map(({model}) => model).filter((model) => model.renderers);
+const colors = plots.map((plot) => plot.below[0].major_label_text_color);
+const text = styles.getPropertyValue("--text").trim();
+return [plots.map((plot) => plot.output_backend), colors.every((color) => color === text)];
+"""
 PLACE = """
 const place = document.getElementById(arguments[0]);
 place.scrollIntoView({block: "center"});
@@ -374,6 +381,7 @@ def test_what_is_said_can_be_read(page: Any, scheme: str) -> None:
             "return [at('body').backgroundColor, ...named]"
         )
         page_color, words, mark, front, edge, inverted = colors
+        assert page.execute_script(LOOK) == [["canvas", "canvas"], True]
         assert (luminance(page_color) < 0.1) == (scheme == "dark")
         assert contrast(page_color, words) > 7
         assert min(contrast(page_color, other) for other in (mark, front, edge)) > 4.5
@@ -392,6 +400,7 @@ def test_a_page_is_printed_on_white_without_controls(page: Any) -> None:
             for name in ("clear", "filters", "scatter", "parallel", "numbers", "passing")
         }
         background = page.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert page.execute_script(LOOK) == [["svg", "svg"], True]  # sharp on paper
     finally:
         page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
     assert is_shown == {
