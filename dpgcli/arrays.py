@@ -24,6 +24,16 @@ def total(parts: Array) -> Array:
     return np.asarray(parts.sum(axis=0))
 
 
+def rotated(ways: Array, angle: float | Array) -> Array:
+    """Directions (2, …, batch), turned counterclockwise by angles, (batch,) rad or one for all.
+
+    >>> rotated(np.array([[1.0], [0.0]]), np.array([np.pi / 2.0])).round(12).tolist()
+    [[0.0], [1.0]]
+    """
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack((cos * ways[0] - sin * ways[1], sin * ways[0] + cos * ways[1]))
+
+
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
     """Each value once, in order; of numbers, none of them NaN.
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.arrays import Array, Flags, Indices, rotated
 from dpgcli.design.loads import GRAVITY
 from dpgcli.mechanics.aperture import ForceCurve
 from dpgcli.records import dataclass
@@ -73,6 +73,8 @@ class Disc:
 class Polygon:
     """A body with straight sides: a reference point (2,), and corners from there, (2, corner), mm.
 
+    Of bodies that have turned corners are (2, corner, design).
+
     >>> wedge = np.array([[0.0, 3.0, 3.0], [0.0, -4.0, 4.0]])
     >>> bool(Polygon(np.array([40.0, 0.0]), wedge).is_mirrored)
     True
@@ -87,7 +89,18 @@ class Polygon:
 
     def take_lanes(self, index: Indices) -> "Polygon":
         """Those of some designs of a batch; one that is alike in all is repeated."""
-        return Polygon(_centers(self.center, index), self.around)
+        around = self.around if self.around.ndim == 2 else _taken(self.around, index)
+        return Polygon(_centers(self.center, index), around)
+
+    def turned(self, angle: float | Array) -> "Polygon":
+        """The same, turned counterclockwise about its reference point, by angles (design,), rad.
+
+        >>> bar = Polygon(np.zeros(2), np.array([[0.0, 8.0, 8.0, 0.0], [0.0, 0.0, 2.0, 2.0]]))
+        >>> bar.turned(0.5 * np.pi).corners.round(12).tolist()
+        [[0.0, 0.0, -2.0, -2.0], [0.0, 8.0, 8.0, 0.0]]
+        """
+        around = self.around[..., None] if np.ndim(angle) else self.around
+        return Polygon(self.center, rotated(around, angle))
 
     @property
     def name(self) -> str:
@@ -96,17 +109,32 @@ class Polygon:
 
     @cached_property
     def corners(self) -> Array:
-        """The corners in the gripper's frame, (2, corner), mm."""
-        around = self.around if self.center.ndim == 1 else self.around[..., None]
-        return np.asarray(self.center[:, None] + around)
+        """The corners in the gripper's frame, (2, corner) or (2, corner, design), mm."""
+        if self.center.ndim + 1 == self.around.ndim:
+            return np.asarray(self.center[:, None] + self.around)
+        around = self.around.reshape(*self.around.shape[:2], -1)
+        return np.asarray(self.center.reshape(2, 1, -1) + around)
 
     @property
     def middle(self) -> Array:
         """Its center of area, (2,) or (2, design), mm."""
-        import shapely
+        return np.asarray((self.center.T + self._to_middle.T).T)
 
-        from_center = shapely.get_coordinates(shapely.centroid(shapely.Polygon(self.around.T)))[0]
-        return np.asarray((self.center.T + from_center).T)
+    @cached_property
+    def _to_middle(self) -> Array:
+        """The center of area from the reference point, (2,) or (2, design), mm."""
+        first = self.around[:, :1]
+        x, y = self.around - first
+        after_x, after_y = np.roll(x, -1, axis=0), np.roll(y, -1, axis=0)
+        area = x * after_y - after_x * y
+        moment = np.stack(((x + after_x) * area, (y + after_y) * area)).sum(axis=1)
+        return np.asarray(first[:, 0] + moment / (3.0 * area.sum(axis=0)))
+
+    @property
+    def outer_radius(self) -> float:
+        """The distance of the furthest corner from its center of area, mm."""
+        x, y = self.around - self._to_middle[:, None]
+        return float(np.hypot(x, y).max())
 
     @property
     def nearest_x(self) -> float | Array:
@@ -119,7 +147,8 @@ class Polygon:
         """The radius of the largest circle in it, mm."""
         import shapely
 
-        return float(shapely.maximum_inscribed_circle(shapely.Polygon(self.around.T)).length)
+        first = self.around.reshape(*self.around.shape[:2], -1)[..., 0]  # of those that turn
+        return float(shapely.maximum_inscribed_circle(shapely.Polygon(first.T)).length)
 
     @property
     def is_mirrored(self) -> Flags:
@@ -199,6 +228,15 @@ class Jaws:
 
 
 Body = Disc | Jaws | Polygon
+
+
+def at_place(body: Body, center: Array, angle: float | Array = 0.0) -> Body:
+    """A body with its reference point at another place, (2,) or (2, design) mm, turned there, rad.
+
+    Only polygons turn.
+    """
+    turned = body.turned(angle) if isinstance(body, Polygon) else body
+    return replace(turned, center=center)
 
 
 def gives_way(body: Body | None) -> bool:

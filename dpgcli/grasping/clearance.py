@@ -88,7 +88,8 @@ def _least(around: Outlines, body: Body, begin: Array, end: Array) -> Array:
         ways = shapely.linestrings(np.stack((begin, end), axis=-1).transpose(1, 2, 0))
         nearest = shapely.distance(around, ways).min(axis=0)
         return np.asarray(nearest - body.radius)
-    corners = (body.corners - body.center[:, None])[..., None] + begin[:, None]
+    corners = body.corners.reshape(2, body.corners.shape[1], -1) - body.center[:, None, None]
+    corners = corners + begin[:, None]
     sides = np.stack((corners, np.roll(corners, -1, axis=1)), axis=-1)
     swept = np.concatenate((sides, sides + (end - begin)[:, None, :, None]), axis=-1)
     hulls = shapely.convex_hull(shapely.multipoints(np.moveaxis(swept, 0, -1)))

@@ -39,7 +39,7 @@ from dpgcli.mechanics.mirror import Axis, Heights, NodeGaps, OfNodes, Touching
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.mechanics.sticking import Sticking
-from dpgcli.mechanics.terms import DeadLoad, Formulate
+from dpgcli.mechanics.terms import DeadLoad, Formulate, Quadratic
 from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 
@@ -124,7 +124,8 @@ class Obstructed:
             face = replace(alone, places=n * alone.places + finger)
             if self.motion is not None:
                 own = np.arange(self.n_own, self.n_own + self.motion.n)
-                face = face.seen_from(self.motion.directions[finger], own)
+                ways, pivot = self.motion.directions[finger], self.motion.pivot_of(finger)
+                face = face.seen_from(ways, own, pivot)
             faces.append(face)
         return tuple(faces)
 
@@ -270,8 +271,7 @@ class Obstructed:
         terms = [terms_of_part(alone.terms, finger, n, size) for finger, alone in enumerate(own)]
         resistance = None if self.motion is None else self.motion.resistance
         resisting = () if resistance is None else (Term("body", self._opening, resistance),)
-        hold = None if self.motion is None else self.motion.hold
-        holding = () if hold is None else (Term("hold", self._motions, DeadLoad(hold)),)
+        holding = self._holding(1.0)
         pressing = () if self.ramp is None else self._pressing(own, self.ramp.begin)
         return (*(term for part in terms for term in part), *resisting, *holding, *pressing)
 
@@ -280,10 +280,18 @@ class Obstructed:
 
         What held the body lets go, and pressures change.
         """
-        hold = None if self.motion is None else self.motion.hold
-        letting_go = () if hold is None else (Term("hold", self._motions, DeadLoad(-hold)),)
         pressing = () if self.ramp is None else self._pressing(own, self.ramp.change)
-        return (*letting_go, *pressing)
+        return (*self._holding(-1.0), *pressing)
+
+    def _holding(self, share: float) -> tuple[Term, ...]:
+        """A share of what keeps the body where it is: forces, and a spring where it turns."""
+        if self.motion is None or self.motion.hold is None:
+            return ()
+        force = Term("hold", self._motions, DeadLoad(share * self.motion.hold))
+        spring = self.motion.spring
+        if spring is None:
+            return (force,)
+        return force, Term("hold", self._motions, Quadratic(share * spring))
 
     def _pressing(self, own: tuple[FingerPotential, ...], pressure: Array) -> tuple[Term, ...]:
         """The work of pressures, (unit, 1) in MPa, on the domes of every finger."""

@@ -80,8 +80,10 @@ class Pulled:
         lanes = np.flatnonzero(slip > 0.0)
         if len(lanes):
             few, rest = self._free(own.take_lanes(lanes), shapes.take_lanes(lanes), lanes)
-            pull = np.zeros((len(rest.coordinates) - few.n_own, len(lanes)))
-            pull[:2] = np.multiply.outer(self.gravity, slip[lanes])
+            motion = few.motion
+            assert motion is not None, "a body that may move"
+            pull = np.zeros((motion.n, len(lanes)))
+            pull[motion.ways] = np.multiply.outer(self.gravity, slip[lanes])
             friction = np.broadcast_to(self.friction.coefficient, len(slip))[lanes]
             share[lanes], is_reset[lanes] = followed(few, rest, friction, pull)
         return slip, share, is_reset
@@ -100,14 +102,17 @@ class Pulled:
     def _free(
         self, own: Obstructed, shapes: ContactShapes, lanes: Indices
     ) -> tuple[Obstructed, ContactShapes]:
-        """The same fingers, with a body that may move along x and y."""
-        few = self.take_lanes(lanes)
-        n_before = own.n_own + WAYS[self.held].shape[1]
-        moved, others = shapes.coordinates[:n_before], shapes.coordinates[n_before:]
-        still = np.zeros((own.n_own + 2 - n_before, len(lanes)))
+        """The same fingers, with a body that may move along x and y, and turn if it is one to."""
+        if self.held is Held.FREE:
+            return own, shapes
+        few, n_ways = self.take_lanes(lanes), WAYS[self.held].shape[1]
         motion = motion_of(few.body, Held.FREE, few.frames)
-        coordinates = np.concatenate((moved, still, others))
-        return replace(own, motion=motion), replace(shapes, coordinates=coordinates)
+        assert motion is not None, "a body that may move"
+        fingers, moved, others = np.split(shapes.coordinates, [own.n_own, own.n_own + n_ways])
+        still = np.zeros((motion.n - len(moved) - len(others), len(lanes)))
+        first = motion.ways.start
+        parts = (fingers, still[:first], moved, still[first:], others)
+        return replace(own, motion=motion), replace(shapes, coordinates=np.concatenate(parts))
 
 
 def borne(

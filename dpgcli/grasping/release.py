@@ -7,20 +7,22 @@ they must. A body that no finger keeps from moving on leaves them: there is no r
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dpgcli.arrays import Array, Indices
-from dpgcli.design.bodies import Body, Jaws, gives_way
+from dpgcli.arrays import Array, Indices, rotated
+from dpgcli.design.bodies import Body, Jaws, Polygon, gives_way
 from dpgcli.design.scene import Held
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.closing import Closing, closed, with_reach
-from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.contact import STIFFER, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped, Placed, described
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.aperture import KeptApart
+from dpgcli.mechanics.face import Pivot
 from dpgcli.mechanics.terms import Quadratic
 from dpgcli.states.certify import Status
 
@@ -38,6 +40,9 @@ def motion_of(body: Body, held: Held, frames: Sequence[FingerFrame]) -> Motion |
     The aperture of jaws that give way is the last of the motions: each plate goes half of it.
     """
     ways, resistance = WAYS[held][..., None], None
+    pivots: tuple[Pivot, ...] = ()
+    if turns(body, held):
+        pivots = tuple(_pivot(body, frame) for frame in frames)
     apart = np.zeros((2, 0, 1))
     if isinstance(body, Jaws) and gives_way(body):
         apart = np.array([0.0, 0.5])[:, None, None]
@@ -46,7 +51,18 @@ def motion_of(body: Body, held: Held, frames: Sequence[FingerFrame]) -> Motion |
         return None
     along = (np.concatenate((ways, frame.side * apart), axis=1) for frame in frames)
     told = zip(frames, along, strict=True)
-    return Motion(tuple(frame.along(own) for frame, own in told), resistance)
+    return Motion(tuple(frame.along(own) for frame, own in told), resistance, pivots=pivots)
+
+
+def turns(body: Body | None, held: Held) -> TypeGuard[Polygon]:
+    """Whether a body that is held so turns: a disc does so without a change, jaws do not."""
+    return isinstance(body, Polygon) and held is Held.FREE
+
+
+def _pivot(body: Polygon, frame: FingerFrame) -> Pivot:
+    """The center of area, about which the furthest corner goes as far as a motion says."""
+    point = frame.inside(body.middle).reshape(2, -1)
+    return Pivot(point, np.array([frame.side * body.outer_radius]))
 
 
 def _resistance(jaws: Jaws) -> Quadratic | KeptApart:
@@ -57,10 +73,19 @@ def _resistance(jaws: Jaws) -> Quadratic | KeptApart:
     return Quadratic(np.reshape(jaws.stiffness, (1, -1)))
 
 
-def moved_by(held: Held, motions: Array) -> Array:
-    """How far bodies have moved, (2, lane), by their motions, (motion, lane); mm."""
-    ways = WAYS[held]
-    return np.asarray(ways @ motions[: ways.shape[1]])
+def moved_by(body: Body, held: Held, motions: Array) -> Array:
+    """How far reference points have moved, (2, lane), by motions, (motion, lane); mm."""
+    ways, first = WAYS[held], int(turns(body, held))
+    moved = np.asarray(ways @ motions[first : first + ways.shape[1]])
+    if not first:
+        return moved
+    arm = (body.center - body.middle).reshape(2, -1)
+    return moved + rotated(arm, turned_by(body, held, motions)) - arm
+
+
+def turned_by(body: Body, held: Held, motions: Array) -> Array:
+    """By which angles bodies have turned, (lane,), rad, counterclockwise."""
+    return np.asarray(motions[0] / (body.outer_radius if turns(body, held) else np.inf))
 
 
 def opened_by(body: Body, motions: Array) -> Array:
@@ -198,6 +223,8 @@ def released(own: Obstructed, shapes: ContactShapes) -> Approach:
     begin = np.zeros(shapes.coordinates.shape[1])
     potential = own.pressed(shapes.inverted, shapes.push, begin + 1.0)
     kept = potential.evaluate(shapes.coordinates).gradient[own.n_own :]
-    keeping = replace(own, depth=np.zeros(1), motion=replace(own.motion, hold=kept))
+    spring = own.stiffness / STIFFER if own.motion.pivots else None
+    motion = replace(own.motion, hold=kept, spring=spring)
+    keeping = replace(own, depth=np.zeros(1), motion=motion)
     gone = approach(keeping, shapes, begin, begin + 1.0)
     return replace(gone, resets=tuple(replace(own, of_release=True) for own in gone.resets))

@@ -120,7 +120,7 @@ def _best(known: Prospect, plans: Sequence[Plan], failed: _Furthest) -> Plan | N
     lanes = np.flatnonzero(are_lifted & _well(words, plans, Stage.CARRY, failed, order))
     if not len(lanes):
         return None
-    found = replace(found, pairs=found.pairs[:, lanes], centers=found.centers[:, lanes])
+    found = found.take_rows(lanes)
     plans, merits = [plans[lane] for lane in lanes.tolist()], (near[lanes], worth[lanes])
     return _released(known, plans, found, some(after, lanes), merits, failed)
 
@@ -252,7 +252,8 @@ def letting_go(
     task, places = known.task, np.array([place for place, _ in options])
     sequences = [pulses for _, pulses in options]
     parts, near = pulsed(task, some(after, places), sequences, known.reach)
-    free = kept(task, parts, found.centers[:, places])
+    before = found.take_rows(places)
+    free = kept(task, parts, before.centers, before.turned)
     rows = grasp_rows(free)
     words = status_words(rows)
     words = np.where((words == WELL) & (rows["n_contacts"] > 0), IN_TOUCH, words)

@@ -7,6 +7,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
 from dpgcli.mechanics.aperture import KeptApart, Softening
+from dpgcli.mechanics.face import Pivot
 from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.records import dataclass
 
@@ -45,21 +46,32 @@ class ContactShapes:
 class Motion:
     """How a body may move, by q, (motion, batch) in mm.
 
-    `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger, and
-    `resistance` is the law of the last q, if any. `hold` (motion, batch) N keeps it where it is at
-    a load of 0, and lets go of it until 1. With a `travel` D (motion, batch), mm, it does not move
-    by itself: q is (λ − 1) D.
+    `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger; with
+    `pivots` in these frames it turns, too, by a q before all others. `resistance` is the law of the
+    last q, if any. `hold` (motion, batch) N keeps it where it is at a load of 0, and lets go of it
+    until 1, with a `spring` (1, 1 or batch) N/mm on each q, if any. With a `travel` D (motion, batch), mm, it does not move by itself: q is (λ − 1) D.
     """
 
     directions: tuple[Array, ...]
     resistance: ScalarLaw | None = None
     hold: Array | None = None
     travel: Array | None = None
+    pivots: tuple[Pivot, ...] = ()
+    spring: Array | None = None
 
     @property
     def n(self) -> int:
         """Number of motions."""
-        return int(self.directions[0].shape[1])
+        return int(self.directions[0].shape[1]) + bool(self.pivots)
+
+    @property
+    def ways(self) -> slice:
+        """The motions along x and y of a body that is free."""
+        return slice(len(self.pivots[:1]), len(self.pivots[:1]) + 2)
+
+    def pivot_of(self, finger: int) -> Pivot | None:
+        """What the body turns about in the frame of a finger, if it does."""
+        return self.pivots[finger] if self.pivots else None
 
     @property
     def softening(self) -> Softening | None:
@@ -74,6 +86,8 @@ class Motion:
             self.resistance and self.resistance.take_lanes(index),
             None if self.hold is None else take_lanes(self.hold, index),
             None if self.travel is None else take_lanes(self.travel, index),
+            tuple(pivot.take_lanes(index) for pivot in self.pivots),
+            None if self.spring is None else take_lanes(self.spring, index),
         )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.pulses import Pulse
 from dpgcli.arrays import Array, Codes, Flags, Indices
-from dpgcli.design.bodies import Body
+from dpgcli.design.bodies import Body, at_place
 from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Approach, approach
@@ -23,7 +23,7 @@ from dpgcli.grasping.closing import driven, with_reach
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, placed
 from dpgcli.grasping.pull import Pulled, borne
-from dpgcli.grasping.release import let_go, motion_of, moved_by
+from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by
 from dpgcli.grasping.shapes import ContactShapes, Ramp
 from dpgcli.grasping.table import Grasps
 from dpgcli.mechanics.terms import chain_potential
@@ -161,11 +161,12 @@ def some(parts: Parts, index: Indices) -> Parts:
     return _each(parts, taken)
 
 
-def kept(task: Task, parts: Parts, centers: Array) -> Grasps:
-    """Fingers with the body kept in its place, at `centers` (2, lane)."""
+def kept(task: Task, parts: Parts, centers: Array, turned: Array | float = 0.0) -> Grasps:
+    """Fingers with the body kept at `centers`, (2, lane), where it has `turned`, (lane,)."""
     scene = replace(task.scene, held=Held.FIXED, friction=None)
     rows = np.tile(np.arange(centers.shape[1]), (len(parts), 1))
-    return Grasps(scene, task.body, task.frames, _each(parts, _described), rows, centers)
+    fingers = _each(parts, _described)
+    return Grasps(scene, task.body, task.frames, fingers, rows, centers, turned=turned)
 
 
 def _described(part: Placed) -> Grasped:
@@ -193,7 +194,8 @@ def way(task: Task, found: Grasps, begin: Array, end: Array) -> Clearance:
         outlines(own, frame, height, length)
         for own, frame in zip(found.fingers, found.frames, strict=True)
     ]
-    return clearance(np.concatenate(around), task.body, begin, end)
+    body = at_place(task.body, task.body.center, found.turned)
+    return clearance(np.concatenate(around), body, begin, end)
 
 
 def lifted(task: Task, parts: Parts) -> tuple[Grasps, Parts]:
@@ -208,8 +210,9 @@ def lifted(task: Task, parts: Parts) -> tuple[Grasps, Parts]:
         found, rest, after = kept(task, parts, task.centers(n)), None, parts
     else:
         fingers, motions, rest = let_go(parts, lanes, motion, scene.held, with_margins=False)
-        centers = task.centers(n) + moved_by(scene.held, motions)
-        found = replace(kept(task, parts, centers), fingers=fingers)
+        centers = task.centers(n) + moved_by(task.body, scene.held, motions)
+        turned = turned_by(task.body, scene.held, motions)
+        found = replace(kept(task, parts, centers), fingers=fingers, turned=turned)
         after = _apart(task, parts, found, rest)
     found = replace(found, scene=scene)
     if scene.friction is None:
@@ -222,7 +225,7 @@ def lifted(task: Task, parts: Parts) -> tuple[Grasps, Parts]:
 def _apart(task: Task, parts: Parts, found: Grasps, rest: ContactShapes) -> Parts:
     """The fingers of bodies that have moved, each by itself, with the body kept where it is."""
     places = np.where(np.isnan(found.centers), task.body.center[:, None], found.centers)
-    body = replace(task.body, center=places)
+    body = at_place(task.body, places, np.nan_to_num(found.turned))
     n_units, n_before, after = task.scene.finger.n_units, 0, []
     joint = replace(parts[0].own, bodies=tuple(part.own.bodies[0] for part in parts))
     for finger, (part, frame) in enumerate(zip(parts, found.frames, strict=True)):

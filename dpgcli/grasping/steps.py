@@ -12,6 +12,7 @@ from dpgcli.design.outputs import Output
 from dpgcli.design.pressure import History
 from dpgcli.grasping.grasp import Grasped
 from dpgcli.grasping.plans import Plan, Prospect
+from dpgcli.grasping.release import turns
 from dpgcli.grasping.routine import (
     COLLIDES,
     FINE,
@@ -26,7 +27,7 @@ from dpgcli.grasping.routine import (
     status_words,
 )
 from dpgcli.grasping.stages import Parts, Task, beside, free, kept, lifted, pulsed, way
-from dpgcli.grasping.table import Grasps, grasp_rows
+from dpgcli.grasping.table import ANGLE, Grasps, grasp_rows
 from dpgcli.records import dataclass
 from dpgcli.states.columns import Column, Kind
 
@@ -53,6 +54,7 @@ COLUMNS = (
     Column("payload_margin", "", "how much more than its weight that is, a share of it"),
     Column("object_x_mm", "mm", "x of the body's reference point, in the gripper's frame"),
     Column("object_y_mm", "mm", "y of the same"),
+    Column("object_angle_deg", "deg", "angle that the body has turned by, counterclockwise"),
     Column("tie", "", "units whose threshold is the same within 1e-6", kind=Kind.TEXT),
 )
 OF_FRICTION, OF_WEIGHT = "payload_N", "payload_margin"
@@ -163,7 +165,7 @@ def _released(known: Prospect, plan: Plan, parts: Parts, held: Grasps) -> Iterat
         yield Step(Stage.RELEASE, held, NO_PULSES)
     for count, pulse in enumerate(plan.release, start=1):
         parts, near = pulsed(task, parts, [[pulse]], known.reach)
-        found = kept(task, parts, held.centers)
+        found = kept(task, parts, held.centers, held.turned)
         rows = grasp_rows(found)
         word = str(status_words(rows)[0])
         is_held = word == WELL and count == len(plan.release) and rows["n_contacts"][0] > 0
@@ -197,6 +199,8 @@ def columns_of(task: Task) -> tuple[Column, ...]:
     left_out = {OF_FRICTION, OF_WEIGHT} if friction is None else set()
     if friction is not None and friction.weight is None:
         left_out.add(OF_WEIGHT)
+    if not turns(task.scene.body, task.scene.held):
+        left_out.add(ANGLE)
     return tuple(column for column in COLUMNS if column.name not in left_out)
 
 
@@ -227,6 +231,7 @@ def routine_rows(routine: Routine) -> Columns:
         "payload_N": payload,
         "payload_margin": payload / weight - 1.0 if weight else 0.0 * payload,
         **{name: of(name, float) for name in ("object_x_mm", "object_y_mm")},
+        ANGLE: np.degrees([float(np.reshape(step.found.turned, -1)[0]) for step in routine.steps]),
         "tie": np.array([step.tie for step in routine.steps], str),
     }
     return {column.name: rows[column.name] for column in columns_of(routine.task)}
@@ -241,7 +246,8 @@ def joined(routine: Routine) -> Grasps:
     )
     pairs = np.tile(np.arange(len(found)), (len(fingers), 1))
     centers = np.concatenate([own.centers for own in found], axis=1)
-    return replace(first, fingers=fingers, pairs=pairs, centers=centers)
+    turned = np.concatenate([np.reshape(own.turned, -1) for own in found])
+    return replace(first, fingers=fingers, pairs=pairs, centers=centers, turned=turned)
 
 
 def schedule(routine: Routine, ramp: float, move: float) -> History:

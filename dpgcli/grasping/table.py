@@ -15,7 +15,7 @@ from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing, event_text
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, blocks, placed, told
-from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by
+from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by, turned_by, turns
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.plates import SLIGHT
@@ -61,6 +61,7 @@ COLUMNS = (
     Column("overlaps", "", "whether the fingers overlap each other", kind=Kind.FLAG),
     Column("object_x_mm", "mm", "x of the body's reference point"),
     Column("object_y_mm", "mm", "y of the body's reference point"),
+    Column("object_angle_deg", "deg", "angle that the body has turned by, counterclockwise"),
     Column("jaw_gap_mm", "mm", "aperture of the jaws"),
     Column("penetration_mm", "mm", "largest depth of the body, or a finger, in a face"),
     Column("margin", "", "how much more of the load before a next unit resets", outputs=FORCES),
@@ -69,6 +70,7 @@ COLUMNS = (
 )
 JAW_GAP = "jaw_gap_mm"
 OF_BODIES = ("object_x_mm", "object_y_mm")
+ANGLE = "object_angle_deg"
 OF_CLOSING = ("events", "tie")
 OF_FRICTION = ("payload_N", "fails_first")
 OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
@@ -79,9 +81,9 @@ class Grasps:
     """Fingers against a body, by frame (upper and lower, or one), and the pairs of their states.
 
     `pairs` (finger, row) are lanes of the fingers' tables, `centers` (2, row) are where the body
-    is, and by so much jaws have `opened`, (row,), mm. `closing` is how they closed, if they did;
-    `borne` are columns of what friction bears, if there is any. Without a body fingers touch each
-    other.
+    is, and by so much it has `turned`, or jaws `opened`, (row,), rad or mm. `closing` is how they
+    closed, if they did; `borne` are columns of what friction bears, if there is any. Without a body
+    fingers touch each other.
     """
 
     scene: Scene
@@ -91,8 +93,16 @@ class Grasps:
     pairs: NDArray[np.int64]
     centers: Array
     opened: Array | float = 0.0
+    turned: Array | float = 0.0
     closing: Closing | None = None
     borne: Columns = field(default_factory=dict)
+
+    def take_rows(self, index: Indices) -> "Grasps":
+        """Some of the rows, of the same fingers."""
+        n_rows = self.pairs.shape[1]
+        opened, turned = (np.broadcast_to(v, n_rows)[index] for v in (self.opened, self.turned))
+        pairs, centers = self.pairs[:, index], self.centers[:, index]
+        return replace(self, pairs=pairs, centers=centers, opened=opened, turned=turned)
 
     def take(self, finger: int, row: int) -> tuple[Grasped, int]:
         """The finger of a row, and its lane."""
@@ -142,10 +152,11 @@ def grasps(
     found, moved, rest = let_go(parts, lanes, motion, scene.held, later)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
-    away = _rounded(moved_by(scene.held, moved), scene.finger.straight_length)
+    away = _rounded(moved_by(body, scene.held, moved), scene.finger.straight_length)
     centers = np.where(is_there, centers + away, np.nan)
     opened = np.where(is_there, opened_by(body, moved), np.nan)
-    known = Grasps(scene, body, seen_from, found, rows, centers, opened, closing)
+    turned = np.where(is_there, _rounded(turned_by(body, scene.held, moved), 1.0), np.nan)
+    known = Grasps(scene, body, seen_from, found, rows, centers, opened, turned, closing)
     return _with_payload(known, parts, lanes, rest)
 
 
@@ -175,6 +186,8 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
         left_out.add(JAW_GAP)
     if scene.body is None:
         left_out.update(OF_BODIES)
+    if not turns(scene.body, scene.held):
+        left_out.add(ANGLE)
     if closing is None:
         left_out.update(OF_CLOSING)
     if scene.friction is None:
@@ -185,13 +198,9 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
 def grasp_rows(found: Grasps) -> Columns:
     """Rows by column, (row,). What is not known of states that are not stable is NaN."""
     happened = [_happened(finger, found.closing) for finger in found.fingers]
-    n_rows = found.pairs.shape[1]
-    parts = []
-    for some in blocks(n_rows, found.scene.finger.n_units):
-        opened = np.broadcast_to(found.opened, n_rows)[some]
-        few = replace(found, pairs=found.pairs[:, some], centers=found.centers[:, some])
-        few = replace(few, opened=opened)
-        parts.append(_rows(few, happened))
+    rows_of = blocks(found.pairs.shape[1], found.scene.finger.n_units)
+    few = (found.take_rows(np.arange(some.start, some.stop)) for some in rows_of)
+    parts = [_rows(own, happened) for own in few]
     rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     rows |= found.borne
     return {column.name: rows[column.name] for column in columns_of(found.scene, found.closing)}
@@ -230,6 +239,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
         "max_contact_N": known(most),
         "object_x_mm": found.centers[0],
         "object_y_mm": found.centers[1],
+        ANGLE: np.degrees(found.turned) + np.zeros(len(status)),
         "penetration_mm": known(np.max([np.maximum(0.0, -o["gap"]) for o in of_fingers], axis=0)),
         "margin": known(np.min([own["margin"] for own in of_fingers], axis=0)),
         "residual_N": known(np.max([own["residual"] for own in of_fingers], axis=0)),

@@ -9,7 +9,9 @@ Between fingers their ends count as well: `with_end` adds the side along the las
 the dome axis, as long as the strut is at rest.
 
 A body that moves by q along D moves the finger by −q D as the body sees it: such coordinates are
-rows before all others, each like a chord's extension at the base.
+rows before all others, each like a chord's extension at the base. One that turns about a point C
+turns the finger about C the other way: a row before these, like a corner's at C, but that it is the
+way r of a point of the body, by the angle r/R.
 
 A corner turns all that lies beyond it by −1 about its station P, so that ∂F/∂θ = R (F − P) with
 R (x, y) = (y, −x); a chord's extension moves all beyond along its direction u. Of coordinates p
@@ -23,24 +25,42 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.arrays import Array, Flags, Indices, rotated, total
 from dpgcli.equilibrium.contracts import take_lanes
 from dpgcli.mechanics.chain_geometry import internal, pose_of
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.records import dataclass
 
 
+class Pivot(NamedTuple):
+    """A point C that a body turns about, (2, 1 or batch), and R, (1 or batch,): angles are r/R.
+
+    In the finger's frame, in mm; R is negative where angles are those of a mirrored frame.
+    """
+
+    point: Array
+    radius: Array
+
+    def take_lanes(self, index: Indices) -> "Pivot":
+        """That of some lanes."""
+        return Pivot(*(take_lanes(part, index) for part in self))
+
+
 class FaceShape(NamedTuple):
     """Nodes F_0 … F_n of a face, mm, (2, node, batch), and how they move.
 
     By row, coordinates in their order along the chain: the first node that one moves, whether it is
-    a corner, and P of a corner or u of a chord, (2, row, batch).
+    a corner, and P of a corner or u of a chord, (2, row, batch). A body that sees them has turned
+    by an `angle`, (batch,), if it may: the first row, of which a mm is so much, `rate` (1 or
+    batch,).
     """
 
     nodes: Array
     first: Indices
     is_corner: Flags
     origin: Array
+    angle: Array | None = None
+    rate: Array | None = None
 
     def pulled(self, forces: Array) -> Array:
         """Σ f · ∂F over nodes, (row, cell, batch), for forces f (2, node, cell, batch)."""
@@ -51,7 +71,10 @@ class FaceShape(NamedTuple):
         at_x, at_y = self.origin[:, :, None]
         by_corner: Array = moment - (from_x * at_y - from_y * at_x)
         along = from_x * at_x + from_y * at_y
-        return np.where(self.is_corner[:, None, None], by_corner, along)
+        result = np.where(self.is_corner[:, None, None], by_corner, along)
+        if self.rate is not None:
+            result[0] *= self.rate
+        return result
 
     def bent(self, forces: Array) -> Array:
         """Σ f · ∂²F over nodes, (row, row, batch), for forces f (2, node, batch)."""
@@ -62,7 +85,18 @@ class FaceShape(NamedTuple):
         earlier, later = _pairs(len(self.first))
         result = by_later[later]
         result[~self.is_corner[earlier]] = 0.0
+        if self.rate is not None:
+            result[0] *= self.rate
+            result[1:, 0] *= self.rate
         return result
+
+    def turned(self, ways: Array) -> Array:
+        """Directions that the body sees, (2, …, batch), as they are in the finger's frame."""
+        return ways if self.angle is None else rotated(ways, self.angle)
+
+    def seen(self, ways: Array) -> Array:
+        """Directions of the finger's frame, (2, …, 1 or batch), as the body sees them."""
+        return ways if self.angle is None else rotated(ways, -self.angle)
 
 
 def _summed_from_behind(values: Array) -> Array:
@@ -83,8 +117,9 @@ class Face:
 
     `places` are the rows of a body's motions, if it has any, and of e, a and b of each unit among
     all coordinates (a, e, b in the order of the chain; rigid bars have no e). A body moves along
-    `directions`, (2, motion, 1 or batch), in the finger's frame. `has_end` says whether the last
-    strut, of the `height` H at rest, is a side.
+    `directions`, (2, motion, 1 or batch), in the finger's frame, and turns about a `pivot`, if it
+    does: the first of the rows. `has_end` says whether the last strut, of the `height` H at rest,
+    is a side.
     """
 
     length: Array
@@ -94,6 +129,7 @@ class Face:
     is_rigid: bool
     places: Indices
     directions: Array = field(default_factory=lambda: np.zeros((2, 0, 1)))
+    pivot: Pivot | None = None
     has_end: bool = False
 
     @classmethod
@@ -123,23 +159,31 @@ class Face:
         """One for each phalanx, and the end."""
         return self.n_units + self.has_end
 
-    def seen_from(self, directions: Array, places: Indices) -> Self:
-        """As a body sees it that moves along `directions` by the coordinates at `places`."""
-        return replace(self, directions=directions, places=np.append(places, self.places))
+    def seen_from(self, directions: Array, places: Indices, pivot: Pivot | None = None) -> Self:
+        """As a body sees it that moves along `directions` by the coordinates at `places`.
+
+        With a pivot it turns, by the first of them.
+        """
+        places = np.append(places, self.places)
+        return replace(self, directions=directions, pivot=pivot, places=places)
+
+    @property
+    def _n_motions(self) -> int:
+        return int(self.directions.shape[1]) + (self.pivot is not None)
 
     @cached_property
     def _moves(self) -> tuple[Indices, Flags]:
         """The first node that each row moves, and whether the row is a corner."""
         kinds = [True, True] if self.is_rigid else [True, False, True]
-        n_motions = self.directions.shape[1]
         first = np.repeat(np.arange(1, self.n_units + 1), len(kinds))
         is_corner = np.tile(np.array(kinds), self.n_units)
-        base = np.zeros(n_motions, np.int64)
-        return np.append(base, first), np.append(base > 0, is_corner)
+        base = np.zeros(self._n_motions, np.int64)
+        is_turn = np.arange(len(base)) < self._n_motions - self.directions.shape[1]
+        return np.append(base, first), np.append(is_turn, is_corner)
 
     def shape(self, coordinates: Array) -> FaceShape:
         """The face at coordinates, (size, batch)."""
-        n, n_motions = self.n_units, self.directions.shape[1]
+        n, n_motions = self.n_units, self._n_motions
         rows = coordinates[self.places[n_motions:]].reshape(n, -1, coordinates.shape[1])
         zero = np.zeros((n, coordinates.shape[1]))
         near, far = rows[:, 0], rows[:, -1]
@@ -147,8 +191,9 @@ class Face:
         pose = pose_of(internal(_as_chain(chord, near, far), is_rigid=False), self.length)
         base = np.zeros((2, 1, coordinates.shape[1]))
         stations = np.concatenate((base, np.stack((pose.x, pose.y))), axis=1)
-        if n_motions:
-            moved = self.directions * coordinates[self.places[:n_motions]]
+        ways = self.directions
+        if ways.shape[1]:
+            moved = ways * coordinates[self.places[n_motions - ways.shape[1] : n_motions]]
             stations = stations - total(np.moveaxis(moved, 1, 0))[:, None]
         angle = np.concatenate((base[0], pose.strut_angle))
         inwards = np.stack((np.sin(angle), -np.cos(angle)))
@@ -156,20 +201,38 @@ class Face:
         if not self.is_rigid:
             pivots.insert(1, np.stack((pose.chord_cos, pose.chord_sin)))
         origin = np.stack(pivots, axis=2).reshape(2, -1, coordinates.shape[1])
-        if n_motions:
-            away = np.broadcast_to(-self.directions, (2, n_motions, coordinates.shape[1]))
+        if ways.shape[1]:
+            away = np.broadcast_to(-ways, (*ways.shape[:2], coordinates.shape[1]))
             origin = np.concatenate((away, origin), axis=1)
         nodes = stations + self.half_thickness * inwards
         if self.has_end:
             top = stations[:, -1:] - self.height[-1:] * inwards[:, -1:]
             nodes = np.concatenate((nodes, top), axis=1)
-        return FaceShape(nodes, *self._moves, origin)
+        shape = FaceShape(nodes, *self._moves, origin)
+        return shape if self.pivot is None else self._turned(shape, coordinates[self.places[0]])
+
+    def _turned(self, shape: FaceShape, way: Array) -> FaceShape:
+        """The face as a body sees it that a point has gone so far in, (batch,) mm, by turning."""
+        assert self.pivot is not None, "a body that turns"
+        angle, center = way / self.pivot.radius, self.pivot.point[:, None]
+        is_point = shape.is_corner[1:, None]
+        from_center = np.where(is_point, shape.origin - center, shape.origin)
+        seen = rotated(from_center, -angle)
+        origin = np.where(is_point, seen + center, seen)
+        own = np.broadcast_to(center, (2, 1, len(way)))
+        return shape._replace(
+            nodes=center + rotated(shape.nodes - center, -angle),
+            origin=np.concatenate((own, origin), axis=1),
+            angle=angle,
+            rate=1.0 / self.pivot.radius,
+        )
 
     def take_lanes(self, index: Indices) -> Self:
         """The faces of some lanes of the batch."""
         parts = (self.length, self.half_thickness, self.height, self.directions)
         length, half, height, along = (take_lanes(part, index) for part in parts)
-        return replace(self, length=length, half_thickness=half, height=height, directions=along)
+        own = replace(self, length=length, half_thickness=half, height=height, directions=along)
+        return replace(own, pivot=self.pivot and self.pivot.take_lanes(index))
 
 
 def _as_chain(chord: Array, near: Array, far: Array) -> Array:

@@ -151,7 +151,10 @@ class FaceGaps:
         return np.where(plates.is_over.reshape(-1, batch), number, at_end)
 
     def touches(self, coordinates: Array) -> Touches:
-        """Where the body is touched in each cell that is at its own place, and which way."""
+        """Where the body is touched in each cell that is at its own place, and which way.
+
+        In the finger's frame, of the body as it has turned, but where it was before it moved.
+        """
         shape, body = self.face.shape(coordinates), self.obstacle
         near = nearest(shape, body.points)
         of_points = body.points[:, :, None] - body.radii[:, None] * near.normal
@@ -163,7 +166,11 @@ class FaceGaps:
             for parts, values in ((places, nodes), (ways, -normal)):
                 whole = np.broadcast_to(values, shape_of_all)
                 parts.append(whole.reshape(2, -1, whole.shape[-1]))
-        return Touches(np.concatenate(places, axis=1), np.concatenate(ways, axis=1))
+        place, way = (np.concatenate(parts, axis=1) for parts in (places, ways))
+        if self.face.pivot is not None:
+            center = self.face.pivot.point[:, None]
+            place = center + shape.turned(place - center)
+        return Touches(place, shape.turned(way))
 
     def are_slipping(self, coordinates: Array, bound: Array) -> Flags:
         """Whether the finger's end slips over a body that it touches at a bound, (batch,).

@@ -50,7 +50,7 @@ def plate_gaps(shape: FaceShape, body: Obstacle) -> PlateGaps:
     is_over = is_beside & (distance >= -SLIGHT)
     is_on = (is_over & (distance <= SLIGHT)).any(axis=0)
     is_inside = _is_inside(shape.nodes, start, end) & ~is_on
-    nearest = _nearest_facing(share, distance, length, normal)
+    nearest = _nearest_facing(share, distance, length, shape.turned(normal))
     is_over = np.where(is_inside, nearest, is_over)
     first, last = body.plates[:, 0, None, None], body.plates[:, 1, None, None]
     return PlateGaps(distance, is_over, np.where(share < 0.5, first, last), normal)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dpgcli.arrays import Array, Columns
-from dpgcli.design.bodies import Body, Jaws
+from dpgcli.design.bodies import Body, Jaws, at_place
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped
 from dpgcli.grasping.table import Grasps
@@ -98,19 +98,18 @@ def _draw_ghost(axes: Any, around: Points, away: Array) -> None:
     axes.plot(way.real, way.imag, color=EDGE, lw=0.7, ls=":", zorder=0.5)
 
 
-def _moved(found: Grasps, row: int) -> Array:
-    """By how much the body has moved, (2,); not at all, if there is no answer, or no body."""
-    if found.body is None:
-        return np.zeros(2)
-    moved = found.centers[:, row] - found.body.center
-    return np.asarray(np.where(np.isnan(moved), 0.0, moved))
+def _at_rest(found: Grasps, row: int) -> Body | None:
+    """The body where it has come to rest; where it was, if there is no answer."""
+    body, center = found.body, found.centers[:, row]
+    if body is None or np.isnan(center).any():
+        return body
+    return at_place(body, center, float(np.broadcast_to(found.turned, found.pairs.shape[1])[row]))
 
 
 def _body(found: Grasps, row: int) -> Points:
     """Points around the body; none without one."""
-    if found.body is None:
-        return np.zeros(0, complex)
-    return np.asarray(around_body(found.body) + complex(*_moved(found, row)))
+    body = _at_rest(found, row)
+    return np.zeros(0, complex) if body is None else around_body(body)
 
 
 def _draw_body(axes: Any, body: Body, around: Points) -> None:
@@ -160,11 +159,13 @@ def _complex(points: Array) -> Points:
 
 def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
     """Arrows from the places of contact into the body; `scale` in mm per N."""
+    body, there = found.body, _at_rest(found, row)
+    moved = np.zeros(2) if body is None or there is None else there.middle - body.middle
     for place, frame in enumerate(found.frames):
         own, lane = found.take(place, row)
         for cell in np.flatnonzero(own.push[:, lane] > 0.0):
             way = frame.outside(own.touches.directions[:, cell, lane])
-            start = frame.placed(own.touches.places[:, cell, lane]) + _moved(found, row)
+            start = frame.placed(own.touches.places[:, cell, lane]) + moved
             end = start + scale * own.push[cell, lane] * way
             arrow = {"arrowstyle": "-|>", "color": MEASURE, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
             arrow["mutation_scale"] = SHORTEST * 2.0

@@ -40,10 +40,12 @@ def body_columns(base: Design) -> dict[str, Column]:
     """Those of states with the base's body in their way, by name; none without one."""
     if base.body is None:
         return {}
+    from dpgcli.grasping.release import turns
     from dpgcli.sweeps.grasps import grasp_columns
 
-    has_friction = base.friction is not None
-    every = grasp_columns(is_pair=bool(base.gripper), has_friction=has_friction)
+    has_friction, may_turn = base.friction is not None, turns(base.body, base.held)
+    is_pair = bool(base.gripper)
+    every = grasp_columns(is_pair=is_pair, has_friction=has_friction, may_turn=may_turn)
     return {column.name: column for column in every if column.kind in NUMBERS}
 
 

@@ -77,10 +77,15 @@ class DesignEvaluation:
         """The columns of states about the body, none without one."""
         if self.base.body is None:
             return ()
+        from dpgcli.grasping.release import turns
         from dpgcli.sweeps.grasps import grasp_columns
 
-        has_friction = self.base.friction is not None
-        return grasp_columns(is_pair=bool(self.base.gripper), has_friction=has_friction)
+        has_friction, may_turn = (
+            self.base.friction is not None,
+            turns(self.base.body, self.base.held),
+        )
+        is_pair = bool(self.base.gripper)
+        return grasp_columns(is_pair=is_pair, has_friction=has_friction, may_turn=may_turn)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

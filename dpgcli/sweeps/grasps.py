@@ -14,8 +14,8 @@ from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, met
-from dpgcli.grasping.release import let_go, motion_of, moved_by
-from dpgcli.grasping.table import COLUMNS, OF_FRICTION, OF_PAIRS
+from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by, turns
+from dpgcli.grasping.table import ANGLE, COLUMNS, OF_FRICTION, OF_PAIRS
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
@@ -24,11 +24,13 @@ from dpgcli.states.units import UnitSolutions
 
 NAMES = (
     *("pattern_after", "n_contacts", "finger_force_x_N", "finger_force_y_N", "squeeze_N"),
-    *("max_contact_N", "object_x_mm", "object_y_mm", "penetration_mm"),
+    *("max_contact_N", "object_x_mm", "object_y_mm", ANGLE, "penetration_mm"),
 )
 
 
-def grasp_columns(*, is_pair: bool, has_friction: bool = False) -> tuple[Column, ...]:
+def grasp_columns(
+    *, is_pair: bool, has_friction: bool = False, may_turn: bool = False
+) -> tuple[Column, ...]:
     """The columns of states about a body: those of `dpg grasp`, and what became of the grasp.
 
     >>> [column.name for column in grasp_columns(is_pair=False)][:3]
@@ -36,7 +38,8 @@ def grasp_columns(*, is_pair: bool, has_friction: bool = False) -> tuple[Column,
     """
     known = {column.name: column for column in COLUMNS}
     names = (*NAMES, *(OF_FRICTION if has_friction else ()))
-    told = [known[name] for name in names if is_pair or name not in OF_PAIRS]
+    left_out = {*(() if is_pair else OF_PAIRS), *(() if may_turn else (ANGLE,))}
+    told = [known[name] for name in names if name not in left_out]
     return (
         Column("grasp_status", "", "status with the body there", Group.GRASP, Kind.STATUS),
         *(
@@ -74,15 +77,16 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
             part, lower = _lower(own, frame, codes, parts[0], fingers[0])
             parts.append(part)
             fingers.append(lower)
-        moved = np.zeros((2, len(codes)))
+        moved, turned = np.zeros((2, len(codes))), np.zeros(len(codes))
     else:
         parts += [_met(own, frame, codes) for frame in seen_from[1:]]
         index = [every] * len(parts)
         found, by, rest = let_go(parts, index, motion, own.held, with_margins=False)
         fingers = [_Finger.of(finger) for finger in found]
         is_held = fingers[0].status == Status.STABLE
-        moved = np.where(is_held, moved_by(own.held, by) + 0.0, np.nan)
-    rows = _rows(own, seen_from, fingers, moved)
+        moved = np.where(is_held, moved_by(own.body, own.held, by) + 0.0, np.nan)
+        turned = np.where(is_held, turned_by(own.body, own.held, by) + 0.0, np.nan)
+    rows = _rows(own, seen_from, fingers, moved, turned)
     if own.friction is None:
         return rows
     from dpgcli.grasping.pull import Pulled, borne
@@ -156,6 +160,7 @@ def _rows(
     seen_from: Sequence[FingerFrame],
     fingers: Sequence[_Finger],
     moved: Array,
+    turned: Array,
 ) -> Columns:
     status = np.max([finger.status for finger in fingers], axis=0)
     is_there = status == Status.STABLE
@@ -176,9 +181,12 @@ def _rows(
         "max_contact_N": known(np.max([finger.largest for finger in fingers], axis=0)),
         "object_x_mm": place[0],
         "object_y_mm": place[1],
+        ANGLE: np.degrees(turned),
         "penetration_mm": known(np.max([np.maximum(0.0, -f.gap) for f in fingers], axis=0)),
     }
-    return {column.name: rows[column.name] for column in grasp_columns(is_pair=len(fingers) > 1)}
+    may_turn = turns(own.body, own.held)
+    columns = grasp_columns(is_pair=len(fingers) > 1, may_turn=may_turn)
+    return {column.name: rows[column.name] for column in columns}
 
 
 def _after(fingers: Sequence[_Finger], n_units: int) -> NDArray[np.bytes_]:

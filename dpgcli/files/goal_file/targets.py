@@ -86,7 +86,8 @@ class TargetReader:
 
         with_gripper = replace(self.base, gripper={"base_spacing_mm": np.ones(1)})
         with_pressure = replace(self.base, pressure=self.base.pressure or GivenPressure())
-        of_body = {c.name for c in grasp_columns(is_pair=True, has_friction=True)}
+        every = grasp_columns(is_pair=True, has_friction=True, may_turn=True)
+        of_body = {column.name for column in every}
         of_body |= {metric.name for metric in METRICS if metric.group is Group.GRASP}
         if quantity in of_body:
             return "the base has no object" if self.base.body is None else "its object has it not"
