@@ -354,6 +354,8 @@ def _fallen(own: Obstructed, begun: ContactShapes, ends: Ends, load: Array) -> C
     """Where those come to rest, at loads (batch,), that have lost their balance."""
     is_fold = ends.outcome == PathEnd.FOLD
     further = np.where(is_fold, DISPLACED * ends.onward, 0.0)
+    if own.motion is not None and own.motion.pivots:  # on edge: to which side no model says
+        further[own.n_own] = np.where(is_fold, further[own.n_own], DISPLACED * own.large[0])
     there = relaxed(own, begun.coordinates + further, begun.inverted, begun.push, load)
     lost = np.flatnonzero(~there.is_there & ~own.are_slipping(there.coordinates, load))
     if len(lost):  # pushes of contacts that the fall has left lead nowhere
