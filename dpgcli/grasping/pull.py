@@ -3,7 +3,7 @@
 The pull that friction bears is that of `payload`. On the way there a unit may reset. Fingers are
 followed: each sticks to the body at the place that it presses hardest, and its other places slide.
 What held the body lets go first, and friction takes over; then the pull grows. The body moves with
-its fingers as they give way, and does not turn.
+its fingers as they give way, and turns if it is one that does when it is free.
 """
 
 from collections.abc import Sequence

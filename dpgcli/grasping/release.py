@@ -3,6 +3,10 @@
 The body has grown about the fingers while it was kept in its place. What keeps it is a force on
 each of its motions; as that goes to nothing the body and its fingers move on, and units reset as
 they must. A body that no finger keeps from moving on leaves them: there is no rest.
+
+Polygons that are free turn, about the center of their area. Most of them are on edge before a
+second place of a finger supports them, and mere forces would not keep them: of these bodies springs
+do so too, and go to nothing as the forces do.
 """
 
 from collections.abc import Iterator, Sequence

@@ -49,7 +49,8 @@ class Motion:
     `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger; with
     `pivots` in these frames it turns, too, by a q before all others. `resistance` is the law of the
     last q, if any. `hold` (motion, batch) N keeps it where it is at a load of 0, and lets go of it
-    until 1, with a `spring` (1, 1 or batch) N/mm on each q, if any. With a `travel` D (motion, batch), mm, it does not move by itself: q is (λ − 1) D.
+    until 1; so does a `spring` (1, 1 or batch) N/mm on each q, if there is one. With a `travel` D
+    (motion, batch), mm, it does not move by itself: q is (λ − 1) D.
     """
 
     directions: tuple[Array, ...]

@@ -2,21 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
+import shapely
 from scipy.optimize import brentq, minimize
 
 from dpgcli.arrays import Array, rotated
 from dpgcli.design.bodies import Body, Disc, Friction, Jaws, Polygon, at_place
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp, release, table
+from dpgcli.grasping.clearance import clearance
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.grasp import described, placed
 from dpgcli.grasping.release import motion_of, moved_by, released, together, turned_by
 from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.grasping.stages import Task, beside, kept, lifted, way
 from dpgcli.grasping.table import Grasps, grasp_rows, grasps
 from dpgcli.mechanics.chain import Chain
 from dpgcli.mechanics.face import Face, Pivot
@@ -24,10 +28,13 @@ from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FAR, FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.reports import grasp as drawing
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
+from dpgcli.sweeps.grasps import Encounter
+from dpgcli.sweeps.grasps import grasp_rows as grasp_rows_of_designs
 
 Fingers = Callable[..., Finger]
 LAYER, ROUNDING = 1.5, 1e-9  # mm
@@ -542,3 +549,79 @@ def test_payloads_of_a_body_that_has_turned(reference_finger: Fingers) -> None:
     assert straight["payload_N"][0] > 0.01
     assert turned["payload_N"] == pytest.approx(straight["payload_N"], rel=1e-6)
     assert turned["fails_first"].tolist() == straight["fails_first"].tolist()
+
+
+def test_many_designs_as_each_by_itself(reference_finger: Fingers) -> None:
+    """Sweeps have the column, and only where a body may turn."""
+    scene = gripper_of(reference_finger(3))
+    body = spool(scene, "010/010").turned(0.03)
+    column = np.array([0.0, 0.2])
+    many = body.with_value("at_y_mm", column).take_lanes(np.arange(2))
+    gripper = Gripper(np.full(2, 50.0), np.zeros(2))
+    both, layer = np.repeat(codes("010"), 2), np.full(2, LAYER)
+    own = Encounter(UnitSolutions.of(scene.finger), layer, gripper, many, Held.FREE)
+    rows = grasp_rows_of_designs(own, both)
+    for place, y in enumerate(column):
+        one = replace(body, center=np.array([body.center[0], y]))
+        alone = grasp_rows(grasped(scene, one, "010/010"))
+        for name in ("object_angle_deg", "object_x_mm", "object_y_mm", "squeeze_N"):
+            assert rows[name][place] == pytest.approx(alone[name][0], abs=1e-9)
+    assert rows["object_angle_deg"] == pytest.approx(-np.degrees([0.03, 0.03]), abs=1e-9)
+    assert "object_angle_deg" not in grasp_rows_of_designs(own._replace(held=Held.GUIDED), both)
+
+
+def test_routines_go_on_about_the_body_as_it_has_turned(reference_finger: Fingers) -> None:
+    """Each finger by itself, with the body kept where it rests, is in balance there."""
+    scene = gripper_of(reference_finger(3))
+    body = spool(scene, "010/010")
+    body = replace(body, center=body.center + np.array([0.1, 0.2])).turned(0.03)
+    task = Task(replace(scene, body=body, held=Held.FREE), cast("Any", None), body.center)
+    held, after = lifted(task, beside(task, codes("010")))
+    assert held.turned == pytest.approx([-0.03], abs=1e-9)
+    before = grasp_rows(held)
+    kept_rows = grasp_rows(kept(task, after, held.centers, held.turned))
+    assert before["status"].tolist() == kept_rows["status"].tolist() == [Status.STABLE]
+    for name in ("squeeze_N", "finger_force_x_N", "n_contacts"):
+        assert kept_rows[name] == pytest.approx(before[name], abs=1e-9)
+    assert kept_rows["penetration_mm"].max() < ROUNDING
+    other = at_place(body, body.center, float(held.turned[0]))
+    begin, end = np.array([[70.0], [0.0]]), held.centers
+    around = np.array([[shapely.box(0.0, 20.0, 60.0, 30.0)]])
+    (turned, known) = (
+        clearance(around, own, begin, end)
+        for own in (at_place(body, body.center, held.turned), other)
+    )
+    assert turned.gap == pytest.approx(known.gap, abs=1e-12)
+    assert way(task, held, begin, end).gap.shape == (1,)
+
+
+def test_centers_of_area() -> None:
+    """By shapely, of bodies by design as well."""
+    random = np.random.default_rng(7)
+    turn = np.sort(random.uniform(0.0, 2.0 * np.pi, 7))
+    around = np.array([[40.0], [-3.0]]) + 9.0 * np.array([np.cos(turn), 0.5 * np.sin(turn)])
+    body, angle = Polygon(np.array([5.0, 6.0]), around), np.array([0.0, 0.4, 2.5])
+    many = at_place(body, np.array([[5.0, 7.0, 9.0], [6.0, 6.0, 1.0]]), angle)
+    radius = []
+    for place in range(3):
+        area = shapely.Polygon(many.corners[..., place].T)
+        middle = shapely.get_coordinates(shapely.centroid(area))[0]
+        assert many.middle[:, place] == pytest.approx(middle, abs=1e-12)
+        radius.append(np.hypot(*(many.corners[..., place] - middle[:, None])).max())
+    assert radius == pytest.approx([body.outer_radius] * 3, abs=1e-12)
+    assert many.inner_radius == pytest.approx(body.inner_radius, rel=1e-6)
+
+
+def test_figures_show_bodies_as_they_have_turned(
+    reference_finger: Fingers, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    scene = gripper_of(reference_finger(3))
+    body = spool(scene, "010/010").turned(0.03)
+    found, drawn = grasped(scene, body, "010/010"), list[Array]()
+    monkeypatch.setattr(drawing, "_draw_body", lambda axes, body, around: drawn.append(around))
+    drawing.draw_grasps(found, grasp_rows(found), tmp_path / "spool.svg")
+    x, y = spool(scene, "010/010").corners
+    (around,) = drawn
+    away = around - (x + 1j * y)
+    assert away.imag == pytest.approx(np.zeros(6), abs=1e-9), "it stands across"
+    assert np.ptp(away.real) == pytest.approx(0.0, abs=1e-9)
