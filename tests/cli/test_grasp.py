@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.grasping.table import COLUMNS, JAW_GAP, OF_CLOSING, OF_FRICTION, OF_PAIRS
+from dpgcli.grasping.table import ANGLE, COLUMNS, JAW_GAP, OF_CLOSING, OF_FRICTION, OF_PAIRS
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-LEFT_OUT = (JAW_GAP, *OF_CLOSING, *OF_FRICTION)
+LEFT_OUT = (ANGLE, JAW_GAP, *OF_CLOSING, *OF_FRICTION)
 NAMES = [column.name for column in COLUMNS if column.name not in LEFT_OUT]  # of a disc, placed
 DISC = ("--object", "disc:40", "--at", "40,0")
 RIGID = ("--set", "finger.linear_stiffness_N_per_mm=.inf")

@@ -8,10 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.grasping.table import COLUMNS, JAW_GAP, OF_BODIES, OF_CLOSING, OF_FRICTION
+from dpgcli.grasping.table import ANGLE, COLUMNS, JAW_GAP, OF_BODIES, OF_CLOSING, OF_FRICTION
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-LEFT_OUT = (JAW_GAP, *OF_BODIES, *OF_CLOSING, *OF_FRICTION)
+LEFT_OUT = (ANGLE, JAW_GAP, *OF_BODIES, *OF_CLOSING, *OF_FRICTION)
 NAMES = [column.name for column in COLUMNS if column.name not in LEFT_OUT]
 
 

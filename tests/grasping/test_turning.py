@@ -253,8 +253,8 @@ def test_a_body_given_askew_comes_to_stand_across(reference_finger: Fingers) -> 
 
 
 PATTERNS = {2: ("10",), 3: ("010", "100", "001", "110")}
-QUICK = (0, 12)
-MANY = (*QUICK, 1, 3, 4, 6, 9, 13, 14, 15, 17, 18, 19, 22, 23, 24, 26, 27, 28)
+QUICK = (12,)
+MANY = (*QUICK, 0, 1, 3, 4, 6, 9, 13, 14, 15, 17, 18, 19, 22, 23, 24, 26, 27, 28)
 SEEDS = [pytest.param(s, marks=[] if s in QUICK else pytest.mark.slow) for s in MANY]
 
 
@@ -442,17 +442,17 @@ def test_a_polygon_given_turned_comes_to_the_same_rest(reference_finger: Fingers
     moved = Polygon(straight.center + arm, straight.around - arm[:, None])
     end = np.degrees(float(np.reshape(first.turned, -1)[0]))
     middle = at_place(straight, first.centers[:, 0], np.radians(end)).middle
-    for angle in (-0.03, 0.02):
-        about = straight.middle - moved.center
-        center = moved.center + about - rotated(about[:, None], np.array([angle]))[:, 0]
-        other = grasped(scene, replace(moved, center=center).turned(angle), pair)
-        own = grasp_rows(other)
-        assert own["object_angle_deg"] + np.degrees(angle) == pytest.approx([end], abs=1e-8)
-        for name in ("squeeze_N", "finger_force_x_N", "max_contact_N", "aperture_mm"):
-            assert own[name] == pytest.approx(rows[name], rel=1e-8)
-        assert other.body is not None
-        there = at_place(other.body, other.centers[:, 0], float(np.reshape(other.turned, -1)[0]))
-        assert there.middle == pytest.approx(middle, abs=1e-8)
+    angle = -0.03
+    about = straight.middle - moved.center
+    center = moved.center + about - rotated(about[:, None], np.array([angle]))[:, 0]
+    other = grasped(scene, replace(moved, center=center).turned(angle), pair)
+    own = grasp_rows(other)
+    assert own["object_angle_deg"] + np.degrees(angle) == pytest.approx([end], abs=1e-8)
+    for name in ("squeeze_N", "finger_force_x_N", "max_contact_N", "aperture_mm"):
+        assert own[name] == pytest.approx(rows[name], rel=1e-8)
+    assert other.body is not None
+    there = at_place(other.body, other.centers[:, 0], float(np.reshape(other.turned, -1)[0]))
+    assert there.middle == pytest.approx(middle, abs=1e-8)
 
 
 def without_turning(patch: pytest.MonkeyPatch) -> None:
@@ -485,7 +485,7 @@ class OnEdge:
         self.scene, self.patch = gripper_of(finger), patch
         self.upper, (_, lowest) = ends_of(self.scene, "010/000")
         self.lowest = lowest
-        along = brentq(lambda x: float(moments(self.still(x))[1]), -6.0, -4.0, xtol=1e-13)
+        along = brentq(lambda x: float(moments(self.still(x))[1]), -4.6, -4.4, xtol=1e-13)
         self.body = self.with_edge(along)
 
     def with_edge(self, along: float) -> Polygon:
@@ -538,6 +538,7 @@ def test_a_body_on_edge_is_not_stable(
     assert np.isnan(told["object_angle_deg"]).all() and np.isnan(told["squeeze_N"]).all()
 
 
+@pytest.mark.slow
 def test_payloads_of_a_body_that_has_turned(reference_finger: Fingers) -> None:
     """Those of the same body given as it rests."""
     scene = gripper_of(reference_finger(3))
@@ -551,6 +552,7 @@ def test_payloads_of_a_body_that_has_turned(reference_finger: Fingers) -> None:
     assert turned["fails_first"].tolist() == straight["fails_first"].tolist()
 
 
+@pytest.mark.slow
 def test_many_designs_as_each_by_itself(reference_finger: Fingers) -> None:
     """Sweeps have the column, and only where a body may turn."""
     scene = gripper_of(reference_finger(3))
