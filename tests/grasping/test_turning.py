@@ -14,6 +14,7 @@ from dpgcli.arrays import Array, rotated
 from dpgcli.design.bodies import Body, Disc, Friction, Jaws, Polygon, at_place
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp, release, table
+from dpgcli.grasping.approach import approach
 from dpgcli.grasping.clearance import clearance
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
@@ -27,6 +28,7 @@ from dpgcli.mechanics.face import Face, Pivot
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.gaps import FAR, FaceGaps
 from dpgcli.mechanics.obstacle import Obstacle
+from dpgcli.mechanics.sticking import Sticking
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.reports import grasp as drawing
 from dpgcli.states.certify import Status
@@ -135,7 +137,9 @@ def turning_gaps(
     return FaceGaps(face, Obstacle.polygon(around)), chain.size
 
 
-def drawn_gaps(seed: int, bars: float, graded_finger: Fingers) -> tuple[FaceGaps, Array]:
+def drawn_gaps(
+    seed: int, bars: float, graded_finger: Fingers, bent: float = 0.05
+) -> tuple[FaceGaps, Array]:
     """Such a polygon below a bent finger, turned and moved."""
     random = np.random.default_rng(seed)
     turn = np.sort(random.uniform(0.0, 2.0 * np.pi, 5))
@@ -144,7 +148,7 @@ def drawn_gaps(seed: int, bars: float, graded_finger: Fingers) -> tuple[FaceGaps
     )
     finger = graded_finger(3, seed, linear_stiffness=bars)
     gaps, n = turning_gaps(finger, around, sign=random.choice([1.0, -1.0]))
-    at = random.normal(0.0, 0.05, (n + 3, 40))
+    at = random.normal(0.0, bent, (n + 3, 40))
     at[n] = random.uniform(-30.0, 30.0, 40)  # mm at 11 mm: up to 156°
     return gaps, at
 
@@ -195,7 +199,7 @@ def test_derivatives_of_gaps(seed: int, bars: float, graded_finger: Fingers) -> 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_body_that_turns_is_one_that_is_placed_so(seed: int, graded_finger: Fingers) -> None:
     """Gaps, where it is touched, and which way it is pushed: of a finger bent into it as well."""
-    gaps, at = drawn_gaps(seed, np.inf, graded_finger)
+    gaps, at = drawn_gaps(seed, np.inf, graded_finger, bent=0.25)
     n, pivot = len(at) - 3, gaps.face.pivot
     assert pivot is not None
     at[n + 1 :] = 0.0
@@ -212,6 +216,22 @@ def test_a_body_that_turns_is_one_that_is_placed_so(seed: int, graded_finger: Fi
     for mine, told in zip(gaps.touches(at), still.touches(at), strict=True):
         assert mine == pytest.approx(told, abs=1e-12)
     assert one.gradient[3:] == pytest.approx(other.gradient, abs=1e-11)
+
+
+def test_places_stick_along_sides_that_have_turned(graded_finger: Fingers) -> None:
+    """Across the push, as the body sees it: a finger that goes on along it moves the place so."""
+    gaps, at = drawn_gaps(1, np.inf, graded_finger)
+    n, pivot, lanes = len(at) - 3, gaps.face.pivot, np.arange(40)
+    assert pivot is not None
+    push = np.random.default_rng(1).uniform(0.0, 1.0, gaps(at).value.shape)
+    place = Sticking.of(gaps, at, push, np.array([[0.5]]))
+    way = gaps.touches(at).directions[:, push.argmax(axis=0), lanes]
+    along = rotated(place.along[:, 0], at[n] / pivot.radius)
+    assert (along * way).sum(axis=0) == pytest.approx(np.zeros(40), abs=1e-12)
+    moved = at.copy()
+    moved[n + 1] += 0.5  # of the body, along its first way
+    ways = gaps.face.directions[:, 0]
+    assert place(moved).value[0] == pytest.approx(-0.5 * (along * ways).sum(axis=0), abs=1e-12)
 
 
 def test_a_square_below_a_straight_finger(reference_finger: Fingers) -> None:
@@ -536,6 +556,32 @@ def test_a_body_on_edge_is_not_stable(
     told = grasp_rows(grasped(case.scene, case.body, "010/000"))
     assert told["status"].tolist() == [Status.NOT_HELD]
     assert np.isnan(told["object_angle_deg"]).all() and np.isnan(told["squeeze_N"]).all()
+
+
+def test_a_body_on_two_edges_goes_counterclockwise(
+    reference_finger: Fingers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between mirrored fingers nothing says to which side; it is let go of but for the last."""
+    scene = gripper_of(reference_finger(3), 40.0)
+    units, free = UnitSolutions.of(scene.finger), np.array([[False], [True], [False]])
+    settled = settle(units, chain_potential, free, 1e-12)
+    face = Face.of(settled.potential.coordinates, np.array([[LAYER]]))
+    nodes = face.shape(settled.equilibrium.coordinates).nodes[..., 0]
+    x, high = frames(scene.gripper)[0].placed(nodes)[:, 1] + np.array([0.0, 0.6])
+    low = high - 0.5
+    corners = [[4.0, 0.0, -4.0, -4.0, 0.0, 4.0], [low, high, low, -low, -high, -low]]
+    body, seen, lane = Polygon(np.array([x, 0.0]), np.array(corners)), frames(scene.gripper), [0]
+    parts = [placed(scene, chain_potential, body, frame, codes("010")) for frame in seen]
+    motion, index = motion_of(body, Held.FREE, seen), np.array(lane)
+    own, start = together(parts, [index, index], motion)
+
+    def nearly(own: Obstructed, shapes: ContactShapes, load: Array, end: Array) -> Any:
+        return approach(own, shapes, load, 0.9985 * end)
+
+    monkeypatch.setattr(release, "approach", nearly)
+    gone = released(own, start).shapes
+    assert gone.is_there.all()
+    assert gone.coordinates[own.n_own, 0] > 0.1, "mm"
 
 
 @pytest.mark.slow
