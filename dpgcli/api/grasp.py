@@ -1,6 +1,7 @@
 """`grasp`: what the fingers of a gripper do with a body between them, state by state."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,10 +34,11 @@ from dpgcli.design.bodies import Friction
 from dpgcli.design.loads import direction_text
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
-from dpgcli.grasping.approach import Way
+from dpgcli.grasping.approach import Load, Way
 from dpgcli.grasping.closing import Closing
-from dpgcli.grasping.costs import Work, effort, is_moving
-from dpgcli.grasping.table import Grasps, columns_of, grasp_rows, grasps
+from dpgcli.grasping.costs import JOINED_SECONDS, Work, effort, is_moving
+from dpgcli.grasping.joining import n_overlapping
+from dpgcli.grasping.table import BETWEEN, Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
@@ -97,12 +99,15 @@ class GraspResult(TableResult):
         if n_other := int(n - (is_there | is_let_go).sum()):
             yield f"{counted(n_other, 'state')} without an answer: see the column status"
         if "overlaps" in rows and rows["overlaps"].any():
-            where = "elsewhere than at faces and ends" if self.grasps.body is None else "each other"
+            is_met = self.grasps.body is None or BETWEEN in rows
+            where = "elsewhere than at faces and ends" if is_met else "each other"
             yield (
                 f"{counted(int(rows['overlaps'].sum()), 'state')} in which the fingers overlap "
                 f"{where}: their contact there is not in the model"
             )
-        if self.grasps.body is None:
+        if BETWEEN in rows:
+            yield from self._between_lines()
+        if self.grasps.body is None or BETWEEN in rows:
             yield from self._mirrored_lines()
         if "tie" in rows and (n_tied := int((rows["tie"] != "").sum())):
             yield (
@@ -116,10 +121,19 @@ class GraspResult(TableResult):
         if self.grasps.scene.friction is not None:
             yield from self._payload_lines(self.grasps.scene.friction)
 
+    def _between_lines(self) -> Iterator[str]:
+        """How many fingers touch each other beside the body."""
+        if n_between := int((self.rows[BETWEEN] > 0.0).sum()):
+            yield f"{counted(n_between, 'state')} in which the fingers touch each other"
+
     def _mirrored_lines(self) -> Iterator[str]:
-        """What is taken of two fingers in one state."""
+        """What is taken of two fingers in one state that come together."""
+        mark = "" if self.grasps.body is None else Load.MEETING
+        are_reset = [
+            bool(text) and mark in text and "/" not in text for text in self.rows["resets"]
+        ]
         is_alike = np.array(["/" not in text for text in self.rows["pattern"]], bool)
-        if n_reset := int((is_alike & (self.rows["resets"] != "")).sum()):
+        if n_reset := int((is_alike & np.array(are_reset, bool)).sum()):
             yield (
                 f"{counted(n_reset, 'mirrored pair')} reset together: which finger goes first the "
                 "model does not say, and one alone may end in another state"
@@ -136,6 +150,12 @@ class GraspResult(TableResult):
             "forces"
         )
         is_known = ~np.isnan(payload)
+        is_unknown = (self.rows["status"] == Status.STABLE) & ~is_known
+        if BETWEEN in self.rows and (n := int((is_unknown & (self.rows[BETWEEN] > 0.0)).sum())):
+            yield (
+                f"{counted(n, 'mirrored pair')} touching each other as well: what the pair bears "
+                "is not known"
+            )
         if not is_known.any():
             return
         best = int(np.nanargmax(payload))
@@ -287,8 +307,12 @@ def work_of(
     if scene.body is None:
         n_pairs = int((pairs[0] != pairs[-1]).sum())
         return Work(*sizes, False, n_pairs=n_pairs, effort=effort(scene, None))
-    has_friction = scene.friction is not None
-    return Work(*sizes, is_moving(scene), way, n_ramps, has_friction, effort(scene, scene.body))
+    moves, has_friction = is_moving(scene), scene.friction is not None
+    work = Work(*sizes, moves, way, n_ramps, has_friction, effort(scene, scene.body))
+    if len(pairs) < 2 or moves or closing is not None:
+        return work
+    n_pairs = n_overlapping(scene, chain_potential, pairs)
+    return replace(work, n_pairs=n_pairs, pair_seconds=JOINED_SECONDS)
 
 
 def check_work(work: Work) -> None:

@@ -29,14 +29,22 @@ MOST_CHANGES, OUT_OF_ORDER = 8, 1e-12  # of contacts in the end; of a stroke
 LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
 
+class Load(StrEnum):
+    """What the load was at which units left their wells, as tables tell it."""
+
+    BODY = ""
+    MEETING = " of coming together"
+    RELEASE = " of letting go"
+
+
 @dataclass(frozen=True)
 class Reset:
     """Units that left their wells in some lanes: `flipped` (unit, lane) at loads (lane,).
 
     `push` (cell, lane) are the pushes, N, at the fold; `snapped` are those that are inverted now.
     Where it is pressures that changed, `pressure` (unit, lane), MPa, is that of each unit, and
-    `tied` (unit, lane) are those whose thresholds are the same, if there are several. Loads
-    `of_release` are shares of letting go.
+    `tied` (unit, lane) are those whose thresholds are the same, if there are several. Loads are
+    shares `of` what grew: the body, mostly.
     """
 
     lanes: Indices
@@ -46,7 +54,7 @@ class Reset:
     snapped: Flags
     tied: Flags
     pressure: Array | None = None
-    of_release: bool = False
+    of: Load = Load.BODY
 
     def take(self, index: Indices) -> "Reset":
         """The same of some of the lanes, by their places here."""

@@ -5,7 +5,7 @@ it does not, fingers know nothing of each other, and each is a scene by itself.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,13 +54,15 @@ class Obstructed:
     """Fingers with bodies in their way: one design and body, or one for each lane.
 
     There are as many fingers to a lane as there are `bodies`: what the body is in the frame of
-    each, or the axis that a finger and its mirror image meet in. Without bodies there are two that
-    meet each other: their frames are mirror images in the `axis`. Arrays by unit and by cell are
-    those of the first finger, then of the next; coordinates are interleaved (`equilibrium.joined`),
-    those of the body's `motion` behind them.
+    each. Fingers that meet each other have an `axis`, in which their frames are mirror images: two
+    of them do, with or without a body, and one alone that `is_mirrored` meets its mirror image
+    there. Arrays by unit are those of the first finger, then of the next; so are those by cell, of
+    bodies before those between fingers. Coordinates are interleaved (`equilibrium.joined`), those
+    of the `motion` behind them.
 
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
-    they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm. A `ramp` changes the
+    they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm; and mirror images may come
+    to the axis, from `apart` (batch,), mm, beyond it. A `ramp` changes the
     pressures on their domes by the load; without it there are none. Points of bodies deeper behind
     a face than the `reach` (batch,), mm, are beyond the finger. Places that are `sticking` to a
     body that is there in full do not slide along it.
@@ -69,18 +71,20 @@ class Obstructed:
     units: UnitSolutions
     formulate: Formulate
     thickness: Array
-    bodies: tuple[Obstacle | Axis, ...]
+    bodies: tuple[Obstacle, ...]
     depth: Array
     motion: Motion | None = None
     ramp: Ramp | None = None
     reach: Array | None = None
     sticking: tuple[Sticking, ...] = ()
     axis: Axis | None = None
+    is_mirrored: bool = False
+    apart: Array = field(default_factory=lambda: np.zeros(1))
 
     @property
     def n_fingers(self) -> int:
         """Fingers to a lane."""
-        return len(self.bodies) or 2
+        return 1 if self.is_mirrored else len(self.bodies) or 2
 
     @property
     def stiffness(self) -> Array:
@@ -104,7 +108,9 @@ class Obstructed:
         units = self.units.take_lanes(index)
         sticking = tuple(place.take_lanes(index) for place in self.sticking)
         bare = Obstructed(units, self.formulate, thickness, bodies, depth, motion, ramp, reach)
-        return replace(bare, sticking=sticking, axis=self.axis and self.axis.take_lanes(index))
+        axis, apart = self.axis and self.axis.take_lanes(index), take_lanes(self.apart, index)
+        meeting = replace(bare, axis=axis, is_mirrored=self.is_mirrored, apart=apart)
+        return replace(meeting, sticking=sticking)
 
     def of_finger(self, values: Array, finger: int) -> Array:
         """What belongs to a finger of coordinates (size, …)."""
@@ -116,31 +122,53 @@ class Obstructed:
         return self.n_fingers * self.formulate(self.units.finger).coordinates.size
 
     @cached_property
+    def _still(self) -> tuple[Face, ...]:
+        """The faces of the fingers."""
+        alone = Face.of(self.formulate(self.units.finger).coordinates, self.thickness)
+        n = self.n_fingers
+        return tuple(replace(alone, places=n * alone.places + finger) for finger in range(n))
+
+    @cached_property
+    def _moving(self) -> tuple[Face, ...]:
+        """The same as what moves sees them."""
+        if self.motion is None:
+            return self._still
+        own = np.arange(self.n_own, self.n_own + self.motion.n)
+        motion, pairs = self.motion, enumerate(self._still)
+        return tuple(
+            face.seen_from(motion.directions[finger], own, motion.pivot_of(finger))
+            for finger, face in pairs
+        )
+
+    @property
     def faces(self) -> tuple[Face, ...]:
         """The faces of the fingers, as the body sees them."""
-        alone = Face.of(self.formulate(self.units.finger).coordinates, self.thickness)
-        n, faces = self.n_fingers, []
-        for finger in range(n):
-            face = replace(alone, places=n * alone.places + finger)
-            if self.motion is not None:
-                own = np.arange(self.n_own, self.n_own + self.motion.n)
-                ways, pivot = self.motion.directions[finger], self.motion.pivot_of(finger)
-                face = face.seen_from(ways, own, pivot)
-            faces.append(face)
-        return tuple(faces)
+        return self._still if self._moves_bases else self._moving
+
+    @property
+    def _moves_bases(self) -> bool:
+        return self.motion is not None and self.motion.is_of_bases
 
     @cached_property
     def contacts(self) -> tuple[FaceGaps | Heights | NodeGaps, ...]:
-        """The gaps of each finger to its body; without bodies those between the two fingers."""
+        """The gaps of each finger to its body, and behind them those between fingers."""
+        return (*self.on_bodies, *self._between)
+
+    @cached_property
+    def on_bodies(self) -> tuple[FaceGaps, ...]:
+        """The gaps of each finger to its body."""
+        pairs = zip(self.faces, self.bodies, strict=False)  # there may be no body
+        return tuple(FaceGaps(face, body, reach=self.reach) for face, body in pairs)
+
+    @cached_property
+    def _between(self) -> tuple[Heights | NodeGaps, ...]:
+        """The gaps between fingers that meet."""
         if self.axis is None:
-            pairs = zip(self.faces, self.bodies, strict=True)
-            return tuple(
-                Heights(face.with_end(), body)
-                if isinstance(body, Axis)
-                else FaceGaps(face, body, reach=self.reach)
-                for face, body in pairs
-            )
-        upper, lower = (face.with_end() for face in self.faces)
+            return ()
+        faces = self._moving if self._moves_bases else self._still
+        if self.is_mirrored:
+            return (Heights(faces[0].with_end(), self.axis),)
+        upper, lower = (face.with_end() for face in faces)
         told = self.axis, self.n_own + self._n_motions, self.behind
         return NodeGaps(upper, lower, *told, True), NodeGaps(lower, upper, *told, False)
 
@@ -155,7 +183,7 @@ class Obstructed:
         n_before = 0
         for number, gaps in enumerate(self.contacts):
             cells = slice(n_before, n_before + gaps.n_cells)
-            if number == finger:
+            if number % self.n_fingers == finger:
                 yield cells, gaps
             elif isinstance(gaps, NodeGaps):
                 yield cells, OfNodes(gaps)
@@ -175,10 +203,9 @@ class Obstructed:
         return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
 
     def each(self, push: Array) -> Iterator[tuple[FaceGaps, Array]]:
-        """The gaps of each finger, and what belongs to them of pushes (cell, …)."""
+        """The gaps of each finger to its body, and what belongs to them of pushes (cell, …)."""
         n_before = 0
-        for gaps in self.contacts:
-            assert isinstance(gaps, FaceGaps), "a body"
+        for gaps in self.on_bodies:
             yield gaps, push[n_before : n_before + gaps.n_cells]
             n_before += gaps.n_cells
 
@@ -212,6 +239,11 @@ class Obstructed:
         return sum(gaps.n_cells for gaps in self.contacts)
 
     @cached_property
+    def n_on_bodies(self) -> int:
+        """Those of them, the first ones, that are gaps to bodies."""
+        return sum(gaps.n_cells for gaps in self.on_bodies)
+
+    @cached_property
     def are_kept(self) -> Flags:
         """Cells that are no gaps, (cell, 1)."""
         n_others = sum(measure.n_cells for measure in self._prescribed)
@@ -220,14 +252,16 @@ class Obstructed:
     @property
     def _deep(self) -> Array:
         """D of every cell, (…, batch)."""
-        if self.motion is None or self.motion.travel is None:
+        is_told = self.motion is not None and self.motion.travel is not None
+        if self.axis is None and not is_told:
             return self.depth
-        own, travel = (
-            np.broadcast_to(self.depth, (self.n_gaps, len(self.depth))),
-            self.motion.travel,
-        )
-        n_lanes = max(own.shape[1], travel.shape[1])
-        return np.concatenate([np.broadcast_to(d, (len(d), n_lanes)) for d in (own, travel)])
+        n_between = self.n_gaps - self.n_on_bodies
+        travel = np.zeros((0, 1)) if self.motion is None else self.motion.travel
+        deep = [(self.n_on_bodies, self.depth), (n_between, self.apart)]
+        deep += [] if travel is None else [(len(travel), travel)]
+        deep.append((len(self.sticking), np.zeros(1)))
+        n_lanes = max(own.shape[-1] for _, own in deep)
+        return np.concatenate([np.broadcast_to(own, (n, n_lanes)) for n, own in deep])
 
     @property
     def _limits(self) -> Array | None:
@@ -236,7 +270,7 @@ class Obstructed:
             return None
         n_lanes = max(place.friction.shape[1] for place in self.sticking)
         limits, n_before = np.zeros((len(self.sticking), len(self.are_kept), n_lanes)), 0
-        for finger, (place, gaps) in enumerate(zip(self.sticking, self.contacts, strict=True)):
+        for finger, (place, gaps) in enumerate(zip(self.sticking, self.on_bodies, strict=True)):
             limits[finger, n_before : n_before + gaps.n_cells] = place.friction
             n_before += gaps.n_cells
         return limits

@@ -16,6 +16,7 @@ RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
 PAIR_SECONDS = 3.5e-3  # of two fingers in different states that come together
+JOINED_SECONDS = 2e-2  # of two that touch a body as well, with their margins
 PULSE_SECONDS = 0.1  # of a pulse, however many states go through it, times the number of units
 JAW_SECONDS = 0.03  # of a state at all apertures
 BODIES = {Disc: 1.0, Jaws: 2.0, Polygon: 8.0}  # times as long: a polygon's corners take most
@@ -32,7 +33,7 @@ PAIR_LANE = 2500  # the same while it is worked on, times their third power
 class Work:
     """Seconds and bytes of so many rows, of states of the upper and the lower finger.
 
-    Without a body `n_pairs` of the rows are those of different states.
+    In `n_pairs` of the rows both fingers are unknown and come together, `pair_seconds` each.
     """
 
     n_states: int
@@ -45,6 +46,7 @@ class Work:
     has_friction: bool = False
     effort: float = 1.0  # times that of a disc and the published law
     n_pairs: int = 0
+    pair_seconds: float = PAIR_SECONDS  # times the square of the number of units
 
     @property
     def seconds(self) -> float:
@@ -58,7 +60,7 @@ class Work:
         one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
         placed = self.n_states * one * square
         pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
-        met = placed + let_go + pulled + self.n_pairs * PAIR_SECONDS * square
+        met = placed + let_go + pulled + self.n_pairs * self.pair_seconds * square
         return START_SECONDS + self.effort * met + self.n_rows * ROW_SECONDS
 
     @property

@@ -70,7 +70,7 @@ def _relaxed(
         goes_on = ~is_near & (n_stuck < MOST_STUCK) & (count < MOST_UPDATES - 1) & ~is_slipping
         goes_on &= np.isfinite(there.relative_residual)
         if own.is_free:  # a body that nothing pushes after so many steps has left
-            goes_on &= (pushed[: own.n_gaps] > 0.0).any(axis=0)
+            goes_on &= (pushed[: own.n_on_bodies] > 0.0).any(axis=0)
         found.put(lanes[~goes_on], near.take_lanes(np.flatnonzero(~goes_on)))
         lanes, n_stuck = lanes[goes_on], n_stuck[goes_on]
         if not len(lanes):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import shapely
@@ -21,7 +21,7 @@ from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import Touches
-from dpgcli.mechanics.mirror import Axis
+from dpgcli.mechanics.mirror import Touching
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.plates import SLIGHT
 from dpgcli.mechanics.terms import Formulate
@@ -38,6 +38,39 @@ BLOCK = 2**28  # bytes
 LANE = 800  # bytes of a lane, times the square of its units: measured from 10 to 26 of them
 
 
+class Pushes(NamedTuple):
+    """Pushes, (cell, batch) N, at each of the places that `touches` are, in the finger's frame."""
+
+    push: Array
+    touches: Touches
+
+    @property
+    def force(self) -> Array:
+        """All of them, (2, batch), N."""
+        return total(np.moveaxis(self.touches.directions * self.push, 1, 0))
+
+    def take_lanes(self, index: Indices) -> "Pushes":
+        """Those of some lanes."""
+        touches = Touches(*(part[..., index] for part in self.touches))
+        return Pushes(self.push[:, index], touches)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Pushes | None]", sizes: Sequence[int]) -> "Pushes | None":
+        """Those of several batches of these sizes as one, with as many places as any has."""
+        most = max((0 if part is None else len(part.push) for part in parts), default=0)
+        if not most:
+            return None
+        push, places, ways = (np.zeros((*of, most, sum(sizes))) for of in ((), (2,), (2,)))
+        ends = np.cumsum(sizes)
+        for part, end in zip(parts, ends, strict=True):
+            if part is not None:
+                n, n_lanes = part.push.shape
+                lanes = slice(end - n_lanes, end)
+                push[:n, lanes] = part.push
+                places[:, :n, lanes], ways[:, :n, lanes] = part.touches
+        return cls(push, Touches(places, ways))
+
+
 @dataclass(frozen=True)
 class Grasped:
     """Fingers at rest against a body, a lane each; forces on the body in the finger's frame.
@@ -45,7 +78,8 @@ class Grasped:
     `status` are `Status` codes of the states that `code` (batch,) have become, `after`; `push`
     (cell, batch) N is that at each of the places that `touches` are, on `phalanges` (cell,),
     `force` (2, batch) N, `gap` (batch,) mm the smallest, `margin` what more of the load the next
-    unit bears. `nodes`, and `face` (2, node, batch), in mm. `residual` N and `error` mm are those
+    unit bears. Without a body these are on the other finger; beside one those are `between`, if
+    fingers meet. `nodes`, and `face` (2, node, batch), in mm. `residual` N and `error` mm are those
     of the tip. `resets` say what happened.
     """
 
@@ -63,6 +97,7 @@ class Grasped:
     nodes: Stations
     face: Array
     resets: tuple[Reset, ...]
+    between: Pushes | None = None
     BY_LANE: ClassVar = (
         *("code", "after", "status", "push", "force", "gap", "margin"),
         *("residual", "error"),
@@ -75,6 +110,7 @@ class Grasped:
             name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
             for name in (*cls.BY_LANE, "face")
         }
+        sizes = [len(part.code) for part in parts]
         nodes, touches = (
             [np.concatenate(v, axis=-1) for v in zip(*values, strict=True)]
             for values in ([p.nodes for p in parts], [p.touches for p in parts])
@@ -84,11 +120,44 @@ class Grasped:
             touches=Touches(*touches),
             phalanges=parts[0].phalanges,
             nodes=Stations(*nodes),
-            resets=_resets_of([part.resets for part in parts], [len(p.code) for p in parts]),
+            resets=_resets_joined([part.resets for part in parts], sizes),
+            between=Pushes.joined([part.between for part in parts], sizes),
+        )
+
+    @property
+    def pushes(self) -> tuple[Pushes, ...]:
+        """All of them: on the body, and on the other finger beside it."""
+        own = Pushes(self.push, self.touches)
+        return (own,) if self.between is None else (own, self.between)
+
+    @property
+    def size_between(self) -> Array:
+        """The size of the force on the other finger beside a body, (batch,), N."""
+        if self.between is None:
+            return np.zeros(len(self.code))
+        return np.asarray(np.hypot(*self.between.force))
+
+    def take_lanes(self, index: Indices) -> "Grasped":
+        """Some of the lanes."""
+        arrays = {name: getattr(self, name)[..., index] for name in (*self.BY_LANE, "face")}
+        return replace(
+            self,
+            **arrays,
+            touches=Touches(*(part[..., index] for part in self.touches)),
+            nodes=Stations(*(part[..., index] for part in self.nodes)),
+            resets=tuple(resets_of(self.resets, index)),
+            between=self.between and self.between.take_lanes(index),
         )
 
 
-def _resets_of(parts: Sequence[Sequence[Reset]], sizes: Sequence[int]) -> tuple[Reset, ...]:
+def resets_of(resets: Sequence[Reset], index: Indices) -> Iterator[Reset]:
+    """What happened to the lanes at `index`, by their places there."""
+    for reset in resets:
+        rows = np.flatnonzero(np.isin(index, reset.lanes))
+        yield replace(reset.take(np.searchsorted(reset.lanes, index[rows])), lanes=rows)
+
+
+def _resets_joined(parts: Sequence[Sequence[Reset]], sizes: Sequence[int]) -> tuple[Reset, ...]:
     """Resets of several batches of these sizes, by the lanes of all of them."""
     firsts = np.cumsum([0, *sizes])
     return tuple(
@@ -115,7 +184,7 @@ class Placed:
         sizes = [len(part.codes) for part in parts]
         margins = [part.grown.margin for part in parts if part.grown.margin is not None]
         margin = np.concatenate(margins) if margins else None
-        resets = _resets_of([part.grown.resets for part in parts], sizes)
+        resets = _resets_joined([part.grown.resets for part in parts], sizes)
         return cls(
             np.concatenate([part.codes for part in parts]),
             replace(parts[0].own, depth=np.concatenate([part.own.depth for part in parts])),
@@ -215,11 +284,22 @@ def met(
 
 
 def grown(
-    own: Obstructed, x: Array, pattern: Flags, is_stable: Flags, beyond: float | None
+    own: Obstructed,
+    x: Array,
+    pattern: Flags,
+    is_stable: Flags,
+    beyond: float | None,
+    push: Array | None = None,
 ) -> Approach:
-    """How fingers in free states, coordinates (size, batch), meet what grows in their way."""
+    """How fingers in balance, coordinates (size, batch), meet what grows in their way.
+
+    They are free, or feel pushes, (cell, batch).
+    """
     begin = np.zeros(x.shape[1])
-    start = finished(own, x, pattern, np.zeros((own.n_gaps, len(begin))), begin)
+    pushes = np.zeros((len(own.are_kept), len(begin)))
+    if push is not None:
+        pushes[: len(push)] = push
+    start = finished(own, x, pattern, pushes, begin)
     start = replace(start, is_there=start.is_there & is_stable)
     return approach(own, start, begin, begin + 1.0, beyond=beyond)
 
@@ -272,39 +352,54 @@ def described(
     found = []
     for finger, state in enumerate(settled):
         cells, seen = zip(*own.seen_by(finger), strict=True)
-        touches = Touches.together([part.touches(shapes.coordinates) for part in seen])
-        push = own.without_rounding(np.concatenate([shapes.push[part] for part in cells]))
+        each = [_pushes(own, shapes, *part) for part in zip(cells, seen, strict=True)]
+        n_first = 1 if own.bodies else len(each)
+        mine, between = _together(each[:n_first]), _together(each[n_first:])
+        assert mine is not None, "there is something to touch"
         rows = slice(finger, own.n_own, own.n_fingers)
-        mine = own.of_finger(shapes.coordinates, finger)
+        at = own.of_finger(shapes.coordinates, finger)
         found.append(
             Grasped(
                 code=codes[finger],
                 after=codes_of(state.reached),
                 status=status,
-                push=push,
-                touches=touches,
-                phalanges=np.concatenate([part.phalanges for part in seen]),
-                force=total(np.moveaxis(touches.directions * push, 1, 0)),
+                push=mine.push,
+                touches=mine.touches,
+                phalanges=np.concatenate([part.phalanges for part in seen[:n_first]]),
+                force=mine.force,
                 gap=np.min([gaps[part].min(axis=0) for part in cells], axis=0),
                 margin=margin,
                 residual=there.residual,
                 error=tip(state, with_compliance=False, whole=there, rows=rows).error,
-                nodes=state.potential.coordinates.stations(mine),
-                face=Face.of(state.potential.coordinates, own.thickness).shape(mine).nodes,
+                nodes=state.potential.coordinates.stations(at),
+                face=Face.of(state.potential.coordinates, own.thickness).shape(at).nodes,
                 resets=_of_finger(grown.resets, own, finger),
+                between=between,
             )
         )
     return tuple(found)
 
 
-def _is_entered(nodes: Array, body: Obstacle | Axis) -> Flags:
+def _pushes(own: Obstructed, shapes: ContactShapes, cells: slice, seen: Touching) -> Pushes:
+    return Pushes(own.without_rounding(shapes.push[cells]), seen.touches(shapes.coordinates))
+
+
+def _together(parts: Sequence[Pushes]) -> Pushes | None:
+    """Cells of several, one after the other; None of none."""
+    if not parts:
+        return None
+    push, touches = zip(*parts, strict=True)
+    return Pushes(np.concatenate(push), Touches.together(touches))
+
+
+def _is_entered(nodes: Array, body: Obstacle) -> Flags:
     """Whether a face, nodes (2, node, batch), runs into a polygon: one whose gaps do not tell.
 
     Lanes that are lost have no nodes, and run into nothing.
     """
     enters = np.zeros(nodes.shape[2], bool)
     lanes = np.flatnonzero(np.isfinite(nodes).all(axis=(0, 1)))
-    if isinstance(body, Obstacle) and len(body.plates) and len(lanes):
+    if len(body.plates) and len(lanes):
         area = shapely.polygons(body.take_lanes(lanes).points.transpose(2, 1, 0))
         inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
         faces = shapely.linestrings(nodes[..., lanes].transpose(2, 1, 0))

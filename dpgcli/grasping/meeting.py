@@ -1,10 +1,12 @@
-"""Fingers of a gripper that meet without a body between them: they touch each other.
+"""Fingers of a gripper that meet: they touch each other.
 
-Their bases come together along y, from where the free fingers just touch to their spacing: that is
-the load. Two in one state stay mirror images of each other, and each meets the axis as a fixed
-line. That such a pair does not give way to one side either is looked at behind that: nodes that
-touch keep each other from sliding, as any friction does where nothing yet pulls along the axis. Of
-other pairs both fingers are unknown, and slide along each other without friction.
+Their bases come together along y, from where the fingers just touch to their spacing: that is the
+load. Without a body they are free before. With one each has taken hold of it as if it were alone,
+and keeps it at its place before its base as they come together: in the end it is one. Two in one
+state stay mirror images of each other, and each meets the axis as a fixed line. That such a pair
+does not give way to one side either is looked at behind that: nodes that touch keep each other from
+sliding, as any friction does where nothing yet pulls along the axis. Of other pairs both fingers
+are unknown, and slide along each other without friction.
 """
 
 from collections.abc import Sequence
@@ -19,10 +21,9 @@ from dpgcli.equilibrium.contracts import Term
 from dpgcli.equilibrium.loaded import Holding
 from dpgcli.equilibrium.newton import looked_at
 from dpgcli.equilibrium.potential import Potential
-from dpgcli.grasping.approach import Approach, approach
+from dpgcli.grasping.approach import Approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.costs import PAIR_LANE
-from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import (
     BLOCK,
@@ -65,7 +66,7 @@ def meeting(
     is_alike, is_swapped = np.asarray(first == second), np.asarray(first > second)
     alike, others = distinct(key[is_alike]), distinct(key[~is_alike])
     parts = [_mirrored(*given, seen_from[0], states[alike // len(states)])] if len(alike) else []
-    for some in _blocks(len(others), scene.finger.n_units):
+    for some in pair_blocks(len(others), scene.finger.n_units):
         codes = [states[place] for place in divmod(others[some], len(states))]
         parts.append(_met(*given, seen_from, codes))
     lanes = np.where(
@@ -86,7 +87,7 @@ def _swapped(found: Grasped) -> Grasped:
     return replace(found, push=np.roll(found.push, half, axis=0), touches=touches)
 
 
-def _blocks(n_pairs: int, n_units: int) -> list[slice]:
+def pair_blocks(n_pairs: int, n_units: int) -> list[slice]:
     """Pairs that are worked on at once, so that these take no more than BLOCK bytes."""
     size = max(BLOCK // (PAIR_LANE * n_units**3), 1)
     return [slice(first, min(first + size, n_pairs)) for first in range(0, n_pairs, size)]
@@ -100,18 +101,34 @@ def _mirrored(
     parts = []
     for some in blocks(len(codes), units.finger.n_units):
         free = settle(units, formulate, pattern[:, some], DEFAULT_TOLERANCE)
+        own = Obstructed(units, formulate, thickness, (), np.zeros(1))
+        own = replace(own, axis=frame.axis, is_mirrored=True)
         x = free.equilibrium.coordinates
-        own = Obstructed(units, formulate, thickness, (frame.axis,), np.zeros(1))
-        own = replace(own, depth=np.maximum(0.0, -own.gaps()(x).value.min(axis=0)))
+        own = replace(own, apart=beyond_axis(own, x))
         is_stable = np.asarray(free.status == Status.STABLE)
         came = grown(own, x, pattern[:, some], is_stable, MARGIN_TO)
-        is_lost = is_stable & ~came.shapes.is_there
-        status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status)
-        found = told(Placed(codes[some], own, came, status))
-        gives_way = (found.status == Status.STABLE) & ~_bears_sideways(own, came)
-        marginal = np.where(gives_way, np.uint8(Status.MARGINAL), found.status)
-        parts.append(replace(found, status=marginal))
+        status = with_lost(free.status, came.shapes.is_there)
+        parts.append(bearing_sideways(told(Placed(codes[some], own, came, status)), own, came))
     return _as_of_pairs(Grasped.joined(parts))
+
+
+def with_lost(status: NDArray[np.uint8], is_there: Flags) -> NDArray[np.uint8]:
+    """Statuses before, but for those that have no rest any more."""
+    is_lost = (status == Status.STABLE) & ~is_there
+    return np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
+
+
+def beyond_axis(own: Obstructed, coordinates: Array) -> Array:
+    """How far fingers that are mirrored reach beyond the axis, mm, (lane,): at least 0."""
+    heights = own.contacts[-1]
+    assert isinstance(heights, Heights), "a finger and its mirror image"
+    return np.asarray(np.maximum(0.0, -heights(coordinates).value.min(axis=0)))
+
+
+def bearing_sideways(found: Grasped, own: Obstructed, came: Approach) -> Grasped:
+    """The same, marginal where a finger gives way with its mirror image to one side."""
+    gives_way = (found.status == Status.STABLE) & ~_bears_sideways(own, came)
+    return replace(found, status=np.where(gives_way, np.uint8(Status.MARGINAL), found.status))
 
 
 def _bears_sideways(own: Obstructed, came: Approach) -> Flags:
@@ -119,16 +136,18 @@ def _bears_sideways(own: Obstructed, came: Approach) -> Flags:
 
     Such a motion is the opposite of its mirror image. It moves nodes that touch along the axis in
     opposite directions, which they keep each other from, and off the axis together, so that heights
-    count with their pushes as in the mirrored state.
+    count with their pushes as in the mirrored state. So do gaps to a body.
     """
-    shapes = came.shapes
-    (heights,) = own.contacts
-    assert isinstance(heights, Heights), "a finger and the axis"
-    x, push = shapes.coordinates, own.without_rounding(shapes.push)
+    shapes, heights = came.shapes, own.contacts[-1]
+    assert isinstance(heights, Heights), "a finger and its mirror image"
+    x, n = shapes.coordinates, own.n_on_bodies
+    push = own.without_rounding(shapes.push[n:])
     normal = heights.axis.normal
     along = replace(heights, axis=Axis(np.stack((normal[1], -normal[0])), np.zeros(1)))
     keeping = Holding(None, np.where(push > 0.0, own.stiffness, 0.0), along(x).value)
     bare = own.bare(shapes.inverted, came.load)
+    if n:
+        bare = replace(own, axis=None).pressed(shapes.inverted, shapes.push[:n], came.load)
     pressed = Term("contact", heights, DeadLoad(push)), Term("stick", along, keeping)
     sideways = Potential(bare.coordinates, (*bare.terms, *pressed))
     return np.asarray(looked_at(sideways, x).curvature > MARGINAL_CURVATURE)
@@ -170,32 +189,47 @@ def _met(
     x = x.reshape(-1, n_rows)
     pattern = np.concatenate([inverted_units(own, finger.n_units) for own in codes])
     axis = seen_from[0].axis
+    own = Obstructed(units, formulate, thickness, (), np.zeros(1), axis=axis)
     face = Face.of(free.potential.coordinates, thickness).with_end()
     nodes = face.shape(free.equilibrium.coordinates).nodes
-    travel = _way(*(_along_axis(axis, nodes[..., own]) for own in lanes))
-    apart = 0.5 * axis.normal[:, None]
-    motion = Motion((apart, apart), travel=travel[None])
-    own = Obstructed(units, formulate, thickness, (), np.zeros(1), motion, axis=axis)
-    begin, nothing = np.zeros(n_rows), np.zeros((own.n_gaps + 1, n_rows))
-    start = finished(own, np.concatenate((x, -travel[None])), pattern, nothing, begin)
+    travel = way_of(*(along_axis(axis, nodes[..., own]) for own in lanes))
     status = np.max([free.status[own] for own in lanes], axis=0)
-    is_stable = np.asarray(status == Status.STABLE)
-    shapes = replace(start, is_there=start.is_there & is_stable)
-    came = approach(own, shapes, begin, begin + 1.0, beyond=MARGIN_TO)
-    is_lost = is_stable & ~came.shapes.is_there
-    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
-    upper, lower = described(own, codes, came, status)
+    coming = apart(own, travel)
+    came = coming_together(coming, x, pattern, status, MARGIN_TO)
+    upper, lower = described(coming, codes, came, with_lost(status, came.shapes.is_there))
     return upper, lower
 
 
-def _along_axis(axis: Axis, nodes: Array) -> Array:
+def apart(own: Obstructed, travel: Array) -> Obstructed:
+    """Two fingers whose bases come together by a travel, (lane,) mm."""
+    assert own.axis is not None, "they meet"
+    half = 0.5 * own.axis.normal[:, None]
+    motion = Motion((half, half), travel=travel[None], is_of_bases=True)
+    return replace(own, depth=np.zeros(1), motion=motion)
+
+
+def coming_together(
+    coming: Obstructed,
+    x: Array,
+    pattern: Flags,
+    status: NDArray[np.uint8],
+    beyond: float | None,
+    push: Array | None = None,
+) -> Approach:
+    """How fingers in balance do so, from coordinates (size, lane) of both and pushes of a body."""
+    assert coming.motion is not None and coming.motion.travel is not None, "they come"
+    start = np.concatenate((x, -coming.motion.travel))
+    return grown(coming, start, pattern, np.asarray(status == Status.STABLE), beyond, push)
+
+
+def along_axis(axis: Axis, nodes: Array) -> Array:
     """Places along the axis and heights over it, (2, node, lane), of a finger's nodes."""
     x, y = axis.normal
     return np.stack((y * nodes[0] - x * nodes[1], axis.height(nodes)))
 
 
-def _way(upper: Array, lower: Array) -> Array:
-    """How far apart bases are moved for free fingers just to touch, mm, (lane,): at least 0.
+def way_of(upper: Array, lower: Array) -> Array:
+    """How far apart bases are moved for fingers just to touch, mm, (lane,): at least 0.
 
     Of places along the axis and heights of their nodes, (2, node, lane): a node of one touches a
     side of the other that faces it.

@@ -19,11 +19,13 @@ from dpgcli.grasping.closing import Closing, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Placed
+from dpgcli.grasping.joining import Joined
 from dpgcli.grasping.payload import Contacts, payloads
 from dpgcli.grasping.release import LANES, WAYS, motion_of, opened_by, released, together
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.sticking import Sticking
 from dpgcli.records import dataclass
+from dpgcli.states.certify import Status
 
 SLIP, RESET, NONE = "slip", "reset", "none"
 
@@ -137,6 +139,31 @@ def borne(
         shapes = shapes if rest is None else rest.take_lanes(index)
         found.append(few.columns(own, shapes, is_there[index]))
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+
+
+def bearing_together(pulled: Pulled, known: Columns, met: Sequence[Joined]) -> Columns:
+    """The columns of rows with those of fingers that touch each other as well.
+
+    Of mirrored pairs that touch the body it is not known: what pulls on them need not be mirrored.
+    """
+    columns = {name: values.copy() for name, values in known.items()}
+    for some in met:
+        is_there = np.asarray(some.fingers[0].status == Status.STABLE)
+        for at in range(0, len(some.rows), LANES):
+            index = np.arange(at, min(at + LANES, len(some.rows)))
+            few = some.take(index)
+            told = _together(pulled.take_lanes(few.rows), few, is_there[index])
+            for name, values in told.items():
+                columns[name][few.rows] = values
+    return columns
+
+
+def _together(pulled: Pulled, met: Joined, is_there: Flags) -> Columns:
+    if not met.own.is_mirrored:
+        return pulled.columns(met.own, met.shapes, is_there)
+    is_known = is_there & ~(met.fingers[0].push > 0.0).any(axis=0)
+    payload = np.where(is_known, 0.0, np.nan)
+    return {"payload_N": payload, "fails_first": np.where(is_known, SLIP, "")}
 
 
 def followed(

@@ -9,7 +9,7 @@ second place of a finger supports them, and mere forces would not keep them: of 
 do so too, and go to nothing as the forces do.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeGuard
 
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Indices, rotated
 from dpgcli.design.bodies import Body, Jaws, Polygon, gives_way
 from dpgcli.design.scene import Held
-from dpgcli.grasping.approach import Approach, Reset, approach
+from dpgcli.grasping.approach import Approach, Load, approach
 from dpgcli.grasping.closing import Closing, closed, with_reach
 from dpgcli.grasping.contact import STIFFER, Obstructed
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import Grasped, Placed, described
+from dpgcli.grasping.grasp import Grasped, Placed, described, resets_of
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.mechanics.aperture import KeptApart
 from dpgcli.mechanics.face import Pivot
@@ -150,17 +150,10 @@ def _let_go(
         away = np.flatnonzero(status == Status.NOT_HELD)
         gone.shapes.put(away, start.take_lanes(away))
     fingers = described(own, codes, gone, status, with_margins=with_margins)
-    events = [_events(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
+    events = [resets_of(part.grown.resets, index) for part, index in zip(parts, lanes, strict=True)]
     told = zip(fingers, events, strict=True)
     fingers = tuple(replace(finger, resets=(*before, *finger.resets)) for finger, before in told)
     return fingers, gone.shapes.coordinates[own.n_own :], gone.shapes
-
-
-def _events(resets: Sequence[Reset], index: Indices) -> Iterator[Reset]:
-    """What happened before bodies are let go of, by the rows whose lanes are at `index`."""
-    for reset in resets:
-        rows = np.flatnonzero(np.isin(index, reset.lanes))
-        yield replace(reset.take(np.searchsorted(reset.lanes, index[rows])), lanes=rows)
 
 
 def _of_jaws(motion: Motion) -> Motion:
@@ -197,7 +190,8 @@ def _are_beyond(motion: Motion, moved: Array) -> NDArray[np.bool_]:
 
 def _is_held(own: Obstructed, shapes: ContactShapes) -> NDArray[np.bool_]:
     """Which bodies are at rest, and touched at all."""
-    return np.asarray(shapes.is_there & (own.without_rounding(shapes.push) > 0.0).any(axis=0))
+    push = own.without_rounding(shapes.push[: own.n_on_bodies])
+    return np.asarray(shapes.is_there & (push > 0.0).any(axis=0))
 
 
 def together(
@@ -231,4 +225,4 @@ def released(own: Obstructed, shapes: ContactShapes) -> Approach:
     motion = replace(own.motion, hold=kept, spring=spring)
     keeping = replace(own, depth=np.zeros(1), motion=motion)
     gone = approach(keeping, shapes, begin, begin + 1.0)
-    return replace(gone, resets=tuple(replace(own, of_release=True) for own in gone.resets))
+    return replace(gone, resets=tuple(replace(own, of=Load.RELEASE) for own in gone.resets))

@@ -44,13 +44,14 @@ class ContactShapes:
 
 @dataclass(frozen=True)
 class Motion:
-    """How a body may move, by q, (motion, batch) in mm.
+    """How a body may move, or the bases of fingers, by q, (motion, batch) in mm.
 
     `directions` (2, motion, 1 or batch) are the ways it moves, in the frame of each finger; with
     `pivots` in these frames it turns, too, by a q before all others. `resistance` is the law of the
     last q, if any. `hold` (motion, batch) N keeps it where it is at a load of 0, and lets go of it
     until 1; so does a `spring` (1, 1 or batch) N/mm on each q, if there is one. With a `travel` D
-    (motion, batch), mm, it does not move by itself: q is (λ − 1) D.
+    (motion, batch), mm, it does not move by itself: q is (λ − 1) D. Where it `is_of_bases` each
+    finger moves with what it touches but the other finger.
     """
 
     directions: tuple[Array, ...]
@@ -59,6 +60,7 @@ class Motion:
     travel: Array | None = None
     pivots: tuple[Pivot, ...] = ()
     spring: Array | None = None
+    is_of_bases: bool = False
 
     @property
     def n(self) -> int:
@@ -89,6 +91,7 @@ class Motion:
             None if self.travel is None else take_lanes(self.travel, index),
             tuple(pivot.take_lanes(index) for pivot in self.pivots),
             None if self.spring is None else take_lanes(self.spring, index),
+            self.is_of_bases,
         )
 
 

@@ -13,8 +13,10 @@ from dpgcli.design.outputs import Output
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing, event_text
+from dpgcli.grasping.costs import is_moving
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, blocks, placed, told
+from dpgcli.grasping.joining import Joined, joined
 from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by, turned_by, turns
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import Stations
@@ -45,7 +47,18 @@ COLUMNS = (
         outputs=FORCES,
     ),
     Column("finger_force_y_N", "N", "the same along y", outputs=FORCES),
-    Column("squeeze_N", "N", "closing force between the two fingers", outputs=FORCES),
+    Column(
+        "squeeze_N",
+        "N",
+        "closing force of the two fingers on the body, or of one on the other",
+        outputs=FORCES,
+    ),
+    Column(
+        "between_fingers_N",
+        "N",
+        "force of the two fingers on each other, beside the body",
+        outputs=FORCES,
+    ),
     Column("max_contact_N", "N", "largest force at one place", outputs=FORCES),
     Column(
         "payload_N", "N", "largest pull on the body along gravity that is borne", outputs=FORCES
@@ -73,7 +86,8 @@ OF_BODIES = ("object_x_mm", "object_y_mm")
 ANGLE = "object_angle_deg"
 OF_CLOSING = ("events", "tie")
 OF_FRICTION = ("payload_N", "fails_first")
-OF_PAIRS = ("squeeze_N", "aperture_mm", "overlaps")
+BETWEEN = "between_fingers_N"
+OF_PAIRS = ("squeeze_N", BETWEEN, "aperture_mm", "overlaps")
 
 
 @dataclass(frozen=True)
@@ -148,7 +162,10 @@ def grasps(
         fingers = [told(part) for part in different] * (len(parts) // len(different))
         rows = np.array(lanes)
         known = Grasps(scene, body, seen_from, tuple(fingers), rows, centers, closing=closing)
-        return _with_payload(known, parts, lanes, None)
+        is_met = len(parts) > 1 and closing is None
+        on_axis = np.asarray(body.is_mirrored)
+        met = list(joined(parts, lanes, seen_from[0].axis, on_axis)) if is_met else []
+        return _with_payload(_with_met(known, met), parts, lanes, None, met)
     found, moved, rest = let_go(parts, lanes, motion, scene.held, later)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
     is_there = found[0].status == Status.STABLE
@@ -160,23 +177,39 @@ def grasps(
     return _with_payload(known, parts, lanes, rest)
 
 
+def _with_met(found: Grasps, met: Sequence[Joined]) -> Grasps:
+    """With fingers that overlapped, and have come together."""
+    if not met:
+        return found
+    fingers, pairs = [[finger] for finger in found.fingers], found.pairs.copy()
+    n_before = np.array([len(finger.code) for finger in found.fingers])
+    for some in met:
+        pairs[:, some.rows] = n_before[:, None] + np.arange(len(some.rows))
+        n_before = n_before + len(some.rows)
+        for own, told_ in zip(fingers, some.fingers, strict=True):
+            own.append(told_)
+    return replace(found, fingers=tuple(Grasped.joined(own) for own in fingers), pairs=pairs)
+
+
 def _with_payload(
     found: Grasps,
     parts: Sequence[Placed],
     lanes: Sequence[NDArray[np.int64]],
     rest: ContactShapes | None,
+    met: Sequence[Joined] = (),
 ) -> Grasps:
     """With what friction bears, if there is any."""
     scene = found.scene
     if scene.friction is None or found.body is None:
         return found
-    from dpgcli.grasping.pull import Pulled, borne
+    from dpgcli.grasping.pull import Pulled, bearing_together, borne
 
     of_fingers = zip(found.fingers, found.pairs, strict=True)
     status = np.max([finger.status[own] for finger, own in of_fingers], axis=0)
     pulled = Pulled(found.body, scene.held, found.frames, scene.friction, scene.gravity)
     is_there = np.asarray(status == Status.STABLE)
-    return replace(found, borne=borne(pulled, parts, lanes, rest, is_there, found.closing))
+    columns = borne(pulled, parts, lanes, rest, is_there, found.closing)
+    return replace(found, borne=bearing_together(pulled, columns, met))
 
 
 def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
@@ -185,11 +218,12 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
     if not isinstance(scene.body, Jaws):
         left_out.add(JAW_GAP)
     if scene.body is None:
-        left_out.update(OF_BODIES)
+        left_out.update((*OF_BODIES, BETWEEN))
     if not turns(scene.body, scene.held):
         left_out.add(ANGLE)
-    if closing is None:
-        left_out.update(OF_CLOSING)
+    left_out.update(OF_CLOSING if closing is None else (BETWEEN,))
+    if is_moving(scene):
+        left_out.add(BETWEEN)
     if scene.friction is None:
         left_out |= {*OF_FRICTION}
     return tuple(column for column in COLUMNS if column.name not in left_out)
@@ -236,6 +270,7 @@ def _rows(found: Grasps, happened: Sequence[Columns]) -> Columns:
         "finger_force_x_N": known(_rounded(forces[0][0], most)),
         "finger_force_y_N": known(_rounded(forces[0][1], most)),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
+        BETWEEN: known(found.fingers[0].size_between[found.pairs[0]]),
         "max_contact_N": known(most),
         "object_x_mm": found.centers[0],
         "object_y_mm": found.centers[1],
@@ -312,13 +347,12 @@ def _happened(finger: Grasped, closing: Closing | None) -> Columns:
         name: [[] for _ in range(n)] for name in ("resets", *OF_CLOSING)
     }
     for reset in finger.resets:
-        of_what = " of letting go" if reset.of_release else ""
         for place, lane in enumerate(reset.lanes):
             if not reset.flipped[:, place].any():  # it is the other finger's
                 continue
             if closing is None or reset.pressure is None:
                 units = _numbers(np.flatnonzero(reset.flipped[:, place]))
-                words["resets"][lane].append(f"{units} at {reset.load[place]:.4g}{of_what}")
+                words["resets"][lane].append(f"{units} at {reset.load[place]:.4g}{reset.of}")
                 continue
             words["events"][lane].append(event_text(reset, place, closing.pressure))
             if tied := _numbers(np.flatnonzero(reset.tied[:, place])):

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array, Columns
 from dpgcli.design.bodies import Body, Jaws, at_place
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped
-from dpgcli.grasping.table import Grasps
+from dpgcli.grasping.table import BETWEEN, Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot
 from dpgcli.reports.fingers import EDGE, MEASURE, WORD, draw_finger, handles, set_window
@@ -60,10 +60,11 @@ def draw_panels(
     bodies = [_body(found, row) for row in range(n)]
     drawn = [finger.points for own in shapes for finger in own]
     window = Window.of(np.concatenate([*bodies, *drawn]))
-    largest = float(np.nanmax(rows["max_contact_N"], initial=0.0))
+    largest = _largest(found, rows)
     grid = PanelGrid.of(n, max(map(len, titles)), window)
-    said = [*notes(found.scene), _said(largest, found.body)]
-    foot = Foot(said, partial(_handles, found.body), grid.page[0] > WIDE)
+    on_what = _on_what(found)
+    said = [*notes(found.scene), _said(largest, on_what)]
+    foot = Foot(said, partial(_handles, found.body, on_what), grid.page[0] > WIDE)
     grid = replace(grid, foot=foot.height)
     with figure_to(path, *grid.page, *described, layout=None) as figure:
         for row, fingers in enumerate(shapes):
@@ -88,6 +89,25 @@ def draw_panels(
                 middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
                 axes.text(0.5, 0.5, word, color=WORD, style="italic", **middle)
         foot.draw(figure, window, grid)
+
+
+def _largest(found: Grasps, rows: Columns) -> float:
+    """The largest force that is drawn, N."""
+    is_there = rows["status"] == Status.STABLE
+    sizes = [
+        part.push[:, own[is_there]].max(initial=0.0)
+        for finger, own in zip(found.fingers, found.pairs, strict=True)
+        for part in finger.pushes
+    ]
+    return float(max(sizes))
+
+
+def _on_what(found: Grasps) -> str:
+    """What forces are drawn on."""
+    if found.body is None:
+        return "other finger"
+    is_met = any(finger.between is not None for finger in found.fingers)
+    return "body or the other finger" if is_met else "body"
 
 
 def _draw_ghost(axes: Any, around: Points, away: Array) -> None:
@@ -158,34 +178,35 @@ def _complex(points: Array) -> Points:
 
 
 def _draw_forces(axes: Any, found: Grasps, row: int, scale: float) -> None:
-    """Arrows from the places of contact into the body; `scale` in mm per N."""
+    """Arrows from the places of contact into the body, or the finger; `scale` in mm per N."""
     body, there = found.body, _at_rest(found, row)
     moved = np.zeros(2) if body is None or there is None else there.middle - body.middle
     for place, frame in enumerate(found.frames):
         own, lane = found.take(place, row)
-        for cell in np.flatnonzero(own.push[:, lane] > 0.0):
-            way = frame.outside(own.touches.directions[:, cell, lane])
-            start = frame.placed(own.touches.places[:, cell, lane]) + moved
-            end = start + scale * own.push[cell, lane] * way
+        few = [part.take_lanes(np.array([lane])) for part in own.pushes]
+        for part, cell in [(p, c) for p in few for c in np.flatnonzero(p.push[:, 0] > 0.0)]:
+            way = frame.outside(part.touches.directions[:, cell, 0])
+            start = frame.placed(part.touches.places[:, cell, 0]) + moved
+            end = start + scale * part.push[cell, 0] * way
             arrow = {"arrowstyle": "-|>", "color": MEASURE, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
             arrow["mutation_scale"] = SHORTEST * 2.0
             axes.annotate("", end, start, arrowprops=arrow, zorder=5)
 
 
-def _handles(body: Body | None) -> list[Any]:
+def _handles(body: Body | None, on_what: str) -> list[Any]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     of_fingers = [handle for handle in handles(is_gripper=False) if handle.get_label() != "tip"]
     patch = Patch(facecolor=BODY, edgecolor=EDGE, lw=0.7, label="body")
-    label = "force on the other finger" if body is None else "force on the body"
+    label = f"force on the {on_what}"
     arrow = Line2D([], [], color=MEASURE, marker=">", lw=1.1, ms=5, label=label)
     return [*of_fingers, *(() if body is None else (patch,)), arrow]
 
 
-def _said(largest: float, body: Body | None) -> str:
+def _said(largest: float, on_what: str) -> str:
     if largest == 0.0:
-        return f"no forces on the {'other finger' if body is None else 'body'}"
+        return f"no forces on the {on_what}"
     return f"arrows are to scale: the longest is {largest:.3g} N"
 
 
@@ -201,4 +222,6 @@ def _described(rows: Columns, row: int) -> str:
         return f"{_title(rows, row)}: {status.text.replace('_', ' ')}"
     n = rows["n_contacts"][row]
     force = f", largest force {rows['max_contact_N'][row]:.4g} N" if n else ""
-    return f"{_title(rows, row)}: {n} contacts{force}"
+    between = rows[BETWEEN][row] if BETWEEN in rows else 0.0
+    met = f", {between:.4g} N between the fingers" if between else ""
+    return f"{_title(rows, row)}: {n} contacts{force}{met}"

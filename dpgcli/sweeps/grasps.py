@@ -14,8 +14,9 @@ from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, met
+from dpgcli.grasping.joining import Joined, joined
 from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by, turns
-from dpgcli.grasping.table import ANGLE, COLUMNS, OF_FRICTION, OF_PAIRS
+from dpgcli.grasping.table import ANGLE, BETWEEN, COLUMNS, OF_FRICTION, OF_PAIRS
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column, Group, Kind
@@ -24,7 +25,7 @@ from dpgcli.states.units import UnitSolutions
 
 NAMES = (
     *("pattern_after", "n_contacts", "finger_force_x_N", "finger_force_y_N", "squeeze_N"),
-    *("max_contact_N", "object_x_mm", "object_y_mm", ANGLE, "penetration_mm"),
+    *(BETWEEN, "max_contact_N", "object_x_mm", "object_y_mm", ANGLE, "penetration_mm"),
 )
 
 
@@ -70,13 +71,17 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
     seen_from = frames(own.gripper)
     parts = [_met(own, frame, codes) for frame in seen_from[:1]]
     motion, rest = motion_of(own.body, own.held, seen_from), None
-    every = np.arange(len(codes))
+    every, met = np.arange(len(codes)), list[Joined]()
     if motion is None:
         fingers = [_told(parts[0])]
         for frame in seen_from[1:]:
             part, lower = _lower(own, frame, codes, parts[0], fingers[0])
             parts.append(part)
             fingers.append(lower)
+        if len(parts) > 1:
+            is_on_axis = np.asarray(own.body.is_mirrored)
+            met = list(joined(parts, [every, every], seen_from[0].axis, is_on_axis))
+            fingers = [_with_met(finger, met, place) for place, finger in enumerate(fingers)]
         moved, turned = np.zeros((2, len(codes))), np.zeros(len(codes))
     else:
         parts += [_met(own, frame, codes) for frame in seen_from[1:]]
@@ -89,11 +94,12 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
     rows = _rows(own, seen_from, fingers, moved, turned)
     if own.friction is None:
         return rows
-    from dpgcli.grasping.pull import Pulled, borne
+    from dpgcli.grasping.pull import Pulled, bearing_together, borne
 
     pulled = Pulled(own.body, own.held, seen_from, own.friction, own.gravity)
     is_there = np.asarray(rows["grasp_status"] == Status.STABLE)
     found_ = borne(pulled, parts, [every] * len(parts), rest, is_there)
+    found_ = bearing_together(pulled, found_, met)
     return {**rows, **found_, "fails_first": found_["fails_first"].astype("S")}
 
 
@@ -106,11 +112,13 @@ class _Finger(NamedTuple):
     force: Array
     largest: Array
     gap: Array
+    between: Array
 
     @classmethod
     def of(cls, told: Grasped) -> "_Finger":
         n_contacts = np.asarray((told.push > 0.0).sum(axis=0))
-        return cls(told.status, told.after, n_contacts, told.force, told.push.max(axis=0), told.gap)
+        largest, between = told.push.max(axis=0), told.size_between
+        return cls(told.status, told.after, n_contacts, told.force, largest, told.gap, between)
 
     def with_lanes(self, index: Indices, others: "_Finger") -> "_Finger":
         """With those at `index` replaced."""
@@ -121,6 +129,7 @@ class _Finger(NamedTuple):
             _put(self.force, index, others.force),
             _put(self.largest, index, others.largest),
             _put(self.gap, index, others.gap),
+            _put(self.between, index, others.between),
         )
 
 
@@ -155,6 +164,13 @@ def _lower(
     return part.with_lanes(off, other), upper.with_lanes(off, _told(other))
 
 
+def _with_met(finger: _Finger, met: Sequence[Joined], place: int) -> _Finger:
+    """With what has become of fingers that overlapped."""
+    for some in met:
+        finger = finger.with_lanes(some.rows, _Finger.of(some.fingers[place]))
+    return finger
+
+
 def _rows(
     own: Encounter,
     seen_from: Sequence[FingerFrame],
@@ -178,6 +194,7 @@ def _rows(
         "finger_force_x_N": known(forces[0][0]),
         "finger_force_y_N": known(forces[0][1]),
         "squeeze_N": known(0.5 * (forces[-1][1] - forces[0][1])),
+        BETWEEN: known(fingers[0].between if own.held is Held.FIXED else np.nan + moved[0]),
         "max_contact_N": known(np.max([finger.largest for finger in fingers], axis=0)),
         "object_x_mm": place[0],
         "object_y_mm": place[1],

@@ -8,10 +8,18 @@ import pyarrow.parquet as pq
 import pytest
 
 from dpgcli.cli.exits import ExitCode
-from dpgcli.grasping.table import ANGLE, COLUMNS, JAW_GAP, OF_BODIES, OF_CLOSING, OF_FRICTION
+from dpgcli.grasping.table import (
+    ANGLE,
+    BETWEEN,
+    COLUMNS,
+    JAW_GAP,
+    OF_BODIES,
+    OF_CLOSING,
+    OF_FRICTION,
+)
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-LEFT_OUT = (ANGLE, JAW_GAP, *OF_BODIES, *OF_CLOSING, *OF_FRICTION)
+LEFT_OUT = (ANGLE, JAW_GAP, BETWEEN, *OF_BODIES, *OF_CLOSING, *OF_FRICTION)
 NAMES = [column.name for column in COLUMNS if column.name not in LEFT_OUT]
 
 
@@ -80,3 +88,19 @@ def test_a_finger_alone_is_told_what_to_give(call: Any, folder: Path, gripper: s
     assert result.exit_code == ExitCode.USAGE
     assert "--object: expected a body such as disc:40" in result.stderr
     assert "two fingers, of a gripper, go without" in result.stderr
+
+
+def test_about_a_body_they_meet_as_well(call: Any, folder: Path, gripper: str) -> None:
+    """The row, the summary and the figure say so."""
+    about = ("--object", "disc:18", "--at", "25,0", "-s", "gripper.base_spacing_mm=30")
+    soft = ("-s", "finger.calibration=finite_elements", "--pattern", "10000")
+    told = ("--format", "json", "--plot", "both.svg")
+    result = call("grasp", gripper, *about, *soft, *told)
+    assert result.exit_code == ExitCode.DONE
+    (row,) = json.loads(result.stdout)
+    assert row["n_contacts"] == 2 and row["between_fingers_N"] > 0.01 and not row["overlaps"]
+    assert row["squeeze_N"] == -row["finger_force_y_N"] > 0.1
+    assert "1 state in which the fingers touch each other\n" in result.stderr
+    drawn = (folder / "both.svg").read_text(encoding="utf-8")
+    assert "force on the body or the other finger" in drawn
+    assert f"{row['between_fingers_N']:.4g} N between the fingers" in drawn

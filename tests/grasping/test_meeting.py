@@ -145,8 +145,8 @@ def way_of(known: Any, gripper: Gripper, pair: Any) -> float:
         raise KnownError
 
     with pytest.MonkeyPatch.context() as patch:
-        way = meeting._way
-        patch.setattr(meeting, "_way", told)
+        way = meeting.way_of
+        patch.setattr(meeting, "way_of", told)
         with pytest.raises(KnownError):
             meeting._met(*known, frames(gripper), pair)
     return found[0]

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array
 from dpgcli.design.bodies import Body, Disc, Jaws
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import grasp
-from dpgcli.grasping.approach import Reset, Way
+from dpgcli.grasping.approach import Load, Reset, Way
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.grasp import placed
 from dpgcli.grasping.release import motion_of, released, together
@@ -292,7 +292,7 @@ def test_resets_before_letting_go_are_told(reference_finger: Fingers) -> None:
     flags = np.eye(5, 2, dtype=bool)
     lanes, load, push = np.array([0, 2]), np.array([0.25, 0.5]), np.zeros((1, 2))
     one = Reset(lanes, load, flags, push, ~flags, flags & False)
-    gone = replace(one, of_release=True)
+    gone = replace(one, of=Load.RELEASE)
     told = replace(found, fingers=(replace(upper, resets=(one, gone)), replace(lower, resets=())))
     assert grasp_rows(told)["resets"].tolist() == [
         "1 at 0.25; 1 at 0.25 of letting go/–",

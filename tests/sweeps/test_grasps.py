@@ -65,6 +65,15 @@ def test_bodies_by_design(body: Body, key: str, column: list[float]) -> None:
     assert n_touching > 0
 
 
+def test_between_fingers_about_bodies_that_move_nothing_is_known() -> None:
+    one, code = Disc(CENTER[:, None], np.array([10.0])), np.array([6], np.uint64)
+    gripper = Gripper(np.array([30.0]), np.array([0.1]))
+    given = UnitSolutions.of(FINGER), np.array([1.5]), gripper, one
+    for held, is_known in ((Held.FIXED, True), (Held.GUIDED, False)):
+        rows = grasp_rows(Encounter(*given, held), code)
+        assert np.isfinite(rows["between_fingers_N"]).tolist() == [is_known]
+
+
 @pytest.mark.parametrize(
     ("body", "key"),
     [

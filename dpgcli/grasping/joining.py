@@ -1,0 +1,180 @@
+"""Fingers that overlap about a body come together from where they just touch: see `meeting`.
+
+Each has met the body as if it were alone. Where the two do not overlap then, that is all. Where
+they do, their bases come together, and they touch the body and each other: only these pay.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dpgcli.arrays import Array, Codes, Flags, Indices, distinct
+from dpgcli.design.scene import Scene
+from dpgcli.grasping.approach import Approach, Load
+from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.frames import frames
+from dpgcli.grasping.grasp import Grasped, Placed, blocks, described, grown, resets_of
+from dpgcli.grasping.meeting import (
+    along_axis,
+    apart,
+    bearing_sideways,
+    beyond_axis,
+    coming_together,
+    pair_blocks,
+    way_of,
+    with_lost,
+)
+from dpgcli.grasping.release import together
+from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.mechanics.face import Face
+from dpgcli.mechanics.mirror import Axis
+from dpgcli.mechanics.terms import Formulate
+from dpgcli.records import dataclass
+from dpgcli.states.accuracy import DEFAULT_TOLERANCE
+from dpgcli.states.certify import Status
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.settle import settle
+from dpgcli.states.units import UnitSolutions
+
+OVERLAP = 1e-9  # mm: what is less is a touch
+ROWS = 2**12  # that are looked at at once
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Fingers that have come together: those of some `rows`, with what they are in the end.
+
+    `own` and `shapes` are those of both, or of one of two that are mirror images.
+    """
+
+    rows: Indices
+    fingers: tuple[Grasped, Grasped]
+    own: Obstructed
+    shapes: ContactShapes
+
+    def take(self, index: Indices) -> "Joined":
+        """Some of the rows, by their places here."""
+        upper, lower = (finger.take_lanes(index) for finger in self.fingers)
+        own, shapes = self.own.take_lanes(index), self.shapes.take_lanes(index)
+        return Joined(self.rows[index], (upper, lower), own, shapes)
+
+
+def joined(
+    parts: Sequence[Placed], lanes: Sequence[Indices], axis: Axis, is_on_axis: Flags
+) -> Iterator[Joined]:
+    """The rows whose fingers overlap about their body, come together: those at `lanes` of parts.
+
+    Two in one state are mirror images if the body is on the axis, or as long as neither touches it.
+    """
+    n_units = parts[0].own.units.finger.n_units
+    codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
+    touched = [_are_touched(part)[index] for part, index in zip(parts, lanes, strict=True)]
+    is_alike = (codes[0] == codes[1]) & (is_on_axis | ~np.any(touched, axis=0))
+    travel = _overlap(parts, lanes, axis, is_alike)
+    others = (travel > 0.0) & ~is_alike
+    alike = np.flatnonzero((travel > 0.0) & is_alike)
+    for some in blocks(len(alike), n_units) if len(alike) else ():
+        rows = alike[some]
+        own = axis.take_lanes(rows)
+        met = _mirrored(parts[0], lanes[0][rows], own, rows)
+        is_off = ~np.broadcast_to(is_on_axis, len(travel))[rows]
+        if is_off.any():
+            both = met.fingers[0], _mirrored(parts[1], lanes[1][rows], own, rows).fingers[0]
+            is_left = is_off & np.any([(f.push > 0.0).any(axis=0) for f in both], axis=0)
+            others[rows[is_left]] = True
+            met = replace(met, fingers=both).take(np.flatnonzero(~is_left))
+        yield met
+    rest = np.flatnonzero(others)
+    for some in pair_blocks(len(rest), n_units):
+        rows = rest[some]
+        few = [index[rows] for index in lanes]
+        yield _paired(parts, few, axis.take_lanes(rows), rows, travel[rows])
+
+
+def _are_touched(part: Placed) -> Flags:
+    """Which lanes touch their body."""
+    return np.asarray((part.own.without_rounding(part.grown.shapes.push) > 0.0).any(axis=0))
+
+
+def _overlap(
+    parts: Sequence[Placed], lanes: Sequence[Indices], axis: Axis, is_alike: Flags
+) -> Array:
+    """How far apart bases are moved for fingers just to touch, mm, (row,).
+
+    0 where they do not overlap, or are not at rest. Rows that are alike are mirrored pairs.
+    """
+    nodes = [_ended(part) for part in parts]
+    travel = np.zeros(len(is_alike))
+    for first in range(0, len(travel), ROWS):
+        rows = np.arange(first, min(first + ROWS, len(travel)))
+        own = axis.take_lanes(rows)
+        upper, lower = (
+            along_axis(own, at[..., index[rows]]) for at, index in zip(nodes, lanes, strict=True)
+        )
+        beyond = -2.0 * upper[1].min(axis=0)
+        travel[rows] = np.where(is_alike[rows], beyond, way_of(upper, lower))
+    each = [part.status[index] == Status.STABLE for part, index in zip(parts, lanes, strict=True)]
+    return np.where(np.all(each, axis=0) & (travel > OVERLAP), travel, 0.0)
+
+
+def n_overlapping(scene: Scene, formulate: Formulate, pairs: Sequence[Codes]) -> int:
+    """How many pairs, but for mirrored ones, have free fingers that reach past each other.
+
+    States of the upper and the lower finger, (row,) each: about so many come together.
+    """
+    assert scene.layer_thickness is not None and scene.body is not None, "faces, and a body"
+    needed = distinct(np.concatenate(list(pairs)))
+    pattern = inverted_units(needed, scene.finger.n_units)
+    free = settle(UnitSolutions.of(scene.finger), formulate, pattern, DEFAULT_TOLERANCE)
+    face = Face.of(free.potential.coordinates, np.reshape(scene.layer_thickness, (1, -1)))
+    nodes = face.with_end().shape(free.equilibrium.coordinates).nodes
+    lowest = frames(scene.gripper)[0].axis.height(nodes).min(axis=0)
+    upper, lower = (lowest[np.searchsorted(needed, codes)] for codes in pairs)
+    is_alike = (pairs[0] == pairs[1]) & bool(scene.body.is_mirrored)
+    return int(((upper + lower < -OVERLAP) & ~is_alike).sum())
+
+
+def _ended(part: Placed) -> Array:
+    """The nodes of faces and ends, (2, node, lane), mm."""
+    return part.own.faces[0].with_end().shape(part.grown.shapes.coordinates).nodes
+
+
+def _mirrored(part: Placed, lanes: Indices, axis: Axis, rows: Indices) -> Joined:
+    """Those that are mirror images: each comes to the axis."""
+    shapes, status = part.grown.shapes.take_lanes(lanes), part.status[lanes]
+    own = replace(part.own.take_lanes(lanes), axis=axis, is_mirrored=True)
+    x = shapes.coordinates
+    coming = replace(own, depth=np.zeros(1), apart=beyond_axis(own, x))
+    came = grown(coming, x, shapes.inverted, status == Status.STABLE, None, shapes.push)
+    rest = _told(came, came.shapes)
+    status = with_lost(status, rest.shapes.is_there)
+    (found,) = described(own, [part.codes[lanes]], rest, status)
+    found = bearing_sideways(found, own, rest)
+    found = replace(found, resets=(*resets_of(part.grown.resets, lanes), *found.resets))
+    return Joined(rows, (found, found), own, rest.shapes)
+
+
+def _paired(
+    parts: Sequence[Placed], lanes: Sequence[Indices], axis: Axis, rows: Indices, travel: Array
+) -> Joined:
+    """Others: both fingers are unknown."""
+    bare, start = together(parts, lanes, None)
+    own = replace(bare, axis=axis)
+    status = np.max([part.status[i] for part, i in zip(parts, lanes, strict=True)], axis=0)
+    coming = apart(own, travel)
+    came = coming_together(coming, start.coordinates, start.inverted, status, None, start.push)
+    rest = _told(came, coming.at_rest(came.shapes))
+    codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
+    fingers = described(own, codes, rest, with_lost(status, rest.shapes.is_there))
+    upper, lower = (
+        replace(finger, resets=(*resets_of(part.grown.resets, index), *finger.resets))
+        for finger, part, index in zip(fingers, parts, lanes, strict=True)
+    )
+    return Joined(rows, (upper, lower), own, rest.shapes)
+
+
+def _told(came: Approach, shapes: ContactShapes) -> Approach:
+    """What happened as bases came together, with the body in full."""
+    resets = tuple(replace(reset, of=Load.MEETING) for reset in came.resets)
+    return Approach(shapes, 0.0 * came.load + 1.0, resets)
