@@ -1,13 +1,9 @@
 """Domes that rest against their neighbors without a push: which go on in touch, and which apart.
 
-At such a place both laws hold. As pressures begin to change each dome either goes on in touch, and
-its push must not become a pull, or apart, and it must not run into its neighbor: with the rate r of
-its free force, E' − p A at its neighbor's place, r ≤ 0 in touch and r ≥ 0 apart. What the others do
-is in that rate: bars and hinges between the units move a neighbor away, or towards a dome whose own
-pressure does not change. This is a linear complementarity problem, whose matrix is that of stable
-fingers, positive definite: it has one solution (Cottle, Pang, Stone, The Linear Complementarity
-Problem, 1992, section 3.3), and changing the first wrong one again and again finds it (Murty 1974;
-there 4.2). All wrong ones at once is mostly faster, and is tried before.
+At such a place both laws hold (`equilibrium.beginning`). With the rate r of a dome's free force,
+E' − p A at its neighbor's place, r ≤ 0 in touch and r ≥ 0 apart. What the others do is in that
+rate: bars and hinges between the units move a neighbor away, or towards a dome whose own pressure
+does not change.
 """
 
 from dataclasses import replace
@@ -15,15 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from dpgcli.actuation.domes import PressedDomes
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array, Flags, Indices
+from dpgcli.equilibrium.beginning import NO_RATE, about_to_act
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.loaded import LoadedPotential, along
 from dpgcli.equilibrium.steps import AWAY
 from dpgcli.mechanics.coordinates import FingerCoordinates
-
-NO_RATE = 1e-9  # of the largest rate: less is rounding, or of second order
-AT_ONCE = 4  # times, before one after the other
-PASSES = 8  # for each unit
 
 PressedFamily = LoadedPotential[FingerCoordinates, PressedDomes]
 
@@ -36,19 +29,12 @@ def about_to_touch(family: PressedFamily, coordinates: Array) -> Flags | None:
     law = family.law
     if law.touching is None:
         return None
-    value = family.measure(coordinates).value
-    is_level, touching = _level(law, value), law.touching.copy()
-    lanes = np.flatnonzero(is_level.any(axis=0))
-    for count in range(PASSES * len(value)):
-        if not len(lanes):
-            break
-        own = family.take_lanes(lanes)
-        wrong = _wrong(own, coordinates[:, lanes], touching[:, lanes], is_level[:, lanes])
-        if count >= AT_ONCE:
-            wrong &= np.arange(len(wrong))[:, None] == wrong.argmax(axis=0)
-        touching[:, lanes] ^= wrong
-        lanes = lanes[wrong.any(axis=0)]
-    return touching
+
+    def are_wrong(lanes: Indices, touching: Flags) -> Flags:
+        return _wrong(family.take_lanes(lanes), coordinates[:, lanes], touching)
+
+    is_level = _level(law, family.measure(coordinates).value)
+    return about_to_act(law.touching, is_level, are_wrong)
 
 
 def with_touching(family: PressedFamily, touching: Flags | None) -> PressedFamily:
@@ -64,8 +50,8 @@ def _level(law: PressedDomes, value: Array) -> Flags:
     return np.asarray(is_rest & (law.touching | (value <= law.furthest)))
 
 
-def _wrong(family: PressedFamily, coordinates: Array, touching: Flags, is_level: Flags) -> Flags:
-    """Domes between both that would pull, or run into their neighbors, (unit, batch).
+def _wrong(family: PressedFamily, coordinates: Array, touching: Flags) -> Flags:
+    """Domes that would pull in touch, or apart run into their neighbors, (unit, batch).
 
     None where the finger loses its balance with these in touch: that is for its path to tell.
     """
@@ -79,4 +65,4 @@ def _wrong(family: PressedFamily, coordinates: Array, touching: Flags, is_level:
     rate = by_neighbor + by_pressure
     least = NO_RATE * (np.abs(by_neighbor) + np.abs(by_pressure)).max(axis=0)
     is_wrong = np.where(touching, rate > least, rate < -least)
-    return np.asarray(is_wrong & is_level & here.is_fine)
+    return np.asarray(is_wrong & here.is_fine)

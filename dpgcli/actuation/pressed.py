@@ -31,7 +31,7 @@ from dpgcli.mechanics.curve import Spline
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
-from dpgcli.mechanics.terms import chain_potential, springs_merged
+from dpgcli.mechanics.terms import chain_potential, springs_merged, without_domes
 from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import inverted_wells
@@ -171,9 +171,8 @@ class Pressed:
     @cached_property
     def _bare(self) -> Potential[FingerCoordinates]:
         """The energy without domes."""
-        whole = chain_potential(self.finger)
-        others = tuple(term for term in whole.terms if term.kind != "bistable")
-        return Potential(whole.coordinates, springs_merged(whole.coordinates, others))
+        bare = without_domes(chain_potential(self.finger))
+        return Potential(bare.coordinates, springs_merged(bare.coordinates, bare.terms))
 
     def family(
         self, shapes: Shapes, target: Array

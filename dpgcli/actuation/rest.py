@@ -7,6 +7,7 @@ import numpy as np
 from dpgcli.actuation.domes import PushingDomes
 from dpgcli.actuation.pressed import Pressed, Shapes
 from dpgcli.arrays import Array, Flags
+from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.accuracy import DEFAULT_TOLERANCE
 from dpgcli.states.certify import Settled, Status
@@ -40,7 +41,9 @@ def at_rest(pressed: Pressed, inverted: Flags) -> tuple[Shapes, Settled]:
     shapes = Shapes(coordinates, np.zeros(inverted.shape), inverted.copy())
     if pressed.stretches is not None:
         shapes = _with_places(pressed, shapes)
-        is_closed = (settled.status == Status.STABLE) & _closed(pressed, shapes)
+        extension = pressed.extensions(shapes.coordinates)
+        closed = are_closed(pressed.finger, extension, shapes.inverted).any(axis=0)
+        is_closed = (settled.status == Status.STABLE) & closed
         status = np.where(is_closed, Status.GAP_CLOSED, settled.status).astype(np.uint8)
         settled = replace(settled, status=status)
     return shapes, settled
@@ -55,18 +58,27 @@ def _with_places(pressed: Pressed, shapes: Shapes) -> Shapes:
     extension = pressed.extensions(shapes.coordinates)
     highest = finger.law.touching(finger.domes).highest
     touching = shapes.inverted & (extension <= highest) if finger.is_loaded else shapes.inverted
-    begin = np.where(shapes.inverted, np.minimum(extension, highest), -finger.domes.contact)
-    law = pressed.domes(shapes.pressure, begin)
-    assert isinstance(law, PushingDomes), "others have no places"
-    return replace(shapes, touching=touching.copy(), place=law.high)
+    place = own_places(pressed, extension, shapes.inverted)
+    return replace(shapes, touching=touching.copy(), place=place)
 
 
-def _closed(pressed: Pressed, shapes: Shapes) -> Flags:
-    """Where a gap is closed beyond the place of its dome, which is at rest, (batch,)."""
+def own_places(pressed: Pressed, extension: Array, inverted: Flags) -> Array:
+    """Where domes that only push rest by themselves without pressure, mm, (unit, batch).
+
+    Inverted ones go on to there from the extensions of their units.
+    """
     finger = pressed.finger
+    highest = finger.law.touching(finger.domes).highest
+    begin = np.where(inverted, np.minimum(extension, highest), -finger.domes.contact)
+    law = pressed.domes(np.zeros(inverted.shape), begin)
+    assert isinstance(law, PushingDomes), "others have no places"
+    return law.high
+
+
+def are_closed(finger: Finger, extension: Array, inverted: Flags) -> Flags:
+    """Gaps that are closed beyond the places of domes at rest, (…, unit, batch)."""
     place: Array = -finger.domes.contact - CLOSED * finger.stroke
-    is_beyond = ~shapes.inverted & (pressed.extensions(shapes.coordinates) < place)
-    return np.asarray(is_beyond.any(axis=0))
+    return np.asarray(~inverted & (extension < place))
 
 
 def is_certified(pressed: Pressed, shapes: Shapes) -> Flags:

@@ -243,8 +243,8 @@ def along(rows: tuple[Row, ...], measured: Measured | WideMeasured, direction: A
     """∇q · v of every cell, (cell, batch), for a direction v, (size, batch)."""
     if isinstance(measured, WideMeasured):
         return total(measured.gradient * direction[[row.offset for row in rows]][:, None])
-    parts = []
-    for row, slope in zip(rows, measured.gradient, strict=True):
+    parts, slopes = [], measured.gradient or (np.ones((1, 1)),)
+    for row, slope in zip(rows, slopes, strict=True):
         clamped = 1 if row.offset < 0 else 0
         taken = direction[row.offset + clamped * row.stride :: row.stride]
         part = np.zeros(measured.value.shape)

@@ -18,6 +18,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished, relaxed
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.ties import tied
+from dpgcli.grasping.travels import about_to_change, with_lost
 from dpgcli.records import dataclass
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
@@ -201,7 +202,11 @@ class _Journey:
         own, few = obstructed.take_lanes(lanes), shapes.take_lanes(lanes)
         fresh = np.flatnonzero(self.fresh[lanes])
         if len(fresh):
-            few.put(fresh, own.take_lanes(fresh).relabeled(few.take_lanes(fresh)))
+            begun = own.take_lanes(fresh)
+            again = begun.relabeled(few.take_lanes(fresh))
+            if own.n_travels:
+                again = about_to_change(begun, again, self.load[lanes[fresh]])
+            few.put(fresh, again)
             shapes.put(lanes, few)
         family, stacked = own.family(few.inverted, few.active), own.stacked(few)
         walk = self.walk and self.walk.resized(len(stacked))
@@ -342,7 +347,8 @@ def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
     cell, lanes = np.maximum(ends.cell, 0), np.arange(len(ends.cell))
     is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
     is_jump &= ends.outcome == PathEnd.EVENT
-    return replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
+    ends = replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
+    return with_lost(own, before, ends)
 
 
 def _at_ends(own: Obstructed, before: ContactShapes, ends: Ends) -> ContactShapes:

@@ -14,6 +14,7 @@ from dpgcli.design.pressure import History, Pressure
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.shapes import ContactShapes, Ramp
+from dpgcli.grasping.travels import with_travels, without_travels
 from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.records import dataclass
 
@@ -30,7 +31,7 @@ class Closing:
 def closed(own: Obstructed, start: Approach, closing: Closing) -> Approach:
     """Let pressures change beside bodies; what flips is told by pressures."""
     by_unit = closing.history.pressure[:, closing.pressure.line_of]
-    return driven(own, start, closing.volumes, by_unit[..., None])
+    return at_rest(own, driven(own, start, closing.volumes, by_unit[..., None]), closing.volumes)
 
 
 def driven(
@@ -42,10 +43,12 @@ def driven(
 ) -> Approach:
     """The same by pressures on each finger, (step, unit, 1 or lane) in MPa.
 
-    They `begin` at none, unless that is given.
+    They `begin` at none, unless that is given, and the fingers have come there this way.
     """
     shapes, resets, n = start.shapes, list(start.resets), len(start.load)
     before = 0.0 * pressures[0] if begin is None else begin
+    if begin is None:
+        shapes = with_travels(replace(own, ramp=Ramp(volumes, before, before)), shapes)
     for target in pressures:
         ramp = Ramp(volumes, before, target - before)
         under = replace(own, depth=np.zeros(1), ramp=ramp)
@@ -54,6 +57,13 @@ def driven(
         is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
         shapes, before = replace(came.shapes, is_there=is_sound), target
     return replace(start, shapes=shapes, resets=tuple(resets))
+
+
+def at_rest(own: Obstructed, came: Approach, volumes: DomeVolumes) -> Approach:
+    """Fingers that have come to no pressure, as states."""
+    none = np.zeros((own.units.finger.n_units, 1))
+    under = replace(own, ramp=Ramp(volumes, none, none))
+    return replace(came, shapes=without_travels(under, came.shapes))
 
 
 def _told_by_pressure(told: Reset, ramp: Ramp, n_fingers: int) -> Reset:

@@ -2,6 +2,16 @@
 
 A body that may move has coordinates of its own, behind those of the fingers that it touches. Where
 it does not, fingers know nothing of each other, and each is a scene by itself.
+
+Domes that only push touch their neighbors as fingers touch a body: without pulling, and without
+running into them. While pressures change each has its own travel as a coordinate, behind the
+body's, with the energy of its curve and its pressure; its neighbor is in its way, one more contact
+among those with the body. So domes that leave their neighbors, meet them again, and snap by
+themselves are contacts that open and close and folds, as all others are, and a path has one
+complementarity for both. (Without a body `actuation` leaves the travels of domes that are apart
+out: they do not act on the finger. For the same paths this is the longer way, and the shorter one
+for what contacts decide.) Without pressure travels are not needed: an inverted dome acts while it
+is in touch, one in its ground state not at all.
 """
 
 from collections.abc import Iterator
@@ -22,6 +32,7 @@ from dpgcli.equilibrium.constraints import (
 )
 from dpgcli.equilibrium.contracts import (
     Coordinates,
+    Measure,
     OwnCoordinate,
     Row,
     Term,
@@ -33,13 +44,21 @@ from dpgcli.equilibrium.loaded import LoadedPotential, ShareOfLaw
 from dpgcli.equilibrium.potential import Potential
 from dpgcli.grasping.shapes import ContactShapes, Motion, Ramp
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
+from dpgcli.mechanics.dome_gaps import DomeGaps
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import FaceGaps
+from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.mirror import Axis, Heights, NodeGaps, OfNodes, Touching
 from dpgcli.mechanics.obstacle import Obstacle
 from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.mechanics.sticking import Sticking
-from dpgcli.mechanics.terms import DeadLoad, Formulate, Quadratic
+from dpgcli.mechanics.terms import (
+    DeadLoad,
+    DomeSprings,
+    Formulate,
+    Quadratic,
+    without_domes,
+)
 from dpgcli.records import dataclass
 from dpgcli.states.units import UnitSolutions
 
@@ -56,9 +75,10 @@ class Obstructed:
     There are as many fingers to a lane as there are `bodies`: what the body is in the frame of
     each. Fingers that meet each other have an `axis`, in which their frames are mirror images: two
     of them do, with or without a body, and one alone that `is_mirrored` meets its mirror image
-    there. Arrays by unit are those of the first finger, then of the next; so are those by cell, of
-    bodies before those between fingers. Coordinates are interleaved (`equilibrium.joined`), those
-    of the `motion` behind them.
+    there. Arrays by unit are those of the first finger, then of the next; so are those by cell.
+    Coordinates are interleaved (`equilibrium.joined`), those of the `motion` behind them, then
+    those of domes by themselves. Cells are gaps to bodies, then those between fingers, then those
+    between domes and neighbors, then what is prescribed.
 
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm; and mirror images may come
@@ -198,9 +218,9 @@ class Obstructed:
         for bare in self.contacts:
             n = sum(measure.n_cells for measure in gaps)
             gaps.append(bare.with_first(None if first is None else first[n : n + bare.n_cells]))
-        if self.motion is None and len(gaps) == 1:
+        if self.motion is None and not self.n_travels and len(gaps) == 1:
             return gaps[0]
-        return Together((*gaps, *self._prescribed), self.n_own + self._n_motions)
+        return Together((*gaps, *self._dome_gaps, *self._prescribed), self._n_frame)
 
     def each(self, push: Array) -> Iterator[tuple[FaceGaps, Array]]:
         """The gaps of each finger to its body, and what belongs to them of pushes (cell, …)."""
@@ -212,6 +232,33 @@ class Obstructed:
     @property
     def _n_motions(self) -> int:
         return 0 if self.motion is None else self.motion.n
+
+    @cached_property
+    def n_travels(self) -> int:
+        """Domes with coordinates of their own: those that only push, while pressures change."""
+        has_own = self.ramp is not None and isinstance(self.units.finger.law, PushOnly)
+        return self.n_fingers * self.units.finger.n_units if has_own else 0
+
+    @property
+    def _n_frame(self) -> int:
+        """Coordinates of fingers, body and domes."""
+        return self.n_own + self._n_motions + self.n_travels
+
+    @property
+    def travels(self) -> tuple[OwnCoordinate, ...]:
+        """Where the domes of each finger are by themselves, as extensions of their springs, mm."""
+        n, first = self.units.finger.n_units, self.n_own + self._n_motions
+        places = range(first, first + self.n_travels, n)
+        return tuple(OwnCoordinate(Row(1, place), n) for place in places)
+
+    @cached_property
+    def _dome_gaps(self) -> tuple[DomeGaps, ...]:
+        """Those of each finger between domes by themselves and their neighbors."""
+        if not self.n_travels:
+            return ()
+        own = (self.formulate(self.units.finger),) * self.n_fingers
+        pairs = zip(self._extensions(own), self.travels, strict=True)
+        return tuple(DomeGaps(extension, travel) for extension, travel in pairs)
 
     @property
     def _motions(self) -> OwnCoordinate:
@@ -247,7 +294,8 @@ class Obstructed:
     def are_kept(self) -> Flags:
         """Cells that are no gaps, (cell, 1)."""
         n_others = sum(measure.n_cells for measure in self._prescribed)
-        return (np.arange(self.n_gaps + n_others) >= self.n_gaps)[:, None]
+        n_contacts = self.n_gaps + self.n_travels
+        return (np.arange(n_contacts + n_others) >= n_contacts)[:, None]
 
     @property
     def _deep(self) -> Array:
@@ -280,8 +328,10 @@ class Obstructed:
         return (load - 1.0) * self._deep
 
     def potentials(self, inverted: Flags) -> tuple[FingerPotential, ...]:
-        """The energies of the fingers without contact."""
+        """The energies of the fingers without contact, and without domes that are by themselves."""
         n = self.units.finger.n_units
+        if self.n_travels:
+            return (without_domes(self.formulate(self.units.finger)),) * self.n_fingers
         parts = inverted.reshape(self.n_fingers, n, -1)
         return tuple(self.formulate(self.units.finger.with_domes(part)) for part in parts)
 
@@ -295,6 +345,11 @@ class Obstructed:
         if self.motion is not None:
             soft = self.stiffness / STIFFER
             system = Extended[Coordinates](joined, self.motion.n, self.large, soft)
+        if self.n_travels:
+            finger = self.units.finger
+            scales = 0.2 * finger.stroke, finger.force_scale / finger.stroke
+            length, stiffness = map(self._by_finger, scales)
+            system = Extended[Coordinates](system, self.n_travels, length, stiffness)
         terms = self._terms_of(own)
         grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing_of(own))
         return Potential(system, (*terms, *grown))
@@ -307,7 +362,10 @@ class Obstructed:
         resisting = () if resistance is None else (Term("body", self._opening, resistance),)
         holding = self._holding(1.0)
         pressing = () if self.ramp is None else self._pressing(own, self.ramp.begin)
-        return (*(term for part in terms for term in part), *resisting, *holding, *pressing)
+        finger = self.units.finger
+        law = DomeSprings(finger.law.pulling, finger.domes)
+        domes = (Term("domes", travel, law) for travel in self.travels)
+        return (*(term for part in terms for term in part), *domes, *resisting, *holding, *pressing)
 
     def _growing_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
         """The terms of which the load is the share that acts.
@@ -333,7 +391,11 @@ class Obstructed:
         work = PressureWork(pressure, self.ramp.volumes, self.units.finger.domes)
         return tuple(Term("pressure", dome, work) for dome in self._domes_of(own))
 
-    def _domes_of(self, own: tuple[FingerPotential, ...]) -> tuple[OfPart, ...]:
+    def _domes_of(self, own: tuple[FingerPotential, ...]) -> tuple[OfPart | OwnCoordinate, ...]:
+        """What pressures move of each finger: extensions of the domes' springs, or their own."""
+        return self.travels or self._extensions(own)
+
+    def _extensions(self, own: tuple[FingerPotential, ...]) -> tuple[OfPart, ...]:
         """Extensions of the domes' springs of each finger."""
         n, size = len(own), self.n_own
         return tuple(
@@ -359,6 +421,7 @@ class Obstructed:
             active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
         )
         terms = (*self._terms_of(own), multiplier_term(system))
+        beside = np.concatenate((active[: self.n_gaps], active[self.n_gaps + self.n_travels :]))
         return LoadedPotential(
             system,
             terms,
@@ -367,10 +430,12 @@ class Obstructed:
             *self._followed(self._domes_of(own)),
             self._growing_of(own),
             n_multipliers=multiplied.n,
-            may_kink=np.asarray(active.any(axis=0)),
+            may_kink=np.asarray(beside.any(axis=0)),
         )
 
-    def _followed(self, domes: tuple[OfPart, ...]) -> tuple[OfPart | Together, Array, Array]:
+    def _followed(
+        self, domes: tuple[OfPart | OwnCoordinate, ...]
+    ) -> tuple[Measure | WideMeasure, Array, Array]:
         """By what paths are followed, its scale and what holds it: by domes.
 
         And by how far jaws have opened, where their own force may turn back: no path by domes sees
@@ -380,15 +445,16 @@ class Obstructed:
         stiffness = self._by_finger(self.units.holding_stiffness)
         softening = None if self.motion is None else self.motion.softening
         if softening is None:
-            return domes[0] if len(domes) == 1 else Together(domes, self.n_own), scale, stiffness
-        every = Together((*domes, self._opening), self.n_own + self._n_motions)
+            size = self._n_frame if self.n_travels else self.n_own
+            return domes[0] if len(domes) == 1 else Together(domes, size), scale, stiffness
+        every = Together((*domes, self._opening), self._n_frame)
         both = (scale, softening.scale), (stiffness, softening.stiffness)
         scale, stiffness = (_with_row(values, value) for values, value in both)
         return every, scale, stiffness
 
     def _multiplied(self, active: Flags) -> Multiplied:
         """Multipliers of active contacts, so many that no batch decides how sums are ordered."""
-        return Multiplied.of(active, WIDE + 2 - self.n_own - self._n_motions)
+        return Multiplied.of(active, WIDE + 2 - self._n_frame)
 
     def _by_finger(self, values: Array) -> Array:
         """Values of each unit, (unit, …), for all fingers."""
@@ -442,6 +508,9 @@ class Obstructed:
 
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are in their inverted wells, (unit, batch)."""
+        if self.n_travels:
+            place = np.concatenate([own(shapes.coordinates).value for own in self.travels])
+            return np.asarray(place > self._by_finger(self.units.wells.spring_barrier))
         own = []
         for finger, potential in enumerate(self.potentials(shapes.inverted)):
             springs = potential.coordinates.springs(self.of_finger(shapes.coordinates, finger))

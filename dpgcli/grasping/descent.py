@@ -40,7 +40,7 @@ def relaxed(
 
 
 def _fallen(obstructed: Obstructed, shapes: ContactShapes) -> Flags:
-    if not isinstance(obstructed.units.finger.law, PushOnly):
+    if obstructed.n_travels or not isinstance(obstructed.units.finger.law, PushOnly):
         return np.zeros(shapes.inverted.shape, bool)
     return shapes.inverted & ~obstructed.is_open(shapes)
 

@@ -19,7 +19,7 @@ from dpgcli.design.pressure import Pressure
 from dpgcli.design.scene import Held, Scene
 from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.clearance import Clearance, clearance, outlines
-from dpgcli.grasping.closing import driven, with_reach
+from dpgcli.grasping.closing import at_rest, driven, with_reach
 from dpgcli.grasping.frames import FingerFrame, frames
 from dpgcli.grasping.grasp import Grasped, Placed, described, placed
 from dpgcli.grasping.pull import Pulled, borne
@@ -141,7 +141,7 @@ def _pulsed(task: Task, part: Placed, peak: Array, limit: float) -> tuple[Placed
         share = further[told.lanes] * told.load
         ahead[told.lanes] = np.minimum(ahead[told.lanes], share)
     back = driven(part.own, there, volumes, 0.0 * peak[None], peak)
-    return _with_status(part, back), np.minimum(near, ahead)
+    return _with_status(part, at_rest(part.own, back, volumes)), np.minimum(near, ahead)
 
 
 def _with_status(part: Placed, came: Approach) -> Placed:

@@ -122,6 +122,17 @@ def _loads(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     return tuple(Term(LOAD, measure, DeadLoad(force)) for measure, force in loads)
 
 
+def without_domes(potential: FingerPotential) -> FingerPotential:
+    """The energy of all but the domes.
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> without_domes(chain_potential(uniform_finger(1, **STUDY))).kinds
+    ('hinge',)
+    """
+    others = tuple(term for term in potential.terms if term.kind != "bistable")
+    return Potential(potential.coordinates, others)
+
+
 def springs_merged(system: FingerCoordinates, terms: tuple[Term, ...]) -> tuple[Term, ...]:
     """The same energy, with the springs of single coordinates as one term that is ahead of others.
 
