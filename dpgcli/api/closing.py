@@ -1,5 +1,6 @@
 """Fingers that close on a body by pressure: what `grasp` needs beside the body."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from dpgcli.api.histories import PressureInput, history_input
@@ -7,32 +8,37 @@ from dpgcli.api.inputs import SceneInput, Settings, SpecInput
 from dpgcli.api.pressure import pressed_input
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.closing import Closing
-from dpgcli.mechanics.laws import PushOnly
-
-PUSHED = (
-    ": domes that only push leave their neighbors as pressures change, which is not computed "
-    "beside a body; take finger.law: published or tabulated"
-)
 
 
 def closing_input(
-    spec: SpecInput, settings: Settings, pressure: PressureInput | None
+    spec: SpecInput,
+    settings: Settings,
+    pressure: PressureInput | None,
+    completed: Callable[[SceneInput], SceneInput],
 ) -> tuple[SceneInput, Closing]:
-    """A spec, and the pressures by which its fingers close: as given, else those of the spec.
+    """A spec `completed` by a body, and the pressures by which its fingers close.
 
-    Raises SpecError for a wrong spec or history, UsageError for one that does not end at 0 MPa, or
-    for domes that only push.
+    They are those given, else those of the spec. Raises SpecError for a wrong spec or history,
+    UsageError with all that is missing, and for a history that does not end at 0 MPa.
     """
-    pressed = pressed_input(spec, settings)
-    history = history_input(pressure, pressed.pressure)
-    if isinstance(pressed.pressed.finger.law, PushOnly):
-        approach = Field("approach")
-        raise UsageError(approach, " close", PUSHED, ", or another ", approach)
+    pressed, missing = pressed_input(spec, settings), list[UsageError]()
+    given = history = None
+    try:
+        given = completed(pressed.given)
+    except UsageError as error:
+        missing.append(error)
+    try:
+        history = history_input(pressure, pressed.pressure)
+    except UsageError as error:
+        missing.append(error)
+    if given is None or history is None:
+        first, *others = (error.message for error in missing)
+        raise UsageError(first, *(part for other in others for part in ("\n", other)))
     last = history.history.pressure[-1]
     if last.any():
         ended = ", ".join(f"{value:g}" for value in last)
         hint = " MPa: expected 0 at the end, as a grasp is what is left without pressure"
         raise UsageError(Field("pressure"), f" ends at {ended}{hint}")
-    given = replace(pressed.given, files=(*pressed.given.files, *history.files))
+    given = replace(given, files=(*given.files, *history.files))
     volumes = pressed.pressed.volumes
     return given, Closing(volumes, pressed.pressure, history.history)

@@ -247,27 +247,40 @@ def grasp(
     """
     check_flags(both=both)
     way = chosen(Way, "approach", approach)
-    of_spec, of_body = own_settings(settings, object)
-    given, closing = grasp_input(spec, of_spec, way, pressure)
-    with_it = with_body(given, object, at, of_body)
+    given, closing = grasp_input(spec, object, at, settings, way, pressure)
     said = None if patterns is None else as_texts("patterns", patterns)
-    return grasp_of(with_it, patterns_of(given.scene, way, said), both, way, closing)
+    return grasp_of(given, patterns_of(given.scene, way, said), both, way, closing)
 
 
 def grasp_input(
-    spec: SpecInput, settings: Settings, way: Way, pressure: "PressureInput | None"
+    spec: SpecInput,
+    body: str | None,
+    at: Sequence[float] | None,
+    settings: Settings,
+    way: Way,
+    pressure: "PressureInput | None",
 ) -> tuple[SceneInput, Closing | None]:
-    """A spec, and the pressures by which its fingers close, if they do.
+    """A spec with its body or the one of these arguments, and pressures, if its fingers close.
 
-    Raises SpecError for a wrong spec or history, UsageError for pressures that have no use.
+    Raises SpecError for a wrong spec or history, UsageError for what is missing, and for pressures
+    that have no use.
     """
+    of_spec, of_body = own_settings(settings, body)
+
+    def completed(given: SceneInput) -> SceneInput:
+        with_it = with_body(given, body, at, of_body)
+        if with_it.scene.body is None and way is not Way.PLACE:
+            what = f" {way} goes with a body: expected an "
+            raise UsageError(Field("approach"), what, Field("object"), " such as disc:40")
+        return with_it
+
     if way is Way.CLOSE:
         from dpgcli.api.closing import closing_input
 
-        return closing_input(spec, settings, pressure)
+        return closing_input(spec, of_spec, pressure, completed)
     if pressure is not None:
         raise UsageError(Field("pressure"), " goes with ", Field("approach"), f" {Way.CLOSE}")
-    return scene_input(spec, settings), None
+    return completed(scene_input(spec, of_spec)), None
 
 
 def patterns_of(scene: Scene, way: Way, patterns: Sequence[str] | None) -> tuple[str, ...]:
@@ -286,9 +299,6 @@ def grasp_of(
 ) -> GraspResult:
     """The same, of a scene with a body that was read before."""
     scene = given.scene
-    if scene.body is None and way is not Way.PLACE:
-        what = f" {way} goes with a body: expected an "
-        raise UsageError(Field("approach"), what, Field("object"), " such as disc:40")
     check_body(scene, scene.body)
     pairs = pairs_of(patterns, scene, both)
     check_work(work_of(scene, pairs, way, closing))

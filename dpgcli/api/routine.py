@@ -15,7 +15,6 @@ from dpgcli.api.bodies import (
     pressure_lines,
     with_body,
 )
-from dpgcli.api.closing import PUSHED
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
@@ -48,7 +47,6 @@ from dpgcli.grasping.steps import (
     routine_rows,
     schedule,
 )
-from dpgcli.mechanics.laws import PushOnly
 from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.text import counted
@@ -291,8 +289,6 @@ def planned(
     scene = pressed.given.scene
     if scene.gripper is None:
         raise UsageError("a routine needs two fingers: expected gripper in the spec")
-    if isinstance(pressed.pressed.finger.law, PushOnly):
-        raise UsageError("a routine", PUSHED)
     codes = [
         code_of(pressed, field, pattern) if pattern else None
         for field, pattern in (("open", opened), ("closed", closed))

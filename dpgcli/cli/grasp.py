@@ -91,7 +91,6 @@ def grasp(
     quiet: Quiet = False,
 ) -> None:
     """Let fingers close on a body, or on each other: contacts, forces, and which units reset."""
-    from dpgcli.api.bodies import own_settings, with_body
     from dpgcli.api.grasp import (
         check_drawable,
         check_work,
@@ -101,21 +100,20 @@ def grasp(
         patterns_of,
         work_of,
     )
+    from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.grasping.approach import Way
 
     if plot is not None:
         check_plot(plot)
     check_table_name(output)
-    way = Way(approach.value)
+    way, place = Way(approach.value), point("--at", at)
     if jaws is not None:
         _check_alone(body, both, approach, pressure)
-    of_spec, of_body = own_settings(settings or (), body)
-    given, closing = grasp_input(spec, of_spec, way, pressure)
-    if jaws is not None:
-        _open_jaws(given, jaws, point("--at", at), patterns, printed_as, output, plot, quiet)
+        given = scene_input(spec, settings or ())
+        _open_jaws(given, jaws, place, patterns, printed_as, output, plot, quiet)
         return
-    given = with_body(given, body, point("--at", at), of_body)
+    given, closing = grasp_input(spec, body, place, settings or (), way, pressure)
     chosen = patterns_of(given.scene, way, patterns or None)
     pairs = pairs_of(chosen, given.scene, both)
     if plot is not None:

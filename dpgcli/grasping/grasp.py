@@ -18,6 +18,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.shapes import ContactShapes, Motion
+from dpgcli.grasping.travels import with_reasons
 from dpgcli.mechanics.coordinates import Stations
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import Touches
@@ -276,11 +277,13 @@ def met(
     else:
         beyond = MARGIN_TO if with_margins and closing is None else None
         came = grown(own, x, pattern, is_stable, beyond)
+    is_lost = is_stable & ~came.shapes.is_there
+    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status)
     if closing is not None:
         own = with_reach(own)
         came = closed(own, came, closing)
-    is_lost = is_stable & ~came.shapes.is_there
-    return Placed(codes, own, came, np.where(is_lost, np.uint8(Status.NOT_CONVERGED), free.status))
+        status = with_reasons(own, came.shapes, status)
+    return Placed(codes, own, came, status)
 
 
 def grown(

@@ -25,6 +25,7 @@ from dpgcli.grasping.contact import STIFFER, Obstructed
 from dpgcli.grasping.frames import FingerFrame
 from dpgcli.grasping.grasp import Grasped, Placed, described, resets_of
 from dpgcli.grasping.shapes import ContactShapes, Motion
+from dpgcli.grasping.travels import with_reasons
 from dpgcli.mechanics.aperture import KeptApart
 from dpgcli.mechanics.face import Pivot
 from dpgcli.mechanics.terms import Quadratic
@@ -142,6 +143,8 @@ def _let_go(
     is_there, lost = gone.shapes.is_there, Status.NOT_CONVERGED
     if held is not Held.FIXED:
         is_there, lost = _is_held(own, gone.shapes), Status.NOT_HELD
+    elif closing is not None:
+        status = with_reasons(own, gone.shapes, status)
     is_lost = (status == Status.STABLE) & ~is_there
     status = np.where(is_lost, np.uint8(lost), status)
     is_beyond = _are_beyond(motion, gone.shapes.coordinates[own.n_own :])

@@ -26,6 +26,7 @@ from dpgcli.grasping.pull import Pulled, borne
 from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by
 from dpgcli.grasping.shapes import ContactShapes, Ramp
 from dpgcli.grasping.table import Grasps
+from dpgcli.grasping.travels import with_reasons
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
@@ -145,9 +146,7 @@ def _pulsed(task: Task, part: Placed, peak: Array, limit: float) -> tuple[Placed
 
 
 def _with_status(part: Placed, came: Approach) -> Placed:
-    is_lost = (part.status == Status.STABLE) & ~came.shapes.is_there
-    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), part.status)
-    return Placed(part.codes, part.own, came, status)
+    return Placed(part.codes, part.own, came, with_reasons(part.own, came.shapes, part.status))
 
 
 def some(parts: Parts, index: Indices) -> Parts:

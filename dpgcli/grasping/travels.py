@@ -6,6 +6,7 @@ Such domes are those that only push, as long as pressures change; see `contact`.
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.actuation.domes import in_touch
 from dpgcli.actuation.pressed import Pressed
@@ -20,7 +21,9 @@ from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.pressure import PressureWork
+from dpgcli.states.certify import Status
 
 
 def with_travels(own: Obstructed, shapes: ContactShapes) -> ContactShapes:
@@ -69,6 +72,17 @@ def have_closed(own: Obstructed, shapes: ContactShapes) -> Flags:
     inverted = _by_finger(own, shapes.inverted)
     closed = are_closed(own.units.finger, _extensions(own, shapes), inverted)
     return np.asarray(closed.any(axis=(0, 1)))
+
+
+def with_reasons(
+    own: Obstructed, shapes: ContactShapes, status: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Statuses, (batch,), of which those that are stable and lost as pressures change say why."""
+    is_lost = (status == Status.STABLE) & ~shapes.is_there
+    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
+    if not isinstance(own.units.finger.law, PushOnly):
+        return status
+    return np.where(is_lost & have_closed(own, shapes), np.uint8(Status.GAP_CLOSED), status)
 
 
 def about_to_change(own: Obstructed, shapes: ContactShapes, load: Array) -> ContactShapes:
