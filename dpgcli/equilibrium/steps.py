@@ -91,7 +91,8 @@ def one_step(
     is_kinked = (walk.cell < 0) & may_kink(family, len(end)) & ~is_event
     is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
-    landed = (accepted & ~is_last & meets.any(axis=0)) | (is_stuck & is_event)
+    is_within = (trial.there.load - end) * towards <= 0.0  # what is met beyond the end is not met
+    landed = (accepted & ~is_last & is_within & meets.any(axis=0)) | (is_stuck & is_event)
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     longer = np.fmin(longer, step * nearer)
     walk.step = np.where(accepted, longer, shorter)
@@ -192,7 +193,8 @@ def _tried(
     moved = np.abs((there.measured.value - walk.values) / scale).max(axis=0)
     nearest = np.where(may_kink(family, len(end)), KINK, FOLD_DISTANCE)
     is_fine = there.is_fine & (moved <= FURTHEST * np.maximum(np.abs(step), nearest))
-    is_fine &= ~is_meeting | ((came > 0.0) & (came <= FURTHEST * step))
+    is_within = (came > 0.0) & (came <= FURTHEST * step) & ((there.load - end) * towards <= 0.0)
+    is_fine &= ~is_meeting | is_within
     step = np.where(is_meeting & is_fine, came, step)
     slope = slope_by(family, there, cell) * walk.sign * towards
     return _Trial(step, cell, is_last, is_meeting, there, slope, margin_of(family, there), is_fine)

@@ -47,11 +47,12 @@ def driven(
     """
     shapes, resets, n = start.shapes, list(start.resets), len(start.load)
     before = 0.0 * pressures[0] if begin is None else begin
+    there = replace(own, depth=np.zeros(1))
     if begin is None:
-        shapes = with_travels(replace(own, ramp=Ramp(volumes, before, before)), shapes)
+        shapes = with_travels(replace(there, ramp=Ramp(volumes, before, 0.0 * before)), shapes)
     for target in pressures:
         ramp = Ramp(volumes, before, target - before)
-        under = replace(own, depth=np.zeros(1), ramp=ramp)
+        under = replace(there, ramp=ramp)
         came = approach(under, shapes, np.zeros(n), np.ones(n))
         resets += [_told_by_pressure(told, ramp, own.n_fingers) for told in came.resets]
         is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
