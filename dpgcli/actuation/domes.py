@@ -15,6 +15,7 @@ from dpgcli.mechanics.pressure import DomeVolumes, PressureWork
 from dpgcli.records import dataclass
 
 NEAREST = 1e-15  # of extensions: as near as rounding tells
+FEW_PLACES = 64  # on a way of domes by themselves
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,19 @@ def in_touch(finger: Finger, work: PressureWork, extension: Array) -> Response:
 def free_force(finger: Finger, volumes: DomeVolumes, extension: Array, pressure: Array) -> Array:
     """E' − p A (N) of the dome alone; it pushes where that is negative."""
     return in_touch(finger, PressureWork(pressure, volumes, finger.domes), extension).force
+
+
+def rest_between(finger: Finger, volumes: DomeVolumes, begin: Array, end: Array) -> Flags:
+    """Domes that rest by themselves wherever they are between two extensions, (…, unit, batch).
+
+    As far as a number of places tells: the pressure E'/A rises with the extension there. Where they
+    begin they may be about to lose their places.
+    """
+    share = (np.arange(1, FEW_PLACES + 1) / FEW_PLACES).reshape(-1, *(1,) * np.ndim(begin))
+    place, domes = begin + share * (end - begin), finger.domes
+    dome, swept = finger.law.pulling.response(place, domes), volumes.swept(place, domes)
+    rises = dome.stiffness * swept.area > dome.force * swept.widening
+    return np.asarray(rises.all(axis=0))
 
 
 class DomeLimits(NamedTuple):

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dpgcli.actuation.domes import rest_between
 from dpgcli.arrays import Array, Flags, Indices, total
 from dpgcli.equilibrium.banded import WIDE
 from dpgcli.equilibrium.constraints import (
@@ -507,10 +508,18 @@ class Obstructed:
         return slips
 
     def is_open(self, shapes: ContactShapes) -> Flags:
-        """Which units are in their inverted wells, (unit, batch)."""
-        if self.n_travels:
-            place = np.concatenate([own(shapes.coordinates).value for own in self.travels])
-            return np.asarray(place > self._by_finger(self.units.wells.spring_barrier))
+        """Which units are in their inverted wells, (unit, batch).
+
+        Domes by themselves that have left their neighbors also where they have withdrawn behind
+        their units' barriers, as long as they have not lost their places. Where a gap closes under
+        their pushes until it is shut, that is the barrier: they lose their places exactly there.
+        """
+        if self.ramp is not None and self.n_travels:
+            barrier = self.units.wells.spring_barrier - ROUNDING * self.units.finger.stroke
+            place = np.stack([travel(shapes.coordinates).value for travel in self.travels])
+            apart = ~shapes.active[self.n_gaps : self.n_gaps + self.n_travels].reshape(place.shape)
+            keeps = rest_between(self.units.finger, self.ramp.volumes, place, barrier)
+            return np.asarray((place > barrier) | (apart & keeps)).reshape(self.n_travels, -1)
         own = []
         for finger, potential in enumerate(self.potentials(shapes.inverted)):
             springs = potential.coordinates.springs(self.of_finger(shapes.coordinates, finger))
