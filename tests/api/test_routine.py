@@ -427,10 +427,6 @@ JAWS = {**SPEC, "object": {"jaws": {"gap_mm": 20, "height_mm": 20}, "at_mm": [30
         (lambda: dpg.routine(SPEC, approach_from=BEGIN, open="2"), "^open 2: expected 3 digits"),
         (lambda: dpg.routine(SPEC, approach_from=BEGIN, closed="11"), "^closed 11: expected 3"),
         (lambda: dpg.routine(JAWS, approach_from=BEGIN), "^object: expected a body that keeps"),
-        (
-            lambda: dpg.routine(SPEC, approach_from=BEGIN, settings={"finger.law": "push_only"}),
-            "domes that only push leave their neighbors",
-        ),
         (lambda: dpg.routine(SPEC, approach_from=BEGIN, object="disc:40", at=(5, 0)), "begins"),
     ],
 )

@@ -84,8 +84,13 @@ def test_lines_are_named_and_histories_are_those_of_actuate(
         ((*DISC, *CLOSE, "--pressure", "0:x:0"), 'found "x"'),
         ((*DISC, "--pressure", "0:0.16:0"), "--pressure goes with --approach close"),
         (
-            (*DISC, *CLOSE, "--pressure", "0:0.16:0", "--set", "finger.law=push_only"),
-            "--approach close: domes that only push leave their neighbors",
+            CLOSE,
+            "--approach close goes with a body: expected an --object such as disc:40\n"
+            "dpg: --pressure: expected pressures in MPa such as 0:0.15:0",
+        ),
+        (
+            (*DISC[:2], *CLOSE),
+            "--at: expected the place of the body in mm, such as 40,0\ndpg: --pressure: expected",
         ),
         (
             ("--jaws", "30:40", "--at", "28,0", *CLOSE, "--pressure", "0:0.1:0"),
@@ -97,3 +102,25 @@ def test_refusals(call: Any, spec: str, options: tuple[str, ...], said: str) -> 
     result = call("grasp", spec, *options)
     assert result.exit_code == ExitCode.USAGE
     assert said in result.stderr and not result.stdout
+
+
+def test_domes_that_only_push(call: Any, spec: str) -> None:
+    """The law of `calibration: finite_elements`: they snap by themselves, and then push."""
+    options = ("--set", "finger.calibration=finite_elements", "--pressure", "0:0.2:0")
+    result = call("grasp", spec, *DISC, *CLOSE, *options, "--format", "json")
+    assert result.exit_code == ExitCode.DONE
+    (row,) = json.loads(result.stdout)
+    assert (row["status"], row["pattern_after"], row["tie"]) == ("stable", "111", "1,2,3")
+    assert re.fullmatch(r"snap 1,2,3 at 0\.1496?\d* MPa", row["events"])
+    assert row["squeeze_N"] > 0.1 and row["penetration_mm"] == 0.0
+    assert "pressures: fitted, snap pressure" in result.stderr
+
+
+def test_gaps_closed_beyond_domes_at_rest_are_rows(call: Any, spec: str) -> None:
+    """The published energy has its dome at rest where the gap is shut: a body that shuts it more."""
+    options = ("--set", "finger.law=push_only", "--pressure", "0:0.2:0")
+    result = call(
+        "grasp", spec, "--object", "disc:39", *DISC[2:], *CLOSE, *options, "--format", "json"
+    )
+    (row,) = json.loads(result.stdout)
+    assert (row["status"], row["pattern_after"]) == ("gap_closed", "")
