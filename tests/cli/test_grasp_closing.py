@@ -117,7 +117,7 @@ def test_domes_that_only_push(call: Any, spec: str) -> None:
 
 
 def test_gaps_closed_beyond_domes_at_rest_are_rows(call: Any, spec: str) -> None:
-    """The published energy has its dome at rest where the gap is shut: a body that shuts it more."""
+    """The published energy has domes at rest where gaps are shut: a body shuts them more."""
     options = ("--set", "finger.law=push_only", "--pressure", "0:0.2:0")
     result = call(
         "grasp", spec, "--object", "disc:39", *DISC[2:], *CLOSE, *options, "--format", "json"
