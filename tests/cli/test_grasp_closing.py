@@ -112,7 +112,7 @@ def test_domes_that_only_push(call: Any, spec: str) -> None:
     (row,) = json.loads(result.stdout)
     assert (row["status"], row["pattern_after"], row["tie"]) == ("stable", "111", "1,2,3")
     assert re.fullmatch(r"snap 1,2,3 at 0\.1496?\d* MPa", row["events"])
-    assert row["squeeze_N"] > 0.1 and row["penetration_mm"] == 0.0
+    assert row["squeeze_N"] > 0.1 and row["penetration_mm"] <= 1e-9
     assert "pressures: fitted, snap pressure" in result.stderr
 
 
