@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -39,12 +40,14 @@ class InverseDesignResult(TableResult):
     """The best designs, each certified anew from its spec, and how they were found.
 
     `specs` are those of the designs, the best first, and `reached` what their states come to.
+    `removed` are specs of an earlier search that went from the folder of the output.
     """
 
     given: GoalFile
     searched: Searched
     specs: tuple[Spec, ...]
     reached: tuple[Reached, ...]
+    removed: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -108,6 +111,8 @@ class InverseDesignResult(TableResult):
         if goal.n_choices > MOST_CHOICES:
             yield f"a population found which of {goal.n_choices:,} combinations to search for"
         yield from how_slopes_are_found(goal) if goal.ranges else ()
+        if self.removed:
+            yield f"of an earlier search, removed as it wrote them: {enumerated(self.removed)}"
 
     @property
     def _tables(self) -> GoalTables:
@@ -116,8 +121,9 @@ class InverseDesignResult(TableResult):
     def save(self, folder: str | Path) -> None:
         """Write the designs, the trace and a spec for each design into a folder.
 
-        They are `best.parquet`, `trace.parquet` and `design_1.yaml` and so on. Raises OutputError,
-        and UsageError for files that the designs come from.
+        They are `best.parquet`, `trace.parquet` and `design_1.yaml` and so on; specs of an earlier
+        search go. Raises OutputError, also for a spec that was edited, and UsageError for files
+        that the designs come from.
         """
         from dpgcli.files.output import sole_use
 
@@ -125,7 +131,7 @@ class InverseDesignResult(TableResult):
         with sole_use(path):
             self._write(path)
 
-    def _write(self, folder: Path) -> None:
+    def _write(self, folder: Path) -> tuple[str, ...]:
         from dpgcli.files.goal_output import BEST, TRACE, write_designs
 
         trace = self._tables.trace(self.searched.trace)
@@ -133,7 +139,7 @@ class InverseDesignResult(TableResult):
             (BEST, self.columns, self.rows),
             (TRACE, self._tables.trace_columns, trace),
         )
-        write_designs(folder, self.given, tables, self.specs, scene_of(self.specs[0]))
+        return write_designs(folder, self.given, tables, self.specs, scene_of(self.specs[0]))
 
 
 def inverse_design(
@@ -256,7 +262,7 @@ def found_for(
             study.store.drop()
             raise
         if output is not None:
-            found._write(output)
+            found = replace(found, removed=found._write(output))
         study.store.drop()
     return found
 

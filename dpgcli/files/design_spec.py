@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from dpgcli.errors import UsageError
 from dpgcli.files.content import MAX_BYTES
+from dpgcli.files.edits import sealed
 from dpgcli.files.output import Mark, whole_file
 from dpgcli.files.scene_file import Spec, canonical_json, checked, with_files
 from dpgcli.files.scene_file.settings import changed
@@ -18,7 +19,6 @@ from dpgcli.text import printable
 
 SWEEP = "dpg.sweep"
 FIRST = "# Written by dpg: "  # its mark
-SECOND = "# It is replaced where it is written again: take the line above away to keep changes.\n"
 
 
 def design_spec(base: Document, values: Mapping[str, float]) -> Spec:
@@ -34,7 +34,7 @@ def spec_text(spec: Spec, about: str) -> str:
 
     Raises UsageError where a spec's file has no room for its calibrations.
     """
-    text = f"{FIRST}{printable(about)}\n{SECOND}{yaml_text(spec.model_dump(exclude_none=True))}"
+    text = sealed(f"{FIRST}{printable(about)}", yaml_text(spec.model_dump(exclude_none=True)))
     n_bytes, n_values = len(text.encode()), _n_values(spec.model_dump(exclude_none=True))
     if n_bytes > MAX_BYTES or n_values > MAX_NODES:
         raise UsageError(
@@ -48,7 +48,7 @@ def spec_text(spec: Spec, about: str) -> str:
 
 
 def write_spec(path: Path, spec: Spec, about: str, mark: Mark = Mark.SPEC) -> None:
-    """Write a spec as `spec_text` has it, in the place of nothing but such a file, by its mark."""
+    """Write a spec as `spec_text` has it, in the place of nothing but such a file as it was."""
     text = spec_text(spec, about)
     with whole_file(path, mark) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")

@@ -10,7 +10,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.files.access import writing
 from dpgcli.files.design_spec import write_spec
 from dpgcli.files.goal_file import GoalFile
-from dpgcli.files.output import Mark, check_outputs, is_own
+from dpgcli.files.output import Mark, check_outputs
 from dpgcli.files.record_batches import record_batch, schema
 from dpgcli.files.scene_file import Spec, canonical_json
 from dpgcli.files.scene_metadata import scene_metadata
@@ -26,7 +26,8 @@ NamedTable = tuple[str, tuple[Column, ...], Columns]
 def check_folder(folder: Path, given: GoalFile) -> None:
     """Raise OutputError or UsageError for a folder that tables cannot go into, before the work.
 
-    Nor may there be specs of designs that no search wrote: what it finds would take their names.
+    Nor may there be specs of designs that no search wrote, or that were edited since: what it
+    finds would take their names, or their place.
     Whoever calls has the folder to himself, here and below.
     """
     tables = ((folder / name, Mark.TABLE) for name in (BEST, TRACE))
@@ -44,10 +45,10 @@ def write_designs(
     tables: Sequence[NamedTable],
     specs: Sequence[Spec],
     first: Scene,
-) -> None:
+) -> tuple[str, ...]:
     """Write tables by name, and the specs as design_1.yaml and so on; `first` is the best's scene.
 
-    Specs of more designs that an earlier search left there are removed.
+    Specs of more designs that an earlier search left there are removed: their names.
     """
     check_folder(folder, given)
     own = {folder / f"design_{number}.yaml": spec for number, spec in enumerate(specs, start=1)}
@@ -63,7 +64,13 @@ def write_designs(
         write_table(folder / name, described, [record_batch(columns, rows)], metadata)
     for number, (path, spec) in enumerate(own.items(), start=1):
         write_spec(path, spec, f"design {number} of {BEST}", Mark.FOUND)
-    for path in _specs(folder):
-        with writing(path):
-            if path not in own and path.stat().st_size and is_own(path, Mark.FOUND):
-                path.unlink()
+    return tuple(path.name for path in _specs(folder) if path not in own and _removed(path))
+
+
+def _removed(path: Path) -> bool:
+    """Remove a spec of an earlier search, which is as it was; whether it was one."""
+    with writing(path):
+        is_old = path.stat().st_size > 0
+        if is_old:
+            path.unlink()
+    return is_old

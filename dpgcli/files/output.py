@@ -12,6 +12,7 @@ from pathlib import Path
 
 from dpgcli.errors import OutputError, UsageError
 from dpgcli.files.access import reading, writing
+from dpgcli.files.edits import is_edited
 from dpgcli.files.seal import footer_size
 from dpgcli.temporary import lock, temporary_file
 from dpgcli.text import control_character
@@ -51,6 +52,7 @@ class Mark(Enum):
     PARTS = rb'\A\{\s*"dpg\.'
 
 
+EDITED = (Mark.SPEC, Mark.FOUND)  # by people, for whom they are written
 Output = tuple[Path | None, Mark]
 
 
@@ -59,7 +61,7 @@ def whole_file(path: Path, mark: Mark = Mark.NONE) -> Iterator[Path]:
     """Give a temporary file beside `path`; sync it and rename it when all went well.
 
     A link stays one: what it points to is written. What is there is replaced only if it is
-    empty or has the mark, and its permissions stay.
+    empty or has the mark, and no spec that somebody edited; its permissions stay.
     Whatever interrupts the block leaves `path` as it was and no temporary file. Raises
     OutputError where the file cannot be written: no folder, no permission, no space, a file of
     somebody else.
@@ -238,15 +240,17 @@ def _handle(folder: Path) -> int:
 
 
 def _check_replaceable(target: Path, mark: Mark) -> None:
-    """Raise OSError for a file that is not of this program, or that its owner protects."""
+    """Raise OSError for what is not of this program, or was edited, or its owner protects."""
     if not target.is_file():
         return
     if not os.access(target, os.W_OK):
         raise PermissionError(None, "it is write-protected")
+    hint = "move it away, or give another name"
     if not is_own(target, mark):
-        hint = "move it away, or give another name"
         whose = "of dpg, but another kind of file" if marks_of(target) else "not of dpg"
         raise FileExistsError(None, f"it is there and {whose}; {hint}")
+    if mark in EDITED and is_edited(target):
+        raise FileExistsError(None, f"it was edited since dpg wrote it; {hint}")
 
 
 @contextmanager

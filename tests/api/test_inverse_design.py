@@ -10,8 +10,10 @@ import pytest
 
 import dpgcli as dpg
 from dpgcli.api import reached as module
+from dpgcli.api.inputs import spec_document
 from dpgcli.errors import NothingSelectedError, SpecError, UsageError
 from dpgcli.files.design_spec import spec_text
+from dpgcli.files.scene_file import checked
 from dpgcli.files.yaml_file import read_document
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -98,6 +100,23 @@ def test_specs_of_an_earlier_search_go_and_those_of_people_stay(
     found.save(folder)
     assert not (folder / "design_98.yaml").exists()
     assert (folder / "design_97.yaml").exists()
+    (folder / "design_99.yaml").write_text(own)
+    again = dpg.inverse_design(goal(vary={STROKE: {"from": 3, "to": 4}}), folder)
+    assert again.removed == ("design_99.yaml",)
+    assert again.summary[-1].endswith("removed as it wrote them: design_99.yaml")
+
+
+@pytest.mark.parametrize("name", ["design_1.yaml", "design_99.yaml"])
+def test_specs_that_somebody_edited_stay(
+    goal: Callable[..., Goal], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr("dpgcli.api.inverse_design.search", None)  # nothing is begun
+    spec = checked(spec_document(goal()["base"]))
+    edited = spec_text(spec, "design 99 of best.parquet") + "# mine\n"
+    (tmp_path / name).write_text(edited)
+    with pytest.raises(dpg.OutputError, match=f"{name}: it was edited since dpg wrote it; move"):
+        dpg.inverse_design(goal(), tmp_path)
+    assert (tmp_path / name).read_text() == edited
 
 
 @pytest.mark.parametrize("first", ["finger: {}", "# Written by dpg: design 99 of the sweep x"])

@@ -80,7 +80,7 @@ def test_a_spec_of_a_file_takes_its_calibrations_along(tmp_path: Path) -> None:
     (tmp_path / "base.yaml").write_text(json.dumps(said), encoding="utf-8")
     spec = design_spec(read_scene("base.yaml"), {"finger.units": 5})
     text = spec_text(spec, "five units")
-    assert text.startswith("# Written by dpg: five units\n# It is replaced where")
+    assert text.startswith("# Written by dpg: five units\n# It may be replaced until")
     Path("design.yaml").write_text(text, encoding="utf-8")
     Path("push.yaml").unlink()
     read = read_spec("design.yaml")
