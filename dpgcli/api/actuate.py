@@ -22,10 +22,10 @@ from dpgcli.api.inputs import (
     SpecInput,
     check_flags,
     check_texts,
-    check_whole,
     figure_path,
     path_of,
     table_path,
+    whole,
 )
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table, TableResult
@@ -264,7 +264,7 @@ def followed(
     given: PressedInput, history: GivenHistory, start: str, cycles: int, *, unstable: bool
 ) -> ActuateResult:
     """The same, of what was read before."""
-    check_whole(cycles=cycles)
+    cycles = whole("cycles", cycles)
     check_flags(unstable=unstable)
     if cycles is None or not 1 <= cycles <= MOST_CYCLES:
         raise UsageError(Field("cycles"), f" {cycles}: expected 1 to {MOST_CYCLES:,}")

@@ -12,13 +12,13 @@ from dpgcli.api.inputs import (
     as_texts,
     check_callable,
     check_installed,
-    check_numbers,
-    check_whole,
     figure_path,
     files_of,
+    number,
     path_of,
     scene_input,
     table_path,
+    whole,
 )
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.benchmark.bench import COLUMNS, Bench, BenchRow, as_columns
@@ -111,11 +111,11 @@ def bench(
     dpgcli.errors.UsageError: keep hinges: this scene leaves out bars, every-unit, every-column
     """
     check_installed("dpg bench", "mpmath")
-    check_whole(repeats=repeats)
+    repeats = whole("repeats", repeats)
     check_callable(watch=watch)
     if repeats is None or not 1 <= repeats <= MOST_REPEATS:
         raise UsageError(Field("repeats"), f" {repeats}: expected from 1 to {MOST_REPEATS:,}")
-    check_numbers(target_error=target_error)
+    target_error = number("target_error", target_error)
     given = scene_input(spec, settings)
     known = None if against is None else states_of(given.scene.finger, against)
     then = None if compare is None else _recorded(path_of("compare", compare), given.json)

@@ -52,6 +52,8 @@ LARGEST_WHOLE = 2**1000  # far beyond any seed
 NO_TABLE = (".csv", ".json", ".yaml", ".yml", ".svg", ".png")
 
 E = TypeVar("E", bound=StrEnum)
+W = TypeVar("W", int, int | None)
+R = TypeVar("R", float, float | None)
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def scene_input(spec: SpecInput, settings: Settings = ()) -> SceneInput:
 
 def spec_or_design(spec: SpecInput, design: int | None, settings: Settings = ()) -> SceneInput:
     """A spec as `scene_input` reads it, or the design of this number of a sweep's folder."""
-    check_whole(design=design)
+    design = whole("design", design)
     if design is not None:
         from dpgcli.api.designs import design_input  # whatever reads tables
 
@@ -318,6 +320,23 @@ def check_whole(**values: int | None) -> None:
         is_whole = isinstance(value, Integral) and not isinstance(value, bool)
         if value is not None and not (is_whole and abs(value) < LARGEST_WHOLE):
             raise UsageError(Field(field), f" {quoted(value)}: expected a whole number")
+
+
+def whole(field: str, value: W) -> W:
+    """A whole number as Python's own, which JSON can say too; raises UsageError for what is none.
+
+    >>> import numpy as np
+    >>> whole("top", np.int64(3)), whole("top", None)
+    (3, None)
+    """
+    check_whole(**{field: value})
+    return value if value is None else int(value)
+
+
+def number(field: str, value: R) -> R:
+    """A number as Python's own, as `whole`; raises UsageError for what is none."""
+    check_numbers(**{field: value})
+    return value if value is None else float(value)
 
 
 def check_callable(**values: object) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dpgcli.api.given import GoalInput, goal_input
-from dpgcli.api.inputs import Settings, check_flags, check_numbers, check_whole, path_of
+from dpgcli.api.inputs import Settings, check_flags, number, path_of, whole
 from dpgcli.api.reached import reached
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, keep_freed_memory
@@ -183,13 +183,11 @@ def inverse_design(
     """
     from dpgcli.api.place import Place
 
-    check_whole(seed=seed, evaluations=evaluations)
-    check_numbers(budget=budget)
+    ends = Ends(whole("seed", seed), whole("evaluations", evaluations), number("budget", budget))
     check_flags(strict=strict, restart=restart)
     place = Place(executor, jobs, scheduler, wait)
     given = goal_input(goal, settings)
     path = None if output is None else path_of("output", output)
-    ends = Ends(seed, evaluations, budget)
     return found_for(given, path, ends, place, restart=restart, strict=strict)
 
 

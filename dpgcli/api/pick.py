@@ -11,7 +11,7 @@ import numpy as np
 
 from dpgcli.api.check import DesignsInput
 from dpgcli.api.designs import table_of, tables_beside
-from dpgcli.api.inputs import as_texts, check_flags, check_whole, path_of, table_path
+from dpgcli.api.inputs import as_texts, check_flags, path_of, table_path, whole
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, Flags
 from dpgcli.errors import Field, NothingSelectedError, UsageError
@@ -106,7 +106,7 @@ def pick(
     [1]
     """
     check_flags(states=states, strict=strict)
-    check_whole(top=top, design=design)
+    top, design = whole("top", top), whole("design", design)
     conditions = [*as_texts("where", where), *([] if design is None else [f"design == {design}"])]
     objectives = as_texts("minimize", minimize), as_texts("maximize", maximize)
     names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)

@@ -82,7 +82,7 @@ class Place:
         if self.is_here:
             return executors.serial()
         _check_importable()
-        return pool.processes(self.jobs or cores().usable)
+        return pool.processes(int(self.jobs or cores().usable))  # of NumPy, JSON could not say it
 
     def _cluster(self, scheduler: str, say: Say) -> "Backend":
         from dpgcli.sweeps import cluster

@@ -11,9 +11,9 @@ from dpgcli.api.inputs import (
     SpecInput,
     as_texts,
     check_flags,
-    check_numbers,
     check_texts,
     figure_path,
+    number,
     path_of,
     spec_or_design,
     table_path,
@@ -145,7 +145,7 @@ def request_of(
 ) -> Request:
     """The request that these arguments make."""
     names = columns.split(",") if isinstance(columns, str) else as_texts("columns", columns)
-    check_numbers(tolerance=tolerance, target_error=target_error)
+    tolerance, target_error = number("tolerance", tolerance), number("target_error", target_error)
     check_texts(formulation=formulation)
     return Request(
         patterns=as_texts("patterns", patterns),

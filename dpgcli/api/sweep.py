@@ -14,9 +14,9 @@ from dpgcli.api.inputs import (
     as_texts,
     check_callable,
     check_flags,
-    check_numbers,
     check_texts,
     each_of,
+    number,
     path_of,
     setting_texts,
 )
@@ -225,7 +225,7 @@ def study_of(
     target_error: float | None = None,
 ) -> Study:
     """A sweep ready to run into a folder."""
-    check_numbers(tolerance=tolerance, target_error=target_error)
+    tolerance, target_error = number("tolerance", tolerance), number("target_error", target_error)
     exactness = DEFAULT_TOLERANCE if tolerance is None else tolerance
     check_exactness(exactness, target_error)
     return Study(sweep_input(sweep, settings), folder, exactness, target_error)
