@@ -90,6 +90,9 @@ class Metrics:
             n_before = 0 if self.n_grasps is None else self.n_grasps
             self.n_grasps = n_before + (stable & (block["n_contacts"] > 0)).sum(axis=1)
             is_answer = np.isin(block["grasp_status"], (Status.STABLE, Status.NOT_HELD))
+            if "payload_N" in block:  # whose search may fail where the grasp is found
+                is_held = block["grasp_status"] == Status.STABLE
+                is_answer &= ~(is_held & np.isnan(block["payload_N"]))
             self.n_unknown_grasps += (is_lost | stable & ~is_answer).sum(axis=1)
         self._add_tips(block["tip_x_mm"], block["tip_y_mm"], stable)
 
@@ -367,7 +370,7 @@ METRICS = (
     ),
     _count(
         UNKNOWN_GRASPS,
-        "states whose grasp is not found: more may touch the body, with larger forces",
+        "states whose grasp or payload is not found: more may touch the body, with larger forces",
         lambda m: m.n_unknown_grasps,
         group=Group.GRASP,
     ),

@@ -217,6 +217,27 @@ def test_grasps_that_are_not_found_are_counted(monkeypatch: pytest.MonkeyPatch) 
     assert any("searches failed in 2 designs" in str(line) for line in result.warnings)
 
 
+def test_payloads_that_are_not_found_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The largest of the others is no upper bound."""
+    rows_of = grasps.grasp_rows
+
+    def losing(own: grasps.Encounter, codes: Codes) -> Columns:
+        rows = rows_of(own, codes)
+        is_best = rows["payload_N"] == np.nanmax(rows["payload_N"])
+        return {**rows, "payload_N": np.where(is_best, np.nan, rows["payload_N"])}
+
+    base = {**SPEC, "object": {**BODY, "friction": 0.5}}
+    axis, asked = ("object.disc.diameter_mm", [20.0]), ["payload_max_N < 100", "n_grasps > 0"]
+    found = swept(base, axis, require=asked)
+    assert found.designs["n_unknown_grasps"].tolist() == [0]
+    assert [len(verdict.rows) for verdict in found.verdicts] == [0, 0]
+    monkeypatch.setattr(grasps, "grasp_rows", losing)
+    lost = swept(base, axis, require=asked)
+    assert 0.0 <= lost.designs["payload_max_N"][0] < found.designs["payload_max_N"][0]
+    assert lost.designs["n_unknown_grasps"][0] > 0
+    assert [len(verdict.rows) for verdict in lost.verdicts] == [1, 0]
+
+
 def test_chunks_of_bodies_take_seconds(folder: Path) -> None:
     """So that there is parallel work to do, something to resume, and a time to say."""
     axis = {"key": "object.at_x_mm", "linear": {"from": 30.0, "to": 34.0, "count": 1000}}
