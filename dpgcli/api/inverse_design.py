@@ -252,6 +252,7 @@ def found_for(
         folder = held.enter_context(parts_folder(output if limits.seconds is None else None))
         workplace = held.enter_context(place.workplace(say))
         study = SearchStudy(given, ends.seed, limits, workplace, folder)
+        held.enter_context(study.store.dropped_if_empty())
         study.begin(restart=restart)
         searched = search(given.goal, ends.seed, limits, study.run)
         try:

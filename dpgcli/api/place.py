@@ -1,5 +1,6 @@
 """Where work is done: in this process, by a pool of processes, or by the workers of Dask."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from dpgcli.api.inputs import check_numbers, check_texts, check_whole
 from dpgcli.cores import MOST_PROCESSES, cores
 from dpgcli.errors import Field, UsageError
 from dpgcli.records import dataclass
+from dpgcli.sweeps.guard import GUARD, OF_POOL
 from dpgcli.text import quoted
 
 if TYPE_CHECKING:
@@ -46,6 +48,7 @@ class Place:
             raise UsageError(Field("jobs"), f" {self.jobs}: {expected}")
         if self.is_sent != (self.scheduler is not None):
             raise UsageError(dask, " dask and ", scheduler, " tcp://host:port go together")
+        _end_if_begun_by_us()
         if self.scheduler is not None:
             from dpgcli.sweeps import cluster
 
@@ -81,6 +84,7 @@ class Place:
 
         if self.is_here:
             return executors.serial()
+        _check_may_begin()
         _check_importable()
         return pool.processes(int(self.jobs or cores().usable))  # of NumPy, JSON could not say it
 
@@ -96,6 +100,31 @@ class Place:
             what = f" {scheduler}: no scheduler or no worker answers"
             why = f"{what}: {str(error) or 'time is up'}"
             raise UsageError(Field("scheduler"), why) from error
+
+
+def _end_if_begun_by_us() -> None:
+    """End a worker of ours that is about to begin this work instead of importing its program.
+
+    The process that waits for it says why, once for all workers. Those of others get an error.
+    """
+    process = sys.modules.get("multiprocessing.process")  # which is there in each of its children
+    if process is None or not getattr(process.current_process(), "_inheriting", False):
+        return
+    if OF_POOL in os.environ:
+        raise SystemExit(1)
+    raise UsageError(f"this process is still importing its program: {GUARD}")
+
+
+def _check_may_begin() -> None:
+    """Raise UsageError where the system of processes allows this one none of its own."""
+    from multiprocessing import current_process
+
+    if current_process().daemon:
+        raise UsageError(
+            Field("executor"),
+            " processes: this one is a worker of multiprocessing, a daemon, and may start none: "
+            "take serial",
+        )
 
 
 def _check_importable() -> None:

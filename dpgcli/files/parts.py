@@ -21,6 +21,7 @@ import numpy as np
 import pyarrow as pa
 
 from dpgcli.arrays import Columns
+from dpgcli.errors import WorkplaceError
 from dpgcli.files.access import inside, reading, writing
 from dpgcli.files.content import opened
 from dpgcli.files.output import Mark, is_own, whole_file
@@ -179,6 +180,16 @@ class PartStore:
                     path.unlink()
             self.folder.rmdir()
             self.folder.parent.rmdir()
+
+    @contextmanager
+    def dropped_if_empty(self) -> Iterator[None]:
+        """Leave nothing of work that no worker began."""
+        try:
+            yield
+        except WorkplaceError:
+            if not self.parts():
+                self.drop()
+            raise
 
     def drop_half_written(self) -> None:
         """Remove what workers that were killed were about to write."""

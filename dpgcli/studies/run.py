@@ -57,7 +57,8 @@ def run(
     if study.extent.seconds > LONG:
         tell(cost(study))
     try:
-        progress = compute()
+        with study.store.dropped_if_empty():
+            progress = compute()
     finally:  # a signal to all processes ends workers at once
         study.store.drop_half_written()
     replays = [study.replay(number, settings) for number in progress.failures[:MOST_NAMED]]

@@ -172,7 +172,8 @@ class Runner(Generic[T]):
             except self.workplace.broken as error:
                 if is_last:
                     why = str(error) or type(error).__name__
-                    said = f"{self.workplace.name}: workers do not start ({why}). {GO_ON}"
+                    name, hint = self.workplace.name, self.workplace.hint
+                    said = f"{name}: workers do not start ({why.rstrip('.')}){hint}. {GO_ON}"
                     raise WorkplaceError(said) from error
                 sleep(PERIOD)  # until a worker that is closing has gone
             else:
@@ -197,7 +198,8 @@ class Backend:
     when a worker dies, `lost` when there is nobody left to ask. `ask` puts a question to each
     worker that may be of another installation: what it returns or raises, by the worker's name.
     `watch` is called with the seconds for which nothing has come back, and may raise
-    WorkplaceError. `close` ends what was opened to reach the workers.
+    WorkplaceError. `close` ends what was opened to reach the workers; `hint` is said where none
+    starts.
     """
 
     name: str
@@ -209,6 +211,7 @@ class Backend:
     ask: Callable[[Callable[[], Any]], dict[str, Any]] = lambda _: {}
     watch: Callable[[float], None] = lambda _: None
     close: Callable[[], object] = lambda: None
+    hint: str = ""
 
 
 def serial() -> Backend:

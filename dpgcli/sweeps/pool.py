@@ -25,6 +25,7 @@ from typing import ParamSpec, TypeVar
 from dpgcli.errors import Field, WorkplaceError
 from dpgcli.signals import STOP_SIGNALS
 from dpgcli.sweeps.executors import GO_ON, Backend
+from dpgcli.sweeps.guard import OF_POOL, said_of_guards
 from dpgcli.temporary import temporary_folder, working_folder_is_gone
 
 R = TypeVar("R")
@@ -37,7 +38,8 @@ LONGEST_SOCKET_PLACE = 72  # characters; the whole name of a socket may have abo
 
 def processes(n_workers: int) -> Backend:
     """A pool of processes on this machine."""
-    return Backend("the pool of processes", process_pool, n_workers)
+    hint = said_of_guards()
+    return Backend("the pool of processes", process_pool, n_workers, hint=hint)
 
 
 def process_pool(n_workers: int) -> Executor:
@@ -141,7 +143,7 @@ def _safe_path() -> Iterator[None]:
 
     What the program that starts them may import, they get from it later.
     """
-    safe = {"PYTHONSAFEPATH": "1"}  # the option -P
+    safe = {"PYTHONSAFEPATH": "1", OF_POOL: "1"}  # the option -P
     with suppress(OSError):  # a working folder that was deleted
         here = os.path.realpath(os.curdir)
         places = os.environ.get("PYTHONPATH", "").split(os.pathsep)
