@@ -155,20 +155,20 @@ def read_table(source: Tabular) -> GridTable:
     """
     sheet = read_sheet(source, {*Geometry.model_fields, *Values.model_fields})
     keys = [name for name in sheet.names if name in Geometry.model_fields]
+    if not keys:
+        raise SpecError((sheet.missing("of the geometry, such as dome_height_mm"),))
     others = [
         name
         for name in sheet.names
         if name not in keys and (name in Values.model_fields or _is_numeric(sheet, name))
     ]
-    if not keys:
-        raise SpecError((sheet.missing("of the geometry, such as dome_height_mm"),))
     if not others:
         raise SpecError((sheet.missing("of a quantity, such as bistable_stiffness_N_per_mm"),))
-    columns = sheet.numbers([*keys, *others])
-    n_numbers = len(sheet.rows) * len(columns)
+    n_numbers = len(sheet.rows) * len({*keys, *others})
     if n_numbers > MOST_NUMBERS:
         expected = f"at most {MOST_NUMBERS:,} numbers, as many as a calibration file holds"
         raise SpecError((sheet.problem(None, "file", expected, f"{n_numbers:,}"),))
+    columns = sheet.numbers([*keys, *others])
     problems = [
         sheet.problem(row, name, POSITIVE, f"{values[row]:g}")
         for name, values in columns.items()

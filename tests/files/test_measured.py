@@ -38,6 +38,24 @@ def test_columns_in_any_order_with_comments_marks_and_spaces(path: Path) -> None
     assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def test_a_column_is_found_at_once_among_a_million() -> None:
+    class Names(tuple[str, ...]):
+        def index(self, *_: object) -> int:
+            raise AssertionError("from the first name on, for each column")
+
+    sheet = csv_file.Sheet("a.csv", Names(("x", "y")), [["1", "2"], ["3", "4"]], [2, 3], "")
+    assert [sheet.cells(name) for name in sheet.names] == [["1", "3"], ["2", "4"]]
+
+
+def test_columns_that_are_needed_are_asked_for_first(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dpgcli.files.measured._is_numeric", None)
+    path.write_text("a,b\n1,2\n3,4\n", encoding="utf-8")
+    with pytest.raises(SpecError, match="expected a column of the geometry"):
+        read_table(path)
+
+
 def test_a_cell_without_end(path: Path) -> None:
     path.write_text(f"travel_mm,energy_mJ\n0,0\n{'1' * 200_000},2\nx,3\n", encoding="utf-8")
     with pytest.raises(SpecError, match="3: row: expected cells of a CSV, found field larger"):
