@@ -18,6 +18,7 @@ from dpgcli.files.csv_file import text_of
 from dpgcli.files.frames import with_index
 from dpgcli.files.layout import doubtful_point, marks_in, rows_in, separator_of
 from dpgcli.files.places import Location, shown
+from dpgcli.files.sweep_file.models import MOST_KEYS
 from dpgcli.files.table_reader import DAMAGED, undamaged
 
 LARGEST_WHOLE = 2**63 - 1
@@ -47,8 +48,8 @@ def frame_in(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFra
     An index with a name is a column like the others, as it was before it was made the index.
     """
     if not content.startswith(PARQUET):
-        rows = _csv(content)
-        return rows if has_room(*rows.shape) else None
+        rows = _csv(content, has_room)
+        return rows if rows is not None and has_room(*rows.shape) else None
     file = undamaged(io.BytesIO(content))
     if file is None:
         raise ValueError(DAMAGED)
@@ -100,8 +101,10 @@ class NoTableError(ValueError):
     """A file is no table: what was found, and a hint."""
 
 
-def _csv(content: bytes) -> pd.DataFrame:
-    """Comments leave empty lines, so that the others keep their numbers.
+def _csv(content: bytes, has_room: Callable[[int, int], bool]) -> pd.DataFrame | None:
+    """The table, None for more keys than there is room for: pandas takes a minute for a million.
+
+    Comments leave empty lines, so that the others keep their numbers.
 
     Lines end as pandas ends them: where a comment went on behind a lone CR, rows would be lost.
     """
@@ -112,6 +115,9 @@ def _csv(content: bytes) -> pd.DataFrame:
         content = COMMENT.sub(b"", content)
     ends = _ends(content)
     separator = separator_of(ends)
+    n_rows, n_keys = _size(content, separator)
+    if n_keys > MOST_KEYS and not has_room(n_rows, n_keys):
+        return None
     _check_gaps(given, separator)
     mark = separator if separator.strip() else "\t"
     if b'"' in content:  # pandas reads "3"4 as 34
@@ -137,6 +143,13 @@ def _utf8(content: bytes) -> bytes:
         return text_of(content, Location("table")).encode()
     except SpecError as error:
         raise NoTableError(error.problems[0].found, error.problems[0].hint) from None
+
+
+def _size(content: bytes, separator: str) -> tuple[int, int]:
+    """About how many rows and keys there are, before they are read."""
+    head, *rows = [line for line in content.split(b"\n") if line.strip()] or [b""]
+    cells = head.split(separator.encode() if separator.strip() else None)
+    return len(rows), sum(1 for cell in cells if cell.strip())
 
 
 def _ends(content: bytes) -> list[str]:

@@ -719,6 +719,15 @@ def test_the_parts_of_a_folder_have_room_together(
     assert read("table: d.parquet").space.size == 2
 
 
+def test_a_header_without_end_is_refused_before_the_rest_is_read(
+    read: Read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys = ",".join(f"k{place}" for place in range(300))
+    (tmp_path / "t.csv").write_text(f"# many\n{keys}\n{'1,' * 299}1\n", encoding="utf-8")
+    monkeypatch.setattr(pd, "read_csv", None)
+    assert "found 300 numbers of 300 keys" in problems(read, "table: t.csv")[0]
+
+
 def test_a_table_is_a_file_and_nothing_else(read: Read, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "t.csv")
     assert "found a device or pipe" in problems(read, "table: t.csv")[0]
