@@ -192,7 +192,8 @@ class _Walk:
         place = self.at(mark.line, mark.column) if mark else self.start
         parts = [getattr(error, "context", None), getattr(error, "problem", None)]
         said = ", ".join(part for part in parts if part) or str(error) or type(error).__name__
-        return located(place, "syntax", "valid YAML", shortened(" ".join(said.split()), 120))
+        said = " ".join(said.split()).removeprefix("found ")  # as a problem says itself
+        return located(place, "syntax", "valid YAML", shortened(said, 120))
 
     def value(self, node: Node, path: KeyPath = (), depth: int = 0) -> Any:
         """The plain value of a node: dict, list, text, number, truth or None."""

@@ -129,11 +129,10 @@ def run_summary(output: Path, progress: Progress, part: Shard | None) -> str:
     """One line for standard error."""
     new = progress.n_done - progress.n_resumed
     resumed = f", {progress.n_resumed:,} were there" if progress.n_resumed else ""
-    text = (
-        f"{output}: {new:,} designs, {progress.n_states:,} states "
-        f"in {_seconds(progress):.3g} s ({progress.n_states / _seconds(progress):,.0f} states/s)"
-        f"{resumed}"
-    )
+    seconds = _seconds(progress)
+    pace = f"in {seconds:.3g} s ({progress.n_states / seconds:,.0f} states/s)"
+    done = f"{new:,} designs, {progress.n_states:,} states {pace}" if new else "no designs left"
+    text = f"{output}: {done}{resumed}"
     if progress.n_states:
         core, writing, pool = (f"{100 * share:.0f} %" for share in _shares(progress))
         of = "the worker's time" if progress.n_workers == 1 else "the workers' time"

@@ -45,7 +45,7 @@ class StoredTask:
 
     def __call__(self, part: Part, maker: Maker) -> bytes:
         """What a part comes to as bytes; none where it is kept, or is nothing."""
-        check_maker(maker)
+        check_maker(maker, "search")
         found = self.task(part)
         if found is None or self.store is None:
             return b"" if found is None else packed(found)
@@ -100,7 +100,7 @@ class SearchStudy:
                     ", or drop it with ",
                     Field("restart"),
                 )
-        check_workers(self.workplace)
+        check_workers(self.workplace, "search")
         self.store.say(self.identity)
         for damaged in self.store.damaged():
             with writing(damaged.path):

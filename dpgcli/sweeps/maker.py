@@ -1,4 +1,4 @@
-"""Who makes the numbers of a sweep: versions and code, so that nobody else's are taken for them."""
+"""Who makes the numbers of a sweep or a search: versions and code, so that nobody else's are taken for them."""
 
 import os
 import pkgutil
@@ -52,23 +52,23 @@ HERE = Maker(dpgcli.__version__, **versions_of_libraries(), code=code_of(PACKAGE
 WHO = partial(pkgutil.resolve_name, f"{__name__}:HERE")
 
 
-def check_maker(maker: Maker) -> None:
-    """Raise WorkplaceError in a worker that is not the one who is to make the numbers."""
+def check_maker(maker: Maker, work: str = "sweep") -> None:
+    """Raise WorkplaceError in a worker that is not the one who is to make the numbers of a work."""
     if maker != HERE:
         where = f"{platform.node()}, process {os.getpid()}, Python in {sys.prefix}"
-        raise WorkplaceError(_mixed(f"a worker ({where})", str(HERE), maker))
+        raise WorkplaceError(_mixed(f"a worker ({where})", str(HERE), maker, work))
 
 
-def check_workers(workplace: Backend) -> None:
+def check_workers(workplace: Backend, work: str = "sweep") -> None:
     """Ask all workers that are there; raises WorkplaceError for the first that is another."""
     for worker, maker in workplace.ask(WHO).items():
         if maker != HERE:
             says = str(maker) if isinstance(maker, Maker) else f"another dpg, or none ({maker!r})"
-            raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE))
+            raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE, work))
 
 
-def _mixed(who: str, has: str, maker: Maker) -> str:
+def _mixed(who: str, has: str, maker: Maker, work: str) -> str:
     return (
-        f"{who} has {has}, but this sweep is of {maker}: their numbers may differ; "
+        f"{who} has {has}, but this {work} is of {maker}: their numbers may differ; "
         "install one package everywhere and restart its workers"
     )

@@ -13,8 +13,9 @@ from dpgcli.errors import NothingSelectedError, UsageError, WorkplaceError
 from dpgcli.search import search as module
 from dpgcli.search.part import Clock, Found, Part, searched_part
 from dpgcli.search.search import Limits, Task, search
-from dpgcli.studies.search import SearchStudy, packed, unpacked
-from dpgcli.sweeps.executors import Result, Runner, serial
+from dpgcli.studies.search import SearchStudy, StoredTask, packed, unpacked
+from dpgcli.sweeps.executors import Backend, Result, Runner, serial
+from dpgcli.sweeps.maker import HERE
 
 STROKE = "finger.lattice.stroke_mm"
 LATTICE = {
@@ -177,3 +178,15 @@ def test_what_nobody_can_go_on_with_is_not_kept(goal: dict[str, Any], tmp_path: 
         dpg.inverse_design({**goal, "vary": hinge}, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert dpg.inverse_design(goal, tmp_path / "out").specs
+
+
+def test_workers_of_another_code_are_told_of_the_search(
+    goal: dict[str, Any], tmp_path: Path
+) -> None:
+    other = HERE._replace(code="f" * 64)
+    mixed = Backend("the cluster", lambda _: pytest.fail("used"), 2, ask=lambda _: {"a": other})
+    study = SearchStudy(goal_input(goal), 1, Limits(None, None), mixed, tmp_path)
+    with pytest.raises(WorkplaceError, match=r"worker a .* but this search is of"):
+        study.begin()
+    with pytest.raises(WorkplaceError, match=r"a worker .* but this search is of"):
+        StoredTask(lambda _: pytest.fail("done"), None)(None, other)  # type: ignore[arg-type]
