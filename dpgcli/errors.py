@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 from dpgcli.records import dataclass
-from dpgcli.text import printable
+from dpgcli.text import legible, printable
 
 
 class Field(str):
@@ -64,11 +64,13 @@ class Problem:
 class DpgError(Exception):
     """Any error raised on purpose: what was wrong with the input, or went wrong outside.
 
-    The parts of its message may be fields. Any other exception is a bug.
+    The parts of its message may be fields; in the others stands what somebody handed in, which is
+    made fit to print here. Any other exception is a bug.
     """
 
     def __init__(self, *parts: str) -> None:
-        self.message = Message(*parts)
+        flat = Message(*parts).parts
+        self.message = Message(*(p if isinstance(p, Field) else legible(p) for p in flat))
         super().__init__(self.message)
 
 

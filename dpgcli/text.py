@@ -6,6 +6,7 @@ from collections.abc import Sequence
 KeyPath = tuple[str | int, ...]
 
 MAX_SHOWN = 60
+LONGEST, GAP = 2000, " [..] "  # characters of a line of a message, of which the middle is cut
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 COMMAND = re.compile(r"(^\s*):(?=:)|(#)#(?=\w*\[)")
 
@@ -58,13 +59,13 @@ def number_in(text: str) -> float:
 
 
 def quoted(value: object) -> str:
-    """Whatever somebody handed in, as Python writes it; its type where Python cannot.
+    """Whatever somebody handed in, as Python writes it, cut; its type where Python cannot.
 
     >>> quoted("a"), quoted(10**5000)
     ("'a'", 'an int that cannot be written')
     """
     try:
-        return repr(value)
+        return shortened(repr(value))
     except Exception:  # of more than 4,300 digits, too deep, or what somebody's class raises
         kind = type(value).__name__
         return f"a{'n' * (kind[:1].lower() in 'aeiou')} {kind} that cannot be written"
@@ -83,6 +84,23 @@ def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     """
     head = printable(text[: limit + 1])
     return head if len(head) <= limit else head[: limit - 3] + "..."
+
+
+def legible(text: str) -> str:
+    """Lines fit to print, each printable and without its middle where it is long.
+
+    >>> legible("a\\x1b[2J\\nb"), len(legible("a" * 500_000))
+    ('a\\\\x1b[2J\\nb', 2000)
+    """
+    return "\n".join(map(_legible, text.split("\n")))
+
+
+def _legible(line: str) -> str:
+    half = (LONGEST - len(GAP)) // 2
+    if len(line) > 2 * LONGEST:  # which is not made longer first
+        line = f"{line[:LONGEST]}{line[-LONGEST:]}"
+    line = printable(line)
+    return line if len(line) <= LONGEST else f"{line[:half]}{GAP}{line[-half:]}"
 
 
 def enumerated(words: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from dpgcli.errors import UsageError
-from dpgcli.text import quoted, shortened
+from dpgcli.text import quoted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,9 +33,9 @@ def frame_of(source: Any) -> "pd.DataFrame":
         raise UsageError(f"expected a table, columns of one length: {error}") from error
     for name, column in frame.items():
         if _is_no_cell(name):
-            raise UsageError(f"expected a table, found a column {shortened(quoted(name))}")
+            raise UsageError(f"expected a table, found a column {quoted(name)}")
         if column.dtype == object and (wrong := [*islice(filter(_is_no_cell, column), 1)]):
-            found = f"{quoted(name)}: {shortened(quoted(wrong[0]))}"
+            found = f"{quoted(name)}: {quoted(wrong[0])}"
             raise UsageError(f"expected a table of numbers and texts, found in column {found}")
     return frame
 

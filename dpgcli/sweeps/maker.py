@@ -1,4 +1,4 @@
-"""Who makes the numbers of a sweep or a search: versions and code, so that nobody else's are taken for them."""
+"""Who makes the numbers of a sweep or a search, by versions and code: nobody else's are taken."""
 
 import os
 import pkgutil

@@ -96,7 +96,7 @@ def fit(**given: Any) -> Any:
         ),
         (
             lambda: dpg.predict(FINGER, target_error=10**400),
-            "target_error 1000*: expected a",
+            "target_error 1000*[.]{3}: expected a",
         ),
         (
             lambda: dpg.predict(FINGER).sketch(width="a"),
@@ -118,7 +118,7 @@ def fit(**given: Any) -> Any:
         ),
         (lambda: fit(fix=3.5), "fix 3.5: expected values by key"),
         (lambda: fit(fix="stroke_mm=3.5"), "fix 'stroke_mm=3.5': expected values by key"),
-        (lambda: fit(fix={"stroke_mm": 10**400}), "fix stroke_mm=1000*: expected a number from"),
+        (lambda: fit(fix={"stroke_mm": 10**400}), "fix stroke_mm=1000*[.]{3}: expected a number"),
         (lambda: fit(fix={"force_linearity": True}), "fix force_linearity=True: expected a number"),
         (lambda: dpg.fit_finger(BASE, TIPS, error="tips=1_0"), "error 'tips=1_0': expected a num"),
         (lambda: dpg.actuate(BASE, pressure=memoryview(b"ab")), "pressure <memory .* expected two"),
@@ -143,7 +143,7 @@ def fit(**given: Any) -> Any:
         ),
         (
             lambda: dpg.fit_grid(GRID, geometry=pd.Series([6.5])),
-            r"geometry 0 +6.5\n.*: expected a text",
+            r"geometry 0 +6.5\\n.*: expected a text",
         ),
         (lambda: dpg.check(pa.array([1]), "a > 1"), "the table is no table of designs"),
         (lambda: dpg.check({}, "a > 1", strict=pd.NA), "strict <NA>: expected True or False"),

@@ -2,7 +2,6 @@
 
 import inspect
 from collections.abc import Callable
-from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -84,6 +83,7 @@ NONE: tuple[Any, ...] = (
     date(2020, 1, 1), object(), np.array([]), np.array([0]), np.array([1.0, 2.0]), np.array(1),
     np.bool_(True), pd.Series([1]), pd.DataFrame(), pd.DataFrame({"a": [1]}), pa.array([1]),
     pa.table({"a": [1]}), [None], [[1]], {1: 2}, Path("x" * 300),
+    "x" * 100_000, "\x1b[2J", ["\0"], {"\x1b[2J": "y" * 100_000}, "\u202e,\ud800",
 )  # fmt: skip
 SLOW = pytest.mark.slow
 CHOICES = [
@@ -110,8 +110,11 @@ def test_any_value_is_taken_or_refused_by_us(
     monkeypatch.chdir(tmp_path)
     call: Callable[..., Any] = getattr(dpg, name)
     for value in NONE:
-        with suppress(dpg.DpgError):
+        try:
             if name == "validate":
                 call(*FACE[name]["specs"], settings=value)
             else:
                 call(**{**FACE[name], argument: value})
+        except dpg.DpgError as error:
+            lines = str(error).split("\n")
+            assert all(line.isprintable() and len(line) < 2500 for line in lines)
