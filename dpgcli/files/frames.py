@@ -1,5 +1,6 @@
 """Tables that are handed in as values: data frames, Arrow tables, columns by name."""
 
+from collections.abc import Iterator
 from decimal import Decimal
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,8 @@ from dpgcli.text import quoted
 if TYPE_CHECKING:
     import pandas as pd
 
+UNLISTED = (range, Iterator)
+MOST_ITEMS = 10**6
 MOST_BITS = 1024  # of a whole number: more than double precision reaches
 
 
@@ -27,10 +30,13 @@ def frame_of(source: Any) -> "pd.DataFrame":
 
     convert: Any = getattr(source, "to_pandas", None)  # as of an Arrow table
     try:
-        frame = pd.DataFrame(source if convert is None else convert())  # an array's is a series
+        table = _listed(source) if convert is None else convert()
+        frame = pd.DataFrame(table)  # an array's is a series
         frame = with_index(frame)
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise UsageError(f"expected a table, columns of one length: {error}") from error
+    except MemoryError as error:
+        raise UsageError("expected a table that there is memory for") from error
     for name, column in frame.items():
         if _is_no_cell(name):
             raise UsageError(f"expected a table, found a column {quoted(name)}")
@@ -38,6 +44,23 @@ def frame_of(source: Any) -> "pd.DataFrame":
             found = f"{quoted(name)}: {quoted(wrong[0])}"
             raise UsageError(f"expected a table of numbers and texts, found in column {found}")
     return frame
+
+
+def _listed(source: Any) -> Any:
+    """A source whose ranges and iterators, which need not be in memory, are lists.
+
+    Raises UsageError for one of more than MOST_ITEMS, which may go on without end.
+    """
+    if isinstance(source, UNLISTED):
+        found = [*islice(iter(source), MOST_ITEMS + 1)]
+        if len(found) > MOST_ITEMS:
+            raise UsageError(f"expected at most {MOST_ITEMS:,} items of a range or an iterator")
+        return _listed(found)
+    if isinstance(source, dict):
+        return {name: _listed(column) for name, column in source.items()}
+    if isinstance(source, list | tuple) and any(isinstance(item, UNLISTED) for item in source):
+        return [*map(_listed, source)]
+    return source
 
 
 def _is_no_cell(value: Any) -> bool:

@@ -1,6 +1,7 @@
 """Tables that are handed in as values: a named index is a column, and every row counts."""
 
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
+from dpgcli.files.frames import frame_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 FINGER = uniform_finger(3, **STUDY)
@@ -148,3 +150,49 @@ def test_a_file_of_the_name_that_frames_have(folder: Path) -> None:
     text = TIPS.to_csv(index=False, sep=";")
     (folder / "data frame").write_text(f"# of a machine\n{text}")
     assert len(dpg.compare(FINGER, "data frame").table) == 3
+
+
+ENDLESS = [
+    lambda: range(10**12),
+    lambda: count(),
+    lambda: {"travel_mm": range(10**12), "energy_mJ": [0.0]},
+    lambda: {"travel_mm": count(), "energy_mJ": [0.0]},
+    lambda: [range(10**12)],
+]
+
+
+@pytest.mark.parametrize("made", ENDLESS)
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda table: dpg.check(table, "n_stable > 1"),
+        dpg.pick,
+        lambda table: dpg.compare(FINGER, table),
+        lambda table: dpg.fit_finger(FINGER, table),
+        lambda table: dpg.fit_bistable(table, travel_to_opening="equal"),
+        dpg.fit_hinge,
+        dpg.fit_unit,
+        dpg.fit_grid,
+    ],
+)
+def test_what_need_not_be_in_memory_is_no_table_without_end(
+    monkeypatch: pytest.MonkeyPatch, call: Callable[[Any], Any], made: Callable[[], Any]
+) -> None:
+    monkeypatch.setattr("dpgcli.files.frames.MOST_ITEMS", 1000)
+    with pytest.raises(dpg.DpgError):
+        call(made())
+
+
+def test_ranges_are_columns_and_memory_may_lack(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = frame_of({"a": range(3), "b": iter([1.0, 2.0, 3.0])})
+    assert found.to_dict("list") == {"a": [0, 1, 2], "b": [1.0, 2.0, 3.0]}
+    monkeypatch.setattr("dpgcli.files.frames.MOST_ITEMS", 2)
+    with pytest.raises(dpg.UsageError, match="at most 2 items"):
+        frame_of({"a": range(3)})
+
+    def lacking(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(pd, "DataFrame", lacking)
+    with pytest.raises(dpg.UsageError, match="there is memory for"):
+        frame_of({"a": [1.0]})
