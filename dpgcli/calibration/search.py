@@ -120,24 +120,49 @@ class Search:
         values = _with(start, free, found.x * size)
         self.check_told_apart(values, free)
         if found.status <= 0:
-            raise FitError(f"no convergence after {found.nfev} steps, at {self.named(values)}")
+            hint = self.told_apart_worst(values, free)
+            at = self.named(values)
+            raise FitError(f"no convergence after {found.nfev} steps, at {at}{hint}")
         return values
 
     def check_told_apart(self, values: Array, free: Flags) -> None:
         """Raise FitError for parameters that the data leave undetermined."""
+        keys, columns = self._effects(values, free)
+        _, singular, directions = np.linalg.svd(columns, full_matrices=False)
+        if singular[-1] > SMALLEST_SINGULAR_VALUE:
+            return
+        if idle := [k for k, effect in zip(keys, columns.T, strict=True) if not effect.any()]:
+            raise FitError(f"the data do not depend on {' and '.join(idle)}: fix it")
+        alike = [k for k, part in zip(keys, directions[-1], strict=True) if abs(part) > 0.1]
+        raise FitError(f"the data cannot tell {' and '.join(alike)} apart: fix one of them")
+
+    def told_apart_worst(self, values: Array, free: Flags) -> str:
+        """The two free values whose effects on the data are most alike, and what helps, in words.
+
+        Along a valley of such values the search goes on without end.
+        """
+        keys, columns = self._effects(values, free)
+        if len(keys) == 1:
+            return ""
+        alike = np.triu(np.abs(columns.T @ columns), 1)
+        pair = np.unravel_index(alike.argmax(), alike.shape)
+        one, other = (keys[place] for place in pair)
+        return (
+            f": of the free values the data tell {one} and {other} apart worst (their effects are "
+            f"alike by {100.0 * alike[pair]:.4g} %): fix one of them"
+        )
+
+    def _effects(self, values: Array, free: Flags) -> tuple[list[str], Array]:
+        """Keys of the free values, and their effects on the data, (row, value), of length one.
+
+        What is rounding beside the others is zero.
+        """
         slopes = self.jacobian(values)[np.ix_(self.rows, free)]
         length = np.sqrt((slopes**2).sum(axis=0))
         effect = length * np.array([p.size for p in self.parameters])[free]
         length = np.where(effect > SMALLEST_EFFECT * effect.max(initial=0.0), length, 0.0)
-        columns = slopes / np.where(length > 0.0, length, np.inf)
-        _, singular, directions = np.linalg.svd(columns, full_matrices=False)
-        if singular[-1] > SMALLEST_SINGULAR_VALUE:
-            return
         keys = [p.key for p, is_free in zip(self.parameters, free, strict=True) if is_free]
-        if idle := [key for key, size in zip(keys, length, strict=True) if size == 0.0]:
-            raise FitError(f"the data do not depend on {' and '.join(idle)}: fix it")
-        alike = [k for k, part in zip(keys, directions[-1], strict=True) if abs(part) > 0.1]
-        raise FitError(f"the data cannot tell {' and '.join(alike)} apart: fix one of them")
+        return keys, slopes / np.where(length > 0.0, length, np.inf)
 
     def cost(self, values: Array, scale: float) -> float:
         """½ Σ C² ρ((r/C)²) over the rows that count."""

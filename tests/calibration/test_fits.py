@@ -223,6 +223,29 @@ def test_a_search_that_does_not_end_is_said(monkeypatch: pytest.MonkeyPatch) -> 
         fitted(noisy(1))
 
 
+def test_what_a_search_without_end_hardly_tells_apart_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By the cosine of two effects, whatever the third value does."""
+    monkeypatch.setattr(search, "MOST_STEPS", 2)
+    starts = {"level": 1.0, "size": 1.0, "rate": 0.2}
+    three = tuple(Parameter(key, start, 1e-6, 1e3) for key, start in starts.items())
+    last: list[Array] = []
+
+    def jacobian(v: Array) -> Array:
+        last.append(np.column_stack((np.cos(9.0 * TIME), slopes(v[1:]))))
+        return last[-1]
+
+    def residual(v: Array) -> Array:
+        return v[0] * np.cos(9.0 * TIME) + decay(v[1:]) - noisy(1)
+
+    with pytest.raises(FitError, match=r"size and rate apart worst .*: fix one of them") as said:
+        fit(three, residual, jacobian, observed=noisy(1))
+    _, size, rate = last[-1].T
+    cosine = abs(size @ rate) / np.sqrt((size @ size) * (rate @ rate))
+    assert f"alike by {100.0 * cosine:.4g} %" in str(said.value)
+
+
 @pytest.mark.parametrize("unit", [1e-9, 1e9])
 def test_units_do_not_matter(unit: float) -> None:
     """The same data in units that are a billion times larger or smaller, from a far start."""
