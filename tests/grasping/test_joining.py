@@ -320,6 +320,7 @@ def rows_of(finger: Finger, gripper: Gripper, body: Body | None, *pairs: str) ->
     return grasp_rows(grasps(scene, chain_potential, body, both))
 
 
+@pytest.mark.slow
 def test_mirrored_pairs_are_minima(
     reference_finger: Fingers, own: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -558,6 +558,7 @@ def test_a_body_on_edge_is_not_stable(
     assert np.isnan(told["object_angle_deg"]).all() and np.isnan(told["squeeze_N"]).all()
 
 
+@pytest.mark.slow
 def test_a_body_on_two_edges_goes_counterclockwise(
     reference_finger: Fingers, monkeypatch: pytest.MonkeyPatch
 ) -> None:

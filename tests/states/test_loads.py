@@ -300,7 +300,9 @@ def test_what_a_search_finds_is_where_growing_loads_lead(
     assert np.abs(off[:, is_stable]).max() < 1e-9
 
 
-@pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
+@pytest.mark.parametrize(
+    "formulate", [chain_potential, pytest.param(lattice_potential, marks=pytest.mark.slow)]
+)
 def test_a_state_under_loads_is_on_the_branch_of_its_unloaded_state(
     formulate: Formulate, units_of: UnitsOf
 ) -> None:
