@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import sys
 import warnings
 from collections.abc import Iterator
@@ -190,9 +191,11 @@ class _Walk:
         """A syntax error in one line."""
         mark = _mark(error)
         place = self.at(mark.line, mark.column) if mark else self.start
-        parts = [getattr(error, "context", None), getattr(error, "problem", None)]
-        said = ", ".join(part for part in parts if part) or str(error) or type(error).__name__
-        said = " ".join(said.split()).removeprefix("found ")  # as a problem says itself
+        problem = getattr(error, "problem", None) or str(error) or type(error).__name__
+        wanted, _, found = " ".join(problem.split()).rpartition("but ")
+        around = [getattr(error, "context", None), wanted.rstrip(", ")]
+        where = ", ".join(" ".join(part.split()) for part in around if part)
+        said = re.sub("^(found|got) ", "", found) + (f" ({where})" if where else "")
         return located(place, "syntax", "valid YAML", shortened(said, 120))
 
     def value(self, node: Node, path: KeyPath = (), depth: int = 0) -> Any:

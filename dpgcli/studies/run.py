@@ -10,6 +10,7 @@ from dpgcli.files.output import check_outputs
 from dpgcli.files.table_writer import write_run
 from dpgcli.studies.sweep import RUN, Progress, Shard, Study, drop_parts, outputs
 from dpgcli.sweeps.extent import size_text, time_text
+from dpgcli.text import counted
 
 LONG = 30.0  # s of one core: what takes longer is said before
 MOST_NAMED = 20  # failed designs with a command for each
@@ -131,7 +132,11 @@ def run_summary(output: Path, progress: Progress, part: Shard | None) -> str:
     resumed = f", {progress.n_resumed:,} were there" if progress.n_resumed else ""
     seconds = _seconds(progress)
     pace = f"in {seconds:.3g} s ({progress.n_states / seconds:,.0f} states/s)"
-    done = f"{new:,} designs, {progress.n_states:,} states {pace}" if new else "no designs left"
+    done = (
+        f"{counted(new, 'design')}, {counted(progress.n_states, 'state')} {pace}"
+        if new
+        else "no designs left"
+    )
     text = f"{output}: {done}{resumed}"
     if progress.n_states:
         core, writing, pool = (f"{100 * share:.0f} %" for share in _shares(progress))

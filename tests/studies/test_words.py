@@ -16,7 +16,7 @@ def test_nothing_that_was_done_has_no_pace(part: Shard | None) -> None:
     assert said.startswith("out: no designs left, 4 were there")
     assert "states/s" not in said
     some = run_summary(Path("out"), Progress(4, 4, 3, 1, n_states=8, seconds=2.0), part)
-    assert some.startswith("out: 1 designs, 8 states in 2 s (4 states/s), 3 were there")
+    assert some.startswith("out: 1 design, 8 states in 2 s (4 states/s), 3 were there")
 
 
 def test_a_calibration_that_was_fitted_again_is_one_difference() -> None:

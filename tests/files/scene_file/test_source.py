@@ -99,7 +99,7 @@ def test_foreign_tags_are_refused_and_not_constructed():
     [
         ("a: b: c", "a.yaml:1:5: syntax: expected valid YAML"),
         ("a: [1,\nb: 2", "a.yaml:2:5: syntax: expected valid YAML"),
-        ("a: 1\n---\nb: 2\n", "a.yaml:2:1: syntax: expected valid YAML, found expected a single"),
+        ("a: 1\n---\nb: 2\n", "a.yaml:2:1: syntax: expected valid YAML, found another document"),
         ("a: *b", "a.yaml:1:4: syntax: expected valid YAML, found undefined alias 'b'"),
         ("a: 1\nb: \x00", "a.yaml:2:4: syntax: expected printable characters, found '\\x00'"),
         ("", "a.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
