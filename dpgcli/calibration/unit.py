@@ -17,6 +17,7 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PushOnly, Tabulated
 
 FEWEST_PUSHES = 2
+TOUCHING = 0.01  # of the largest push: with less a dome has let go of its neighbor
 SMALLEST_RISE = 0.03  # of the opening: less is noise of a pusher that hardly gives way
 STIFFEST = 2.5e-4  # of the opening over the push: walls yield hundreds of times as much
 POWERS = {  # of a length by which the study's values scale, the material and the shape kept
@@ -88,10 +89,14 @@ def unit_finger(known: KnownStates, segment_height: float) -> Finger:
 
 
 def _push(known: KnownStates, study: Mapping[str, float]) -> tuple[float, float]:
-    """Stiffness and rest length of the spring whose pushes the data have; the study's without."""
+    """Stiffness and rest length of the spring whose pushes the data have; the study's without.
+
+    Where the dome has let go of its neighbor the gap opens by the hinge alone: that is not of it.
+    """
     is_known = known.patterns & np.isfinite(known.pushes) & np.isfinite(known.openings)
     if not known.patterns.any():
         return study["bistable_stiffness"], study["stroke"]
+    is_known &= known.pushes > TOUCHING * np.max(known.pushes[is_known], initial=0.0)
     opening, push = known.openings[is_known], known.pushes[is_known]
     if len(np.unique(push)) < FEWEST_PUSHES:
         raise FitError(

@@ -141,8 +141,8 @@ def _under_load(
     """What unloaded states become as loads grow, in another pattern perhaps, certified.
 
     Where openings grow in proportion to the loads Newton's method does; all else is followed, since
-    it might step over a fold, or onto another branch. What has no unloaded state, or folds onto
-    itself on the way, is a state that is found from the guess under the full loads.
+    it might step over a fold, or onto another branch. What is lost on the way, as a finger that
+    folds onto itself, has no answer. What has no unloaded state is looked for under the full loads.
     """
     bare = replace(units, finger=units.finger.unloaded)
     begun = settle(bare, formulate, inverted, tolerance, own=own)
@@ -153,8 +153,9 @@ def _under_load(
     full = settled.equilibrium.coordinates
     coordinates = settled.potential.coordinates
     ways = (begun.equilibrium.coordinates, there, full)
-    openings = (coordinates.springs(x).extension for x in ways)
-    is_sure = (settled.status <= Status.MARGINAL) & _are_straight(*openings)
+    is_straight = _are_straight(*(coordinates.springs(x).extension for x in ways))
+    is_sure = is_straight & (settled.status == Status.STABLE)
+    is_sure |= settled.status == Status.MARGINAL  # next to a fold, or on a saddle: no way on
     lanes = np.flatnonzero(has_begun & ~is_sure)
     if not len(lanes):
         return settled
@@ -162,11 +163,13 @@ def _under_load(
 
     few, begins = units.take_lanes(lanes), np.take(inverted, lanes, axis=1)
     way = grown(few, formulate, begins, begun.equilibrium.coordinates[:, lanes])
-    start = np.where(way.arrived, way.coordinates, guess[:, lanes])
     potential = formulate(few.finger.with_domes(begins))
-    again = settle_from(few, potential, begins, start, tolerance, own)
+    again = settle_from(few, potential, begins, way.coordinates, tolerance, own)
     found = settled.equilibrium.with_lanes(lanes, again.equilibrium, np.arange(len(lanes)))
-    return certified(units, settled.potential, inverted, found, tolerance, own)
+    settled = certified(units, settled.potential, inverted, found, tolerance, own)
+    status = settled.status.copy()
+    status[lanes[~way.arrived]] = Status.NOT_CONVERGED  # elsewhere than loads lead to, if anywhere
+    return replace(settled, status=status)
 
 
 def _are_straight(begin: Array, middle: Array, end: Array) -> Flags:

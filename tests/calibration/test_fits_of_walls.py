@@ -201,6 +201,37 @@ def test_a_unit_by_its_moment_balance(unit: KnownStates) -> None:
         assert fit.values[key] == pytest.approx(value, rel=1e-5)
 
 
+def test_rows_in_which_a_dome_has_let_go_are_no_part_of_its_line() -> None:
+    """k θ = M + P H cos(θ/2) and o = 2 H sin(θ/2) + c P with P = s (o_0 − o) >= 0, exactly."""
+    lever, hinge, walls, spring, too_long = 6.9, 4.6, 1.2, 22.0, 2.2
+    rows: dict[str, list[Any]] = {"unit": [], "moment_N_mm": [], "chamber2_angle_rad": []}
+    rows |= {"opening_mm": [], "push_N": []}
+
+    def push(turn: float) -> float:
+        gap = 2.0 * lever * np.sin(turn / 2.0)
+        return float(max(spring * (too_long - gap) / (1.0 + walls * spring), 0.0))
+
+    for name, moments in (("ground", (-0.7, 0.3, 1.2)), ("inverted", (-0.7, 0.3, 1.2, 2.2, 3.0))):
+        for moment in moments:
+            on = float(name == "inverted")
+            turn = brentq(
+                lambda t, m=moment, on=on: hinge * t - m - on * push(t) * lever * np.cos(t / 2.0),
+                *(-1.0, 1.0),
+                xtol=1e-15,
+            )
+            pushed = on * push(turn)
+            opening = 2.0 * lever * np.sin(turn / 2.0) + walls * pushed
+            told = (
+                (name, moment, -turn, opening, pushed) if on else (name, moment, -turn, None, None)
+            )
+            for column, value in zip(rows.values(), told, strict=True):
+                column.append(value)
+    assert [value for value in rows["push_N"] if value is not None].count(0.0) == 2
+    found = fit_unit(rows).values
+    for key, value in {LEVER: lever, HINGES: hinge, WALLS: walls}.items():
+        assert found[key] == pytest.approx(value, rel=1e-6)
+
+
 def test_one_moment_does_not_tell_hinge_and_walls_apart(unit: KnownStates) -> None:
     alone = unit.chosen(np.flatnonzero(unit.patterns[0] & (unit.moments == 0.0)))
     start = unit_finger(unit, 10.75)

@@ -1,7 +1,9 @@
 """Fingers under dead loads: closed forms, other minimizers, 50 digits, and units that reset."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.terms import Formulate, chain_potential, lattice_potential
 from dpgcli.reference.equilibria import extended_states
+from dpgcli.states import loading
 from dpgcli.states.barriers import barriers
 from dpgcli.states.certify import Settled, Status
 from dpgcli.states.loading import Grown, grown
@@ -327,6 +330,23 @@ def test_a_state_under_loads_is_on_the_branch_of_its_unloaded_state(
     found = stable(finger, patterns, formulate).equilibrium.coordinates
     springs = potential.coordinates.springs(found)
     assert springs.extension == pytest.approx(openings[-1], abs=1e-6)
+
+
+def test_what_is_lost_as_loads_grow_is_no_state(
+    reference_finger: Fingers, units_of: UnitsOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though a search under the full loads would find one that is certified."""
+    finger, patterns = loaded(reference_finger(3, 1e4), 0.5), units_of("101", "111")
+    monkeypatch.setattr(sys.modules[settle.__module__], "STRAIGHT", 0.0)  # so that all is followed
+    stable(finger, patterns)
+
+    def lost(*of: Any) -> Grown:
+        way = grown(*of)
+        return replace(way, arrived=np.array([True, False]))
+
+    monkeypatch.setattr(loading, "grown", lost)
+    found = solved(finger, patterns)
+    assert found.status.tolist() == [Status.STABLE, Status.NOT_CONVERGED]
 
 
 @pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
