@@ -13,6 +13,7 @@ from dpgcli.arrays import Array, Flags
 from dpgcli.design.pressure import History, Pressure
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
+from dpgcli.grasping.descent import finished
 from dpgcli.grasping.shapes import ContactShapes, Ramp
 from dpgcli.grasping.travels import with_travels, without_travels
 from dpgcli.mechanics.pressure import DomeVolumes
@@ -64,7 +65,11 @@ def at_rest(own: Obstructed, came: Approach, volumes: DomeVolumes) -> Approach:
     """Fingers that have come to no pressure, as states."""
     none = np.zeros((own.units.finger.n_units, 1))
     under = replace(own, ramp=Ramp(volumes, none, none))
-    return replace(came, shapes=without_travels(under, came.shapes))
+    shapes = without_travels(under, came.shapes)
+    if under.n_travels:  # as exactly as states are, whose forces in play are without those of domes
+        there = finished(own, shapes.coordinates, shapes.inverted, shapes.push, came.load)
+        shapes = replace(there, is_there=there.is_there & shapes.is_there)
+    return replace(came, shapes=shapes)
 
 
 def _told_by_pressure(told: Reset, ramp: Ramp, n_fingers: int) -> Reset:
