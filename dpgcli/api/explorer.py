@@ -16,7 +16,7 @@ from dpgcli.files.access import reading
 from dpgcli.files.design_spec import swept_base
 from dpgcli.files.parts import FINGERPRINT
 from dpgcli.files.row_source import RowSource, opened_rows
-from dpgcli.files.scene_file import checked, scene_of
+from dpgcli.files.scene_file import canonical, checked, scene_of
 from dpgcli.reports.explorer.content import BestDesign, Explored, best_rows, shown_rows
 from dpgcli.reports.explorer.poses import StateTips
 from dpgcli.reports.explorer.shapes import (
@@ -55,7 +55,7 @@ def explored(folder: Path, space: DesignSpace) -> Explored:
         *(["one finger, in its own frame"] * is_gripper),
         *([WITHOUT_BODY] * (base.design.body is not None)),
     ]
-    return Explored(rows, best, keys, base.model_dump(exclude_none=True), shapes)
+    return Explored(rows, best, keys, canonical(base.model_dump(exclude_none=True)), shapes)
 
 
 def _best(source: RowSource, row: int, metrics: list[str]) -> BestDesign:

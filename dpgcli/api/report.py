@@ -12,12 +12,13 @@ from dpgcli.files.table_reader import read_designs
 from dpgcli.files.table_writer import read_metadata
 from dpgcli.reports.page import html, markdown
 from dpgcli.reports.space import DesignSpace
-from dpgcli.reports.summary import ranked_metrics
+from dpgcli.reports.summary import STATUSES, ranked_metrics
 from dpgcli.studies.sweep import DESIGNS, REPORT
 from dpgcli.sweeps.gate import check_beyond_doubt
 from dpgcli.text import quoted
 
 PAGES = (".md", ".html")
+MOST_NAMED = 3  # statuses that are none
 AT_END = "<!-- written by dpg -->"
 
 Say = Callable[[str], None]
@@ -61,6 +62,11 @@ def page(folder: Path, kind: str, *, strict: bool = False) -> tuple[DesignSpace,
 def space_in(folder: Path) -> DesignSpace:
     """The design space in a folder."""
     table = read_designs(folder / DESIGNS)
+    if unknown := sorted({str(status) for status in table.columns["status"]} - {*STATUSES}):
+        found = ", ".join(map(quoted, unknown[:MOST_NAMED]))
+        raise UsageError(
+            f"{folder / DESIGNS}: status: expected {', '.join(STATUSES)}, found {found}"
+        )
     return DesignSpace(table.columns, table.units, read_metadata(folder / DESIGNS), table.trusts)
 
 

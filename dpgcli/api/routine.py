@@ -20,6 +20,7 @@ from dpgcli.api.inputs import (
     Settings,
     SpecInput,
     check_positive,
+    check_texts,
     figure_path,
     path_of,
     point,
@@ -268,6 +269,7 @@ def routine(
     """
     check_positive("ramp", ramp)
     check_positive("move", move)
+    check_texts(open=open, closed=closed)
     given, known = planned(spec, approach_from, object, at, open, closed, settings)
     return found_routine(given, known, ramp, move)
 

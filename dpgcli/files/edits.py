@@ -4,13 +4,14 @@ import hashlib
 import re
 from pathlib import Path
 
-SEAL = re.compile(rb"\A[^\n]*\n# [^\n]* SHA-256 ([0-9a-f]{64})\n")
-UNTIL = "# It may be replaced until it is edited: what follows has the SHA-256 "
+UNTIL = "# It may be replaced until it is edited: all but this line has the SHA-256 "
+SEAL = re.compile(rb"\A([^\n]*\n)" + re.escape(UNTIL.encode()) + rb"([0-9a-f]{64})\n")
 
 
 def sealed(first: str, body: str) -> str:
-    """A text of a first line and a body, with the SHA-256 of the body between them."""
-    return f"{first}\n{UNTIL}{hashlib.sha256(body.encode()).hexdigest()}\n{body}"
+    """A text of a first line and a body, with the SHA-256 of both between them."""
+    seal = hashlib.sha256(f"{first}\n{body}".encode()).hexdigest()
+    return f"{first}\n{UNTIL}{seal}\n{body}"
 
 
 def is_edited(path: Path) -> bool:
@@ -19,4 +20,4 @@ def is_edited(path: Path) -> bool:
     said = SEAL.match(content)
     if said is None:
         return bool(content)
-    return hashlib.sha256(content[said.end() :]).hexdigest().encode() != said[1]
+    return hashlib.sha256(said[1] + content[said.end() :]).hexdigest().encode() != said[2]

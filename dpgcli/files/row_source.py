@@ -97,7 +97,8 @@ class RowSource:
         if "calibration" in names and (keys := self.keys):
             return tuple(keys)
         first, last = (names.index(n) if n in names else 0 for n in ("design", "calibration"))
-        return tuple(name for name in names[first + 1 : last] if name in self.numbers)
+        numbers = frozenset(self.numbers)
+        return tuple(name for name in names[first + 1 : last] if name in numbers)
 
     @property
     def keys(self) -> dict[str, str]:

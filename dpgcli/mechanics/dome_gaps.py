@@ -18,10 +18,11 @@ from dpgcli.records import dataclass
 class DomeGaps:
     """ξ − y of every dome, mm: `extension` ξ by some coordinates, and `own` y behind them.
 
+    >>> from dpgcli.equilibrium.joined import OfPart
     >>> from dpgcli.mechanics.chain import Chain
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> chain = Chain(uniform_finger(1, **STUDY))  # rigid bars: two corners, and then y
-    >>> gaps = DomeGaps(chain.dome, OwnCoordinate(Row(1, 2), 1))
+    >>> gaps = DomeGaps(OfPart(chain.dome, 0, 1, 2), OwnCoordinate(Row(1, 2), 1))
     >>> gaps(np.array([[0.0], [0.0], [-2.0]])).value.tolist()
     [[2.0]]
     """

@@ -33,6 +33,7 @@ from dpgcli.sweeps.executors import Backend, Chunk, Runner, chunked
 from dpgcli.sweeps.extent import ASKED_AT_ONCE, MOST_ASKED, Extent, size_text
 from dpgcli.sweeps.maker import HERE, check_workers
 from dpgcli.temporary import drop_orphans
+from dpgcli.text import printable
 
 STATES_PER_CHUNK = 2**15  # a quarter of a second of work
 CHUNK_SECONDS = 4.0  # of work with bodies: several times what a batch takes to begin
@@ -133,7 +134,7 @@ class Study:
             "dpg.versions": versions(),
             "dpg.code": HERE.code,
         }
-        return {**said, BASE: self.sweep.base_path.name, FINGERPRINT: fingerprint(said)}
+        return {**said, BASE: printable(self.sweep.base_path.name), FINGERPRINT: fingerprint(said)}
 
     @property
     def _exactness(self) -> dict[str, str]:

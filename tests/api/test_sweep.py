@@ -223,3 +223,11 @@ except dpg.UsageError as error:
     )
     assert ran.stderr == ""
     assert "standard input: save it in a file, or take serial" in ran.stdout
+
+
+def test_a_base_whose_name_is_no_text(folder: Path) -> None:
+    """As of a disk that was written in another encoding: the name is only told."""
+    base = folder / os.fsdecode(b"b\xff.yaml")
+    base.write_bytes((folder / "study.yaml").read_bytes())
+    found = dpg.sweep({"base": base, "space": SPACE}, folder / "out", **SERIAL)
+    assert found.designs["n_stable"].tolist() == [4, 8, 4, 8]

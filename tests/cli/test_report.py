@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -118,6 +119,28 @@ def test_a_table_of_unknown_metadata_has_a_report(call: Call, swept: Path) -> No
 def change(folder: Path) -> None:
     text = (folder / "sweep.yaml").read_text(encoding="utf-8")
     (folder / "sweep.yaml").write_text(text.replace("2.5", "2.25"), encoding="utf-8")
+
+
+def test_a_page_of_designs_between_rigid_bars(call: Call, swept: Path) -> None:
+    """An infinity of the base spec is no number of JSON."""
+    rigid = ("-s", "finger.linear_stiffness_N_per_mm=.inf")
+    assert call("sweep", "sweep.yaml", "-o", "rigid", "-j", "1", *rigid).exit_code == 0
+    assert call("report", "rigid", "-o", "rigid.html").exit_code == 0
+
+
+def test_statuses_of_somebody_else_are_refused(call: Call, swept: Path, folder: Path) -> None:
+    """They were counted nowhere, and every design was said to be stable."""
+    table = pq.read_table(swept / "designs.parquet")
+    place = table.column_names.index("status")
+    crashed = pa.array(["crashed"] * table.num_rows)
+    (folder / "s").mkdir()
+    foreign = table.set_column(place, "status", crashed).replace_schema_metadata({})
+    pq.write_table(foreign, folder / "s" / "designs.parquet")
+    result = call("report", "s")
+    assert result.exit_code == ExitCode.USAGE
+    assert 'status: expected stable, partly_stable, invalid, excluded, failed, found "crashed"' in (
+        result.stderr
+    )
 
 
 def test_the_report_of_former_tables_is_made_anew(

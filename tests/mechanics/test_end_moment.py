@@ -36,7 +36,7 @@ def pushed(reference_finger: Fingers, n_units: int, compliance: float, bars: flo
 
 def solved(finger: Finger, formulate: Formulate, pattern: list[bool]) -> Settled:
     inverted = np.repeat(np.array(pattern)[:, None], MOMENTS.size, axis=1)
-    settled = settle(UnitSolutions.of(finger), formulate, inverted, 1e-12)
+    settled = settle(UnitSolutions.of(finger), formulate, inverted, 1e-13)
     assert (settled.status == Status.STABLE).all()
     return settled
 
