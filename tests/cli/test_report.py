@@ -138,9 +138,8 @@ def test_statuses_of_somebody_else_are_refused(call: Call, swept: Path, folder: 
     pq.write_table(foreign, folder / "s" / "designs.parquet")
     result = call("report", "s")
     assert result.exit_code == ExitCode.USAGE
-    assert 'status: expected stable, partly_stable, invalid, excluded, failed, found "crashed"' in (
-        result.stderr
-    )
+    said = "status: expected stable, partly_stable, invalid, excluded, failed, found 'crashed'"
+    assert said in result.stderr
 
 
 def test_the_report_of_former_tables_is_made_anew(
