@@ -60,7 +60,14 @@ def test_a_check_of_a_hostile_table(call: Any, folder: Path, tables: str, form: 
 
 
 def test_a_report_of_a_hostile_table(call: Any, folder: Path, tables: str) -> None:
-    """Warnings are errors here: Matplotlib warns of what no font has."""
+    """Warnings are errors here: Matplotlib warns of what no font has. Statuses are refused."""
+    result = call("report", tables)
+    assert result.exit_code == ExitCode.USAGE
+    assert not obeyed(result.stderr)
+    path = folder / tables / "designs.parquet"
+    table = pq.read_table(path)
+    status = pa.array(["stable", "stable", "invalid"])
+    pq.write_table(table.set_column(table.column_names.index("status"), "status", status), path)
     result = call("report", tables)
     assert result.exit_code == ExitCode.DONE
     assert not obeyed(result.stdout)
