@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,9 +33,6 @@ from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import select
 from dpgcli.text import counted
-
-if TYPE_CHECKING:
-    pass
 
 MOST_STATES = 1024
 HEIGHT = 40.0  # mm, of jaws that the spec says nothing of

@@ -6,7 +6,6 @@ from functools import cached_property
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from dpgcli.api.inputs import (
     SceneInput,
@@ -33,9 +32,6 @@ from dpgcli.states.landscape_table import COLUMNS, landscape_rows
 from dpgcli.states.least_barriers import BestWay, best_way
 from dpgcli.states.units import UnitSolutions
 from dpgcli.text import counted
-
-if TYPE_CHECKING:
-    pass
 
 MOST_UNITS = 12  # seconds of work
 

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +26,6 @@ from dpgcli.states.columns import Column
 from dpgcli.sweeps.choice import Question, check_undoubted, question, selected, warnings_of
 from dpgcli.sweeps.gate import counts_of
 from dpgcli.text import counted, printable
-
-if TYPE_CHECKING:
-    pass
 
 KEPT = ("dpg.schema_version", "dpg.law", "dpg.versions", "dpg.base", "dpg.trust", "dpg.warnings")
 PICK = "dpg.pick"

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -51,9 +50,6 @@ from dpgcli.grasping.steps import (
 from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.text import counted
-
-if TYPE_CHECKING:
-    pass
 
 RAMP, MOVE = 1.0, 5.0  # s
 

@@ -16,7 +16,8 @@ from dpgcli.benchmark.methods import BenchmarkMethod, BenchmarkResult
 from dpgcli.design.bodies import Disc, gives_way
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.frames import FingerFrame, begins_in_base, frames
-from dpgcli.grasping.grasp import Grasped, Placed, described, placed
+from dpgcli.grasping.grasp import described, placed
+from dpgcli.grasping.grasped import Grasped, Placed
 from dpgcli.hard_cases.verdicts import dense
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.finger import Finger

@@ -18,7 +18,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished, relaxed
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.ties import tied
-from dpgcli.grasping.travels import about_to_change, with_lost
+from dpgcli.grasping.travels import about_to_change, with_lost_domes
 from dpgcli.records import dataclass
 
 DISPLACED = 1e-3  # of a stroke: from a fold to where downhill is told from level
@@ -348,7 +348,7 @@ def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
     is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
     is_jump &= ends.outcome == PathEnd.EVENT
     ends = replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
-    return with_lost(own, before, ends)
+    return with_lost_domes(own, before, ends)
 
 
 def _at_ends(own: Obstructed, before: ContactShapes, ends: Ends) -> ContactShapes:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dpgcli.arrays import Array, Flags
 from dpgcli.design.bodies import Body, Disc
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import Grasped
+from dpgcli.grasping.grasped import Grasped
 
 Outlines = NDArray[np.object_]
 HALVINGS = 50

@@ -44,12 +44,7 @@ from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.mirror import Heights
 from dpgcli.mechanics.pressure import PressureWork
-from dpgcli.mechanics.terms import (
-    DeadLoad,
-    DomeSprings,
-    Quadratic,
-    without_domes,
-)
+from dpgcli.mechanics.terms import DeadLoad, DomeSprings, Quadratic, without_domes
 from dpgcli.records import dataclass
 
 ROUNDING = 1e-13  # of the forces in play: a smaller push is none

@@ -14,7 +14,8 @@ from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Approach, Load
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import Grasped, Placed, blocks, described, grown, resets_of
+from dpgcli.grasping.grasp import blocks, described, grown
+from dpgcli.grasping.grasped import Grasped, Placed, resets_of
 from dpgcli.grasping.meeting import (
     along_axis,
     apart,
@@ -23,10 +24,9 @@ from dpgcli.grasping.meeting import (
     coming_together,
     pair_blocks,
     way_of,
-    with_lost,
 )
 from dpgcli.grasping.release import together
-from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.grasping.shapes import ContactShapes, with_lost
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.mirror import Axis
 from dpgcli.mechanics.terms import Formulate

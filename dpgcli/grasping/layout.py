@@ -8,12 +8,7 @@ from typing import Self
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
-from dpgcli.equilibrium.contracts import (
-    OwnCoordinate,
-    Row,
-    WideMeasure,
-    take_lanes,
-)
+from dpgcli.equilibrium.contracts import OwnCoordinate, Row, WideMeasure, take_lanes
 from dpgcli.equilibrium.joined import OfPart, Together
 from dpgcli.grasping.shapes import Motion, Ramp
 from dpgcli.mechanics.coordinates import FingerPotential
@@ -43,10 +38,10 @@ class Layout:
 
     `thickness` (1, 1 or batch) is that of the layer, mm. Bodies may stand in the way by less than
     they will: by b = (λ − 1) D with a load λ, `depth` D (batch,) in mm; and mirror images may come
-    to the axis, from `apart` (batch,), mm, beyond it. A `ramp` changes the
-    pressures on their domes by the load; without it there are none. Points of bodies deeper behind
-    a face than the `reach` (batch,), mm, are beyond the finger. Places that are `sticking` to a
-    body that is there in full do not slide along it.
+    to the axis, from `apart` (batch,), mm, beyond it. A `ramp` changes the pressures on their domes
+    by the load; without it there are none. Points of bodies deeper behind a face than the `reach`
+    (batch,), mm, are beyond the finger. Places that are `sticking` to a body that is there in full
+    do not slide along it.
     """
 
     units: UnitSolutions

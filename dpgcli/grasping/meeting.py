@@ -25,17 +25,9 @@ from dpgcli.grasping.approach import Approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.costs import PAIR_LANE
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import (
-    BLOCK,
-    MARGIN_TO,
-    Grasped,
-    Placed,
-    blocks,
-    described,
-    grown,
-    told,
-)
-from dpgcli.grasping.shapes import Motion
+from dpgcli.grasping.grasp import BLOCK, MARGIN_TO, blocks, described, grown, told
+from dpgcli.grasping.grasped import Grasped, Placed
+from dpgcli.grasping.shapes import Motion, with_lost
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.gaps import Touches
 from dpgcli.mechanics.mirror import Axis, Heights
@@ -110,12 +102,6 @@ def _mirrored(
         status = with_lost(free.status, came.shapes.is_there)
         parts.append(bearing_sideways(told(Placed(codes[some], own, came, status)), own, came))
     return _as_of_pairs(Grasped.joined(parts))
-
-
-def with_lost(status: NDArray[np.uint8], is_there: Flags) -> NDArray[np.uint8]:
-    """Statuses before, but for those that have no rest any more."""
-    is_lost = (status == Status.STABLE) & ~is_there
-    return np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
 
 
 def beyond_axis(own: Obstructed, coordinates: Array) -> Array:

@@ -18,7 +18,7 @@ from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.closing import Closing, with_reach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import Placed
+from dpgcli.grasping.grasped import Placed
 from dpgcli.grasping.joining import Joined
 from dpgcli.grasping.payload import Contacts, payloads
 from dpgcli.grasping.release import LANES, WAYS, motion_of, opened_by, released, together

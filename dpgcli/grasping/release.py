@@ -23,7 +23,8 @@ from dpgcli.grasping.approach import Approach, Load, approach
 from dpgcli.grasping.closing import Closing, closed, with_reach
 from dpgcli.grasping.contact import STIFFER, Obstructed
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import Grasped, Placed, described, resets_of
+from dpgcli.grasping.grasp import described
+from dpgcli.grasping.grasped import Grasped, Placed, resets_of
 from dpgcli.grasping.shapes import ContactShapes, Motion
 from dpgcli.grasping.travels import with_reasons
 from dpgcli.mechanics.aperture import KeptApart

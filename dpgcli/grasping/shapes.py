@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import ScalarLaw, take_lanes
@@ -10,6 +11,7 @@ from dpgcli.mechanics.aperture import KeptApart, Softening
 from dpgcli.mechanics.face import Pivot
 from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.records import dataclass
+from dpgcli.states.certify import Status
 
 
 @dataclass(frozen=True)
@@ -107,3 +109,9 @@ class Ramp:
         """Those of some lanes."""
         volumes = self.volumes.take_lanes(index)
         return Ramp(volumes, take_lanes(self.begin, index), take_lanes(self.change, index))
+
+
+def with_lost(status: NDArray[np.uint8], is_there: Flags) -> NDArray[np.uint8]:
+    """Statuses before, (batch,), but for those of states that have no rest any more."""
+    is_lost = (status == Status.STABLE) & ~is_there
+    return np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)

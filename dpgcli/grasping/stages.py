@@ -21,7 +21,8 @@ from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.clearance import Clearance, clearance, outlines
 from dpgcli.grasping.closing import at_rest, driven, with_reach
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import Grasped, Placed, described, placed
+from dpgcli.grasping.grasp import described, placed
+from dpgcli.grasping.grasped import Grasped, Placed
 from dpgcli.grasping.pull import Pulled, borne
 from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by
 from dpgcli.grasping.shapes import ContactShapes, Ramp

@@ -10,7 +10,7 @@ from dpgcli.actuation.tables import numbered
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import Output
 from dpgcli.design.pressure import History
-from dpgcli.grasping.grasp import Grasped
+from dpgcli.grasping.grasped import Grasped
 from dpgcli.grasping.plans import Plan, Prospect
 from dpgcli.grasping.release import turns
 from dpgcli.grasping.routine import (

@@ -15,7 +15,8 @@ from dpgcli.grasping.approach import Way
 from dpgcli.grasping.closing import Closing, event_text
 from dpgcli.grasping.costs import is_moving
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import Grasped, Placed, blocks, placed, told
+from dpgcli.grasping.grasp import blocks, placed, told
+from dpgcli.grasping.grasped import Grasped, Placed
 from dpgcli.grasping.joining import Joined, joined
 from dpgcli.grasping.release import let_go, motion_of, moved_by, opened_by, turned_by, turns
 from dpgcli.grasping.shapes import ContactShapes

@@ -20,7 +20,7 @@ from dpgcli.equilibrium.steps import AWAY
 from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
-from dpgcli.grasping.shapes import ContactShapes
+from dpgcli.grasping.shapes import ContactShapes, with_lost
 from dpgcli.mechanics.laws import PushOnly
 from dpgcli.mechanics.pressure import PressureWork
 from dpgcli.states.certify import Status
@@ -78,11 +78,11 @@ def with_reasons(
     own: Obstructed, shapes: ContactShapes, status: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Statuses, (batch,), of which those that are stable and lost as pressures change say why."""
-    is_lost = (status == Status.STABLE) & ~shapes.is_there
-    status = np.where(is_lost, np.uint8(Status.NOT_CONVERGED), status)
+    known = with_lost(status, shapes.is_there)
     if not isinstance(own.units.finger.law, PushOnly):
-        return status
-    return np.where(is_lost & have_closed(own, shapes), np.uint8(Status.GAP_CLOSED), status)
+        return known
+    have_lost = (known != status) & have_closed(own, shapes)
+    return np.where(have_lost, np.uint8(Status.GAP_CLOSED), known)
 
 
 def about_to_change(own: Obstructed, shapes: ContactShapes, load: Array) -> ContactShapes:
@@ -113,7 +113,7 @@ def _are_wrong(own: Obstructed, shapes: ContactShapes, load: Array) -> Flags:
     return np.asarray(is_wrong & here.is_fine)
 
 
-def with_lost(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
+def with_lost_domes(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
     """The ends of paths: domes that leave their neighbors where they cannot rest are at folds.
 
     They go back by themselves.

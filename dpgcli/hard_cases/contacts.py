@@ -12,7 +12,8 @@ from dpgcli.design.bodies import Body as SolverBody
 from dpgcli.design.bodies import Disc, Jaws, Polygon
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import Grasped, Placed, described, met
+from dpgcli.grasping.grasp import described, met
+from dpgcli.grasping.grasped import Grasped, Placed
 from dpgcli.grasping.release import let_go, motion_of
 from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Touch, Verdict

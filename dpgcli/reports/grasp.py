@@ -11,7 +11,7 @@ import numpy as np
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.bodies import Body, Jaws, at_place
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import Grasped
+from dpgcli.grasping.grasped import Grasped
 from dpgcli.grasping.table import BETWEEN, Grasps
 from dpgcli.reports.drawing import figure_to
 from dpgcli.reports.figures import POINTS, TITLE_SIZE, WIDE, Foot

@@ -56,8 +56,10 @@ class Reached:
 
 @dataclass(frozen=True)
 class GoalTables:
-    """The columns and rows of a goal's tables; `has_unfinished` where limits ended
-    the search of one."""
+    """The columns and rows of a goal's tables.
+
+    `has_unfinished` where a limit ended the search of one of the designs.
+    """
 
     goal: Goal
     has_unfinished: bool = False

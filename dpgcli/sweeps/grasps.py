@@ -13,7 +13,8 @@ from dpgcli.design.loads import DOWN
 from dpgcli.design.scene import Gripper, Held
 from dpgcli.equilibrium.contracts import LaneArray
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import Grasped, Placed, described, met
+from dpgcli.grasping.grasp import described, met
+from dpgcli.grasping.grasped import Grasped, Placed
 from dpgcli.grasping.joining import Joined, joined
 from dpgcli.grasping.release import let_go, motion_of, moved_by, turned_by, turns
 from dpgcli.grasping.table import ANGLE, BETWEEN, COLUMNS, OF_FRICTION, OF_PAIRS
@@ -98,9 +99,9 @@ def grasp_rows(own: Encounter, codes: Codes) -> Columns:
 
     pulled = Pulled(own.body, own.held, seen_from, own.friction, own.gravity)
     is_there = np.asarray(rows["grasp_status"] == Status.STABLE)
-    found_ = borne(pulled, parts, [every] * len(parts), rest, is_there)
-    found_ = bearing_together(pulled, found_, met)
-    return {**rows, **found_, "fails_first": found_["fails_first"].astype("S")}
+    alone = borne(pulled, parts, [every] * len(parts), rest, is_there)
+    columns = bearing_together(pulled, alone, met)
+    return {**rows, **columns, "fails_first": columns["fails_first"].astype("S")}
 
 
 class _Finger(NamedTuple):

@@ -20,7 +20,8 @@ from dpgcli.grasping import grasp
 from dpgcli.grasping.approach import Approach, Way, approach
 from dpgcli.grasping.closing import Closing
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import Placed, placed
+from dpgcli.grasping.grasp import placed
+from dpgcli.grasping.grasped import Placed
 from dpgcli.grasping.shapes import Ramp
 from dpgcli.grasping.table import Grasps, grasp_rows, grasps
 from dpgcli.mechanics.finger import STUDY, Finger

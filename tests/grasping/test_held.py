@@ -11,7 +11,8 @@ from dpgcli.design.bodies import Disc
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import grasp
 from dpgcli.grasping.frames import FingerFrame, frames
-from dpgcli.grasping.grasp import Grasped, described, placed
+from dpgcli.grasping.grasp import described, placed
+from dpgcli.grasping.grasped import Grasped
 from dpgcli.mechanics.finger import Finger
 from dpgcli.mechanics.terms import Formulate, chain_potential
 from dpgcli.states.certify import Status

@@ -12,7 +12,7 @@ from dpgcli.arrays import Array
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import grasp, meeting
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import Grasped
+from dpgcli.grasping.grasped import Grasped
 from dpgcli.grasping.table import grasp_rows, grasps
 from dpgcli.mechanics.finger import STUDY, Finger
 from dpgcli.mechanics.terms import chain_potential

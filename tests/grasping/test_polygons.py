@@ -16,7 +16,8 @@ from dpgcli.design.bodies import Body, Jaws, Polygon
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import grasp
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import Placed, placed
+from dpgcli.grasping.grasp import placed
+from dpgcli.grasping.grasped import Placed
 from dpgcli.mechanics.finger import STUDY, Finger
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status

@@ -28,7 +28,8 @@ from dpgcli.grasping.closing import Closing
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.grasp import Placed, placed
+from dpgcli.grasping.grasp import placed
+from dpgcli.grasping.grasped import Placed
 from dpgcli.grasping.shapes import Ramp
 from dpgcli.grasping.travels import with_travels
 from dpgcli.mechanics.curve import spline
