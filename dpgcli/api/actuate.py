@@ -16,17 +16,9 @@ from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.tables import event_columns, event_rows, path_columns, path_rows
 from dpgcli.actuation.travel import PathPoints, Travel, joined, travel
 from dpgcli.actuation.unstable import branches
+from dpgcli.api.arguments import check_flags, check_texts, figure_path, path_of, table_path, whole
 from dpgcli.api.histories import GivenHistory, PressureInput, history_input
-from dpgcli.api.inputs import (
-    Settings,
-    SpecInput,
-    check_flags,
-    check_texts,
-    figure_path,
-    path_of,
-    table_path,
-    whole,
-)
+from dpgcli.api.inputs import Settings, SpecInput
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Array, Columns

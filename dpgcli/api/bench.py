@@ -4,11 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from dpgcli.api.data import frame_of
-from dpgcli.api.inputs import (
-    Place,
-    Settings,
-    SpecInput,
+from dpgcli.api.arguments import (
     as_texts,
     check_callable,
     check_installed,
@@ -16,10 +12,11 @@ from dpgcli.api.inputs import (
     files_of,
     number,
     path_of,
-    scene_input,
     table_path,
     whole,
 )
+from dpgcli.api.data import frame_of
+from dpgcli.api.inputs import Place, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.benchmark.bench import COLUMNS, Bench, BenchRow, as_columns
 from dpgcli.calibration.known import Frame

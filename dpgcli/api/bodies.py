@@ -7,15 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    check_texts,
-    files_of,
-    path_of,
-    point,
-    setting_texts,
-)
+from dpgcli.api.arguments import check_texts, files_of, path_of, point
+from dpgcli.api.inputs import SceneInput, Settings, setting_texts
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import FRICTION, MASS, PLACES, Body, Jaws, gives_way
 from dpgcli.design.outputs import Output

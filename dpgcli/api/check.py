@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from dpgcli.api.inputs import as_texts, check_flags, path_of
+from dpgcli.api.arguments import as_texts, check_flags, path_of
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.frames import frame_of

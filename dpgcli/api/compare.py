@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from dpgcli.api.arguments import figure_path
 from dpgcli.api.data import frame_of
-from dpgcli.api.inputs import Place, Settings, SpecInput, figure_path, scene_input
+from dpgcli.api.inputs import Place, Settings, SpecInput, scene_input
 from dpgcli.api.recalibration import CalibrationInput, recalibrated_scene
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from dpgcli.api.inputs import Place, SceneInput, Texts, as_texts, by_text, check_whole, plain, point
+from dpgcli.api.arguments import as_texts, check_whole, point
+from dpgcli.api.inputs import Place, SceneInput, Texts, by_text, plain
 from dpgcli.calibration.choices import MOST_RESAMPLES
 from dpgcli.calibration.known import Frame, KnownStates
 from dpgcli.errors import Field, UsageError

@@ -6,15 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from dpgcli.api.arguments import files_of, path_of
 from dpgcli.api.check import DesignsInput, arrow_of
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    files_of,
-    path_of,
-    scene_input_in,
-)
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input_in
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.access import reading
 from dpgcli.files.row_source import opened_rows

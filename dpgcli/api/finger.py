@@ -2,7 +2,7 @@
 
 import math
 
-from dpgcli.api.inputs import check_numbers, check_whole
+from dpgcli.api.arguments import check_numbers, check_whole
 from dpgcli.design.dimensions import LARGEST, MAX_UNITS, SMALLEST, STIFFEST
 from dpgcli.errors import UsageError
 from dpgcli.mechanics import finger as mechanics

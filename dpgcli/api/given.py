@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from dpgcli.api.arguments import path_of
 from dpgcli.api.inputs import (
     SceneInput,
     Settings,
     SpecInput,
     by_text,
-    path_of,
     plain,
     scene_input,
     scene_input_in,

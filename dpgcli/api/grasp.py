@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dpgcli.api.arguments import as_texts, check_flags, chosen, figure_path, path_of, table_path
 from dpgcli.api.bodies import (
     body_lines,
     check_body,
@@ -16,18 +17,7 @@ from dpgcli.api.bodies import (
     pressure_lines,
     with_body,
 )
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    as_texts,
-    check_flags,
-    chosen,
-    figure_path,
-    path_of,
-    scene_input,
-    table_path,
-)
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Codes, Columns, distinct, keep_freed_memory
 from dpgcli.design.bodies import Friction

@@ -9,7 +9,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dpgcli.api.inputs import BYTES, by_text, each_of, path_of
+from dpgcli.api.arguments import BYTES, each_of, path_of
+from dpgcli.api.inputs import by_text
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.design.lines import NAME, TIME
 from dpgcli.design.pressure import History, Pressure

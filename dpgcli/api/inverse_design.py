@@ -7,8 +7,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from dpgcli.api.arguments import check_flags, number, path_of, whole
 from dpgcli.api.given import GoalInput, goal_input
-from dpgcli.api.inputs import Settings, check_flags, number, path_of, whole
+from dpgcli.api.inputs import Settings
 from dpgcli.api.reached import reached
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, keep_freed_memory

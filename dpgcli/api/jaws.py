@@ -6,19 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from dpgcli.api.arguments import as_texts, figure_path, path_of, point, table_path
 from dpgcli.api.bodies import check_body, force_lines
 from dpgcli.api.grasp import check_drawable
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    as_texts,
-    figure_path,
-    path_of,
-    point,
-    scene_input,
-    table_path,
-)
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws

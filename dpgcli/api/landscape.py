@@ -7,17 +7,8 @@ from itertools import pairwise
 from math import prod
 from pathlib import Path
 
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    as_texts,
-    check_texts,
-    figure_path,
-    path_of,
-    scene_input,
-    table_path,
-)
+from dpgcli.api.arguments import as_texts, check_texts, figure_path, path_of, table_path
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.outputs import Output

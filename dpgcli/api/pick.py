@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from dpgcli.api.arguments import as_texts, check_flags, path_of, table_path, whole
 from dpgcli.api.check import DesignsInput
 from dpgcli.api.designs import table_of, tables_beside
-from dpgcli.api.inputs import as_texts, check_flags, path_of, table_path, whole
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns, Flags
 from dpgcli.errors import Field, NothingSelectedError, UsageError

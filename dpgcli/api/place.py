@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dpgcli.api.inputs import check_numbers, check_texts, check_whole
+from dpgcli.api.arguments import check_numbers, check_texts, check_whole
 from dpgcli.cores import MOST_PROCESSES, cores
 from dpgcli.errors import Field, UsageError
 from dpgcli.records import dataclass

@@ -5,19 +5,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
+from dpgcli.api.arguments import (
     as_texts,
     check_flags,
     check_texts,
     figure_path,
     number,
     path_of,
-    spec_or_design,
     table_path,
 )
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, spec_or_design
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns
 from dpgcli.design.outputs import Trust

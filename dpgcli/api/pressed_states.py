@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from dpgcli.actuation.rest import at_rest
-from dpgcli.api.inputs import check_texts
+from dpgcli.api.arguments import check_texts
 from dpgcli.api.pressure import PressedInput
 from dpgcli.errors import Field, UsageError
 from dpgcli.states.certify import Status

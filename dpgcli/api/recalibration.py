@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from dpgcli.api.inputs import SceneInput, path_of
+from dpgcli.api.arguments import path_of
+from dpgcli.api.inputs import SceneInput
 from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, Message, Problem, SpecError, UsageError
 from dpgcli.files.access import reading

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from dpgcli.api.inputs import check_flags, path_of
+from dpgcli.api.arguments import check_flags, path_of
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.access import writing
 from dpgcli.files.content import opened

@@ -6,6 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from dpgcli.api.arguments import (
+    check_positive,
+    check_texts,
+    figure_path,
+    path_of,
+    point,
+    table_path,
+)
 from dpgcli.api.bodies import (
     NO_BODY,
     check_body,
@@ -14,17 +22,7 @@ from dpgcli.api.bodies import (
     pressure_lines,
     with_body,
 )
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    check_positive,
-    check_texts,
-    figure_path,
-    path_of,
-    point,
-    table_path,
-)
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput
 from dpgcli.api.pressed_states import code_of
 from dpgcli.api.pressure import pressed_input
 from dpgcli.api.pulses import check_size

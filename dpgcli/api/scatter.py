@@ -5,7 +5,8 @@ from difflib import get_close_matches
 from typing import TypeAlias
 
 from dpgcli.actuation.pressed import Pressed
-from dpgcli.api.inputs import as_texts, by_text, check_whole, plain
+from dpgcli.api.arguments import as_texts, check_whole
+from dpgcli.api.inputs import by_text, plain
 from dpgcli.api.pressure import PressedInput
 from dpgcli.arrays import Indices
 from dpgcli.design.dimensions import LARGEST, Tolerance, unit_of

@@ -3,17 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from dpgcli.api.inputs import (
-    SceneInput,
-    Settings,
-    SpecInput,
-    as_texts,
-    check_callable,
-    check_installed,
-    scene_input,
-    setting_texts,
-    table_path,
-)
+from dpgcli.api.arguments import as_texts, check_callable, check_installed, table_path
+from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input, setting_texts
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.errors import Field, NothingSelectedError, UsageError
 from dpgcli.files.study_tables import write_stress

@@ -8,9 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from tempfile import gettempdir
 
-from dpgcli.api.given import SweepInput, sweep_input
-from dpgcli.api.inputs import (
-    Settings,
+from dpgcli.api.arguments import (
     as_texts,
     check_callable,
     check_flags,
@@ -18,8 +16,9 @@ from dpgcli.api.inputs import (
     each_of,
     number,
     path_of,
-    setting_texts,
 )
+from dpgcli.api.given import SweepInput, sweep_input
+from dpgcli.api.inputs import Settings, setting_texts
 from dpgcli.api.place import Place
 from dpgcli.api.report import silent, summarize
 from dpgcli.api.tables import Table

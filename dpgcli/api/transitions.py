@@ -13,7 +13,8 @@ from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.transition_scatter import SPREAD_COLUMNS, spread_rows
 from dpgcli.actuation.transition_table import COLUMNS, transition_rows
 from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
-from dpgcli.api.inputs import Settings, SpecInput, figure_path, path_of, table_path
+from dpgcli.api.arguments import figure_path, path_of, table_path
+from dpgcli.api.inputs import Settings, SpecInput
 from dpgcli.api.predict import MOST_DRAWN
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.scatter import Draws, ScatterInput, drawn_by

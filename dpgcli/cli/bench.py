@@ -98,8 +98,9 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure error against run time, beside what else there is."""
+    from dpgcli.api.arguments import check_installed
     from dpgcli.api.bench import bench
-    from dpgcli.api.inputs import check_installed, scene_input
+    from dpgcli.api.inputs import scene_input
     from dpgcli.files.output import Mark, check_outputs
 
     check_installed("dpg bench", "mpmath")

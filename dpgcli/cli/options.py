@@ -164,7 +164,7 @@ def _groups(**wanted: bool) -> list[str]:
 
 def check_plot(path: Path) -> None:
     """Before any work: a suffix that can be drawn, and what draws it."""
-    from dpgcli.api.inputs import check_installed
+    from dpgcli.api.arguments import check_installed
     from dpgcli.errors import UsageError
 
     if path.suffix.lower() not in (".svg", ".png"):

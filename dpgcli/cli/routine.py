@@ -74,7 +74,7 @@ def routine(
     quiet: Quiet = False,
 ) -> None:
     """Find pulses that open a gripper, close it on a body, carry it and let it go."""
-    from dpgcli.api.inputs import check_positive
+    from dpgcli.api.arguments import check_positive
     from dpgcli.api.routine import found_routine, planned, seconds_of
     from dpgcli.files.output import Mark, check_outputs
     from dpgcli.sweeps.extent import time_text

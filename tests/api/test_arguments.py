@@ -14,8 +14,9 @@ import pyarrow as pa
 import pytest
 
 import dpgcli as dpg
+from dpgcli.api.arguments import point
 from dpgcli.api.given import sweep_input
-from dpgcli.api.inputs import point, scene_input
+from dpgcli.api.inputs import scene_input
 from dpgcli.api.recalibration import recalibrated_scene
 from dpgcli.files.scene_file import scene_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dpgcli as dpg
-from dpgcli.api.inputs import number, whole
+from dpgcli.api.arguments import number, whole
 from dpgcli.api.place import Place
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 from tests.api.test_choices import DESIGNS, GOAL, HINGE, SPEC, SWEEP

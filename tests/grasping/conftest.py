@@ -8,10 +8,11 @@ the package the order of the coordinates and nothing else.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from dpgcli.arrays import Array, Flags
 from dpgcli.grasping.approach import Approach, approach
@@ -193,3 +194,44 @@ def grown(begun: Callable[..., tuple[Obstructed, ContactShapes]]) -> Callable[..
         return Grown(obstructed, start, approach(obstructed, start, nothing, nothing + end))
 
     return grow
+
+
+@pytest.fixture(scope="session")
+def told() -> Callable[[Approach], list[tuple[int, str, float]]]:
+    """What happened to the only lane: each unit, the way it went, and its pressure."""
+
+    def of_lane(came: Approach) -> list[tuple[int, str, float]]:
+        parts = []
+        for reset in came.resets:
+            assert reset.pressure is not None
+            for unit in np.flatnonzero(reset.flipped[:, 0]):
+                kind = "snap" if reset.snapped[unit, 0] else "reset"
+                parts.append((int(unit), kind, float(reset.pressure[unit, 0])))
+        return parts
+
+    return of_lane
+
+
+@pytest.fixture(scope="session")
+def slsqp() -> Callable[..., Any]:
+    """SciPy's minimum of an energy (coordinate, lane) with gaps (cell, lane) >= 0, from near by.
+
+    `gradient(function, q)` is that of one at coordinates, which are scaled by `unit`.
+    """
+
+    def found(energy: Any, gaps: Any, gradient: Any, q: Array, unit: Array) -> Any:
+        constraints = {
+            "type": "ineq",
+            "fun": lambda z: gaps((z / unit)[:, None])[:, 0],
+            "jac": lambda z: gradient(gaps, z / unit) / unit,
+        }
+        return minimize(
+            lambda z: float(energy((z / unit)[:, None])[0]),
+            q * unit + np.random.default_rng(1).normal(0.0, 0.02, len(unit)),
+            jac=lambda z: gradient(energy, z / unit) / unit,
+            constraints=constraints,
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 500},
+        )
+
+    return found

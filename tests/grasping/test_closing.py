@@ -72,17 +72,6 @@ def ramped(part: Placed, came: Approach, before: float, after: float) -> Approac
     return approach(own, came.shapes, np.zeros(lanes), np.ones(lanes))
 
 
-def told(came: Approach) -> list[tuple[int, str, float]]:
-    """What happened to the only lane: each unit, the way it went, and its pressure."""
-    parts = []
-    for reset in came.resets:
-        assert reset.pressure is not None
-        for unit in np.flatnonzero(reset.flipped[:, 0]):
-            kind = "snap" if reset.snapped[unit, 0] else "reset"
-            parts.append((int(unit), kind, float(reset.pressure[unit, 0])))
-    return parts
-
-
 @pytest.mark.parametrize(
     ("bars", "walls", "steps"),
     [
@@ -92,7 +81,7 @@ def told(came: Approach) -> list[tuple[int, str, float]]:
     ],
 )
 def test_what_they_do_not_touch_changes_nothing(
-    bars: float, walls: float, steps: list[float], graded_finger: Fingers
+    bars: float, walls: float, steps: list[float], graded_finger: Fingers, told: Callable[..., Any]
 ) -> None:
     """Thresholds, states and shapes are those of `actuate`."""
     finger = graded_finger(5, 3, bars, force_linearity=0.03).changed(
@@ -230,7 +219,7 @@ def test_the_work_of_pressures_is_the_change_of_energy(graded_finger: Fingers) -
     assert abs(changed) > 1.0
 
 
-def test_stops_on_the_way_change_nothing() -> None:
+def test_stops_on_the_way_change_nothing(told: Callable[..., Any]) -> None:
     """Events and shapes are the same to the last digits."""
     drawn = Drawn(0)
     disc, n = Disc(drawn.center, drawn.radius), drawn.n
@@ -280,7 +269,7 @@ def test_equal_units_are_tied_unless_the_body_tells_them_apart(reference_finger:
 
 
 def test_units_that_are_nearly_equal_snap_where_they_do_without_a_body(
-    reference_finger: Fingers,
+    reference_finger: Fingers, told: Callable[..., Any]
 ) -> None:
     """Where nothing touches it yet: no contact that slides over a corner is looked for there."""
     finger, by = reference_finger(3, 1e4), closing(3, 0.2, 0.0)

@@ -257,22 +257,13 @@ def test_they_are_minima_on_the_tangent_space(found: Found) -> None:
     assert np.linalg.eigvalsh(tangent.T @ hessian @ tangent).min() > 1e-3, "N/mm"
 
 
-def test_slsqp_finds_the_same_minima(found: Found) -> None:
-    both, unit, cells = found.both, found.unit, found.cells
-    start = found.q * unit + np.random.default_rng(1).normal(0.0, 0.02, len(unit))
-    gaps = {
-        "type": "ineq",
-        "fun": lambda z: both.gaps(cells, (z / unit)[:, None])[:, 0],
-        "jac": lambda z: found.gradient(lambda q: both.gaps(cells, q), z / unit) / unit,
-    }
-    best = minimize(
-        lambda z: float(both.energy((z / unit)[:, None])[0]),
-        start,
-        jac=lambda z: found.gradient(both.energy, z / unit) / unit,
-        constraints=gaps,
-        method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
+def test_slsqp_finds_the_same_minima(found: Found, slsqp: Any) -> None:
+    both, unit = found.both, found.unit
+
+    def gaps(q: Array) -> Array:
+        return both.gaps(found.cells, q)
+
+    best = slsqp(both.energy, gaps, found.gradient, found.q, unit)
     assert best.x / unit == pytest.approx(found.q, abs=2e-5)
     assert best.fun == pytest.approx(float(both.energy(found.q[:, None])[0]), rel=1e-9)
 

@@ -225,24 +225,15 @@ def test_they_are_minima_on_the_tangent_space(
 
 
 def test_slsqp_finds_the_same_minima(
-    drawn: Drawn, own: Any, monkeypatch: pytest.MonkeyPatch
+    drawn: Drawn, own: Any, slsqp: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = met(drawn, own, monkeypatch)
-    pair, unit, cells, tool = found.pair, found.unit, found.cells, found.pair.own[0]
-    start = found.q * unit + np.random.default_rng(1).normal(0.0, 0.02, len(unit))
-    gaps = {
-        "type": "ineq",
-        "fun": lambda z: pair.gaps(cells, (z / unit)[:, None])[:, 0],
-        "jac": lambda z: tool.gradient(lambda x: pair.gaps(cells, x), z / unit) / unit,
-    }
-    best = minimize(
-        lambda z: float(pair.energy((z / unit)[:, None])[0]),
-        start,
-        jac=lambda z: tool.gradient(pair.energy, z / unit) / unit,
-        constraints=gaps,
-        method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
+    pair, unit, tool = found.pair, found.unit, found.pair.own[0]
+
+    def gaps(q: Array) -> Array:
+        return pair.gaps(found.cells, q)
+
+    best = slsqp(pair.energy, gaps, tool.gradient, found.q, unit)
     assert best.x / unit == pytest.approx(found.q, abs=2e-5)
     assert best.fun == pytest.approx(float(pair.energy(found.q[:, None])[0]), rel=1e-9)
 

@@ -228,19 +228,8 @@ def history(*steps: Sequence[float], line_of: Sequence[int]) -> tuple[Pressure, 
     return Pressure(lines, np.array(line_of), np.ones((1, 1)), None), History(np.array(steps))
 
 
-def told(came: Approach) -> list[tuple[int, str, float]]:
-    """What happened to the only lane: each unit, the way it went, and its pressure."""
-    parts = []
-    for reset in came.resets:
-        assert reset.pressure is not None
-        for unit in np.flatnonzero(reset.flipped[:, 0]):
-            kind = "snap" if reset.snapped[unit, 0] else "reset"
-            parts.append((int(unit), kind, float(reset.pressure[unit, 0])))
-    return parts
-
-
 @pytest.mark.parametrize("seed", also_slow((2,), 60))
-def test_what_they_do_not_touch_changes_nothing(seed: int) -> None:
+def test_what_they_do_not_touch_changes_nothing(seed: int, told: Callable[..., Any]) -> None:
     """Thresholds and shapes on two lines are those of `actuate`, in which travels are left out."""
     drawn = Drawn(seed, least=1)
     n, random = drawn.n, drawn.random

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dpgcli.api.arguments import as_texts, check_positive, chosen, files_of, is_number
 from dpgcli.api.data import check_resampling, table_choice
 from dpgcli.api.fits.result import (
     FitResult,
@@ -16,7 +17,7 @@ from dpgcli.api.fits.result import (
     sizes,
     warned,
 )
-from dpgcli.api.inputs import Texts, as_texts, by_text, check_positive, chosen, files_of, is_number
+from dpgcli.api.inputs import Texts, by_text
 from dpgcli.calibration import bistable
 from dpgcli.calibration.bistable import UNITS, BistableFit, BistableOptions
 from dpgcli.calibration.choices import LAW_KEYS, LINEARITY, Branches, CurveQuantity, Loss

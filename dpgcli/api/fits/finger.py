@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from dpgcli.api.arguments import as_texts, chosen, files_of
 from dpgcli.api.data import check_resampling, frame_of
 from dpgcli.api.fits.result import (
     NO_GEOMETRY,
@@ -14,7 +15,7 @@ from dpgcli.api.fits.result import (
     fit_result,
     with_geometry,
 )
-from dpgcli.api.inputs import Place, Settings, SpecInput, as_texts, chosen, files_of, scene_input
+from dpgcli.api.inputs import Place, Settings, SpecInput, scene_input
 from dpgcli.calibration.choices import FITTED_BY_DEFAULT, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit

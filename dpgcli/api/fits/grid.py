@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dpgcli.api.arguments import chosen, files_of
 from dpgcli.api.fits.result import (
     FitResult,
     GeometryInput,
@@ -13,7 +14,6 @@ from dpgcli.api.fits.result import (
     geometry_texts,
     sizes,
 )
-from dpgcli.api.inputs import chosen, files_of
 from dpgcli.calibration.choices import GridMethod
 from dpgcli.calibration.grid import FittedGridLaw, GridPoints
 from dpgcli.errors import Field, UsageError

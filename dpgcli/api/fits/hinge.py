@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dpgcli.api.arguments import chosen, files_of
 from dpgcli.api.data import check_resampling, table_choice
 from dpgcli.api.fits.result import (
     FitResult,
@@ -14,7 +15,7 @@ from dpgcli.api.fits.result import (
     geometry_from,
     warned,
 )
-from dpgcli.api.inputs import Texts, chosen, files_of
+from dpgcli.api.inputs import Texts
 from dpgcli.calibration import hinge
 from dpgcli.calibration.choices import Loss
 from dpgcli.calibration.hinge import HingeFit

@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
-from dpgcli.api.inputs import check_positive, figure_path, keys_of, path_of, setting_texts
+from dpgcli.api.arguments import check_positive, figure_path, path_of
+from dpgcli.api.inputs import keys_of, setting_texts
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Columns
 from dpgcli.calibration.choices import Loss

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dpgcli.api.arguments import as_texts, chosen, files_of
 from dpgcli.api.data import check_resampling
 from dpgcli.api.fits.finger import errors_of, targets_of
 from dpgcli.api.fits.result import (
@@ -18,7 +19,6 @@ from dpgcli.api.fits.result import (
     sizes,
     warned,
 )
-from dpgcli.api.inputs import as_texts, chosen, files_of
 from dpgcli.calibration.choices import HINGES, LEVER, WALLS, Loss, Target
 from dpgcli.calibration.finger import FingerFit
 from dpgcli.calibration.fits import Fit
