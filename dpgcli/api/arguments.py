@@ -91,14 +91,18 @@ def check_numbers(**values: float | None) -> None:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number, and no whole one that is beyond those with a decimal point.
+    """Whether a value is a number, and not beyond those with a decimal point.
 
     >>> is_number(2), is_number(True), is_number("2"), is_number(10**400)
     (True, False, False, False)
     """
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
-    return not isinstance(value, Integral) or abs(int(value)) <= LARGEST
+    try:
+        float(value)
+    except OverflowError:  # whole numbers, and fractions of them
+        return False
+    return True
 
 
 def check_whole(**values: int | None) -> None:
