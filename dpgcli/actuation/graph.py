@@ -5,6 +5,7 @@ on its peak alone: on the way the finger goes through one event after another, a
 another state, or in the same, if it turns back after each.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,8 @@ class Graph:
     `design` and `code` (state,) are in the order in which they are found, those of fewest pulses
     first; `n_pulses` says how many each needs. `n_lost` ranges of peaks led to no certified state,
     or were not looked at, as the finger folds onto itself before; in `n_unknown` directions what
-    happens is not known: no equilibrium is found, or no certified state after release.
+    happens is not known: no equilibrium is found, or no certified state after release. Designs of
+    which it is not known where they rest count there as well.
     """
 
     design: Indices
@@ -64,8 +66,8 @@ def reachable(
     """Everything that pulses on single lines reach, breadth first, of some designs at once.
 
     `line_of` (unit,) are the lines of the units, 0, 1, …; `reach` (design,) how far pressures go,
-    MPa. Each design starts at the pattern with the code `start` (design,), or with no unit
-    inverted; one that is no stable state there has no states at all.
+    MPa. Each design starts at the pattern with the code `start` (design,), or where it `rests`; one
+    that is no stable state there has no states at all.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.pressure import DomeVolumes
@@ -79,11 +81,12 @@ def reachable(
     ([0.1495, 0.1922], [0.1922, 0.4])
     """
     n_units, n_designs = pressed.finger.n_units, len(reach)
-    begin = np.zeros(n_designs, np.uint64) if start is None else start
-    design = np.flatnonzero(are_states(pressed, np.arange(n_designs), begin))
+    begin, is_there = rests(pressed, n_designs) if start is None else _at(pressed, start)
+    design = np.flatnonzero(is_there)
     states = [(design, begin[design])]
     is_known = np.zeros(n_designs << n_units, bool)
-    parts, n_lost, n_unknown = [_no_pulses()], 0, 0
+    parts, n_lost = [_no_pulses()], 0
+    n_unknown = int((~is_there).sum()) if start is None else 0
     while len(states[-1][0]):
         design, code = states[-1]
         is_known[_keys(design, code, n_units)] = True
@@ -111,6 +114,33 @@ def stable_states(pressed: Pressed, n_designs: int) -> Flags:
     return np.concatenate(found).reshape(n_designs, -1)
 
 
+def rests(pressed: Pressed, n_designs: int) -> tuple[Codes, Flags]:
+    """The codes of the patterns in which fingers rest before any pulse, and which are certified.
+
+    No unit is inverted there, unless dead loads have brought the finger to another state. Where
+    neither is a certified stable state it is not known, (design,).
+
+    >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
+    >>> from dpgcli.mechanics.pressure import DomeVolumes
+    >>> from dpgcli.states.units import UnitSolutions
+    >>> finger = uniform_finger(2, **STUDY)
+    >>> pressed = Pressed(UnitSolutions.of(finger), DomeVolumes(np.array([[31.61]])))
+    >>> [found.tolist() for found in rests(pressed, 1)]
+    [[0], [True]]
+    """
+    own = pressed.take_lanes(np.arange(n_designs))
+    shapes, settled = at_rest(own, np.zeros((pressed.finger.n_units, n_designs), bool))
+    is_certain = settled.status == Status.STABLE
+    lanes = np.flatnonzero(settled.status == Status.ANOTHER_PATTERN)
+    there = replace(shapes, inverted=settled.reached).take_lanes(lanes)
+    is_certain[lanes] = is_certified(own.take_lanes(lanes), there)
+    return codes_of(settled.reached), is_certain
+
+
+def _at(pressed: Pressed, code: Codes) -> tuple[Codes, Flags]:
+    return code, are_states(pressed, np.arange(len(code)), code)
+
+
 def reached_from_rest(
     pressed: Pressed,
     line_of: Indices,
@@ -126,9 +156,10 @@ def reached_from_rest(
     n_units = pressed.finger.n_units
     source, target = known or (np.zeros(0, np.int64), np.zeros(0, np.int64))
     is_reached = np.zeros_like(is_stable)
-    is_reached[:, 0] = is_stable[:, 0]
+    begin, is_certain = rests(pressed, len(is_stable))
+    is_reached[np.arange(len(begin)), begin.astype(np.int64)] = is_certain
     for n_stairs in (1, None) if known is None else (None,):
-        is_done, n_unknown = np.zeros_like(is_stable), np.zeros(len(is_stable), np.int64)
+        is_done, n_unknown = np.zeros_like(is_stable), (~is_certain).astype(np.int64)
         while True:
             _close(is_reached.ravel(), source, target)
             is_open = (is_reached != is_stable).any(axis=1)
@@ -142,18 +173,26 @@ def reached_from_rest(
                 np.add.at(n_unknown, unknown, 1)
                 source = np.append(source, _keys(found.design, found.source, n_units))
                 target = np.append(target, _keys(found.design, found.target, n_units))
-    return Reached(is_reached, n_unknown)
+    return Reached(is_reached, n_unknown, np.where(is_certain, begin.astype(np.int64), -1))
 
 
 class Reached(NamedTuple):
     """Which states pulses lead to from rest, (design, pattern by code).
 
     Where these are not all there are, `n_unknown` (design,) directions in which no equilibrium is
-    found, or no certified state after release, may lead to others.
+    found, or no certified state after release, may lead to others. `rest` (design,) is the code
+    that each begins at, or −1 where that is not known, which counts as an unknown direction.
     """
 
     is_reached: Flags
     n_unknown: Indices
+    rest: Indices
+
+    @property
+    def known(self) -> Array:
+        """1 of what is reached, 0 of what is not, NaN where that is not known, (design, code)."""
+        is_known = self.is_reached | (self.n_unknown == 0)[:, None]
+        return np.where(is_known, self.is_reached, np.nan)
 
 
 def _close(is_reached: Flags, source: Indices, target: Indices) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions, SideBySide, on_line, raised
-from dpgcli.actuation.graph import reached_from_rest, stable_states
+from dpgcli.actuation.graph import Reached, reached_from_rest, stable_states
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.rest import is_certified
 from dpgcli.actuation.staircase import Stair, Way
@@ -70,16 +70,29 @@ class Transitions(SideBySide):
 class StateGraph:
     """All stable states of a finger, and their transitions on its lines.
 
-    `is_stable` and `is_reached`, by code of the pattern, say which states there are, and which of
-    them pulses of any height lead to from rest; `n_unknown` directions may lead to others, see
-    `graph.Reached`; `reach` is how far pressures went, MPa.
+    `is_stable`, by code of the pattern, says which states there are; `reached`, of one design,
+    which of them pulses of any height lead to; `reach` is how far pressures went, MPa.
     """
 
     transitions: Transitions
     is_stable: Flags
-    is_reached: Flags
-    n_unknown: int
+    reached: Reached
     reach: float
+
+    @property
+    def is_reached(self) -> Flags:
+        """Which states pulses lead to from rest, by code of the pattern."""
+        return np.asarray(self.reached.is_reached[0])
+
+    @property
+    def n_unknown(self) -> int:
+        """In how many directions others may be, see `graph.Reached`."""
+        return int(self.reached.n_unknown[0])
+
+    @property
+    def rest(self) -> int:
+        """The code of the state that pulses begin at; −1 where it is not known."""
+        return int(self.reached.rest[0])
 
 
 def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
@@ -106,8 +119,7 @@ def state_graph(pressed: Pressed, line_of: Indices) -> StateGraph:
     leads = transitions.take(np.flatnonzero(transitions.outcome == Departure.LEAVES))
     known = leads.code.astype(np.int64), leads.after.astype(np.int64)
     reached = reached_from_rest(pressed, line_of, reach, is_stable, known)
-    n_unknown = int(reached.n_unknown[0])
-    return StateGraph(transitions, is_stable[0], reached.is_reached[0], n_unknown, float(reach[0]))
+    return StateGraph(transitions, is_stable[0], reached, float(reach[0]))
 
 
 def first_flips(

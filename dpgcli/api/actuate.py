@@ -1,6 +1,5 @@
 """`actuate`: a finger followed through a history of pressures."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 from functools import cached_property
@@ -10,24 +9,24 @@ import numpy as np
 
 from dpgcli.actuation.alone import REACH, thresholds_alone
 from dpgcli.actuation.certificate import Certificate, certificate
-from dpgcli.actuation.pressed import Halt, Shapes
+from dpgcli.actuation.pressed import Halt
 from dpgcli.actuation.readings import Drift, Readings, drift
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.tables import event_columns, event_rows, path_columns, path_rows
 from dpgcli.actuation.travel import PathPoints, Travel, joined, travel
 from dpgcli.actuation.unstable import branches
-from dpgcli.api.arguments import check_flags, check_texts, figure_path, path_of, table_path, whole
+from dpgcli.api.arguments import check_flags, figure_path, path_of, table_path, whole
 from dpgcli.api.histories import GivenHistory, PressureInput, history_input
 from dpgcli.api.inputs import Settings, SpecInput
+from dpgcli.api.pressed_states import begin_of, pattern_of
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.arrays import Array, Columns
 from dpgcli.design.outputs import Output
 from dpgcli.errors import ActuationError, Field, UsageError
 from dpgcli.records import dataclass
-from dpgcli.states.certify import Status
 from dpgcli.states.columns import Column
-from dpgcli.states.patterns import texts
+from dpgcli.states.patterns import inverted_units, texts
 from dpgcli.states.solved import Surroundings
 from dpgcli.text import counted, enumerated
 
@@ -235,8 +234,8 @@ def actuate(
 
     `pressure` (MPa): a ramp such as "0:0.15:0", one such as "A=0:0.15:0" for each line, numbers,
     or a table with a column for each line; None takes that of the spec. `start` is the pattern
-    to start from, all units at rest without it. The history is run through `cycles` times. With
-    `unstable` the path goes on beyond folds, along branches that no finger stays on.
+    to start from, that in which the finger rests without it. The history is run through `cycles`
+    times. With `unstable` the path goes on beyond folds, along branches that no finger stays on.
     Raises SpecError for a wrong spec or history, UsageError for wrong choices, ActuationError where
     the finger folds onto itself or no equilibrium is found: its `result` has what happened before.
 
@@ -268,26 +267,12 @@ def followed(
             Field("cycles"),
             f" {cycles:,}: expected at most {MOST_PRESSURES:,}, as the path is held in memory",
         )
-    check_texts(start=start)
-    start = start or "0" * given.pressed.finger.n_units
-    way = travel(given.pressed, _start(given, start), by_unit, cycles, LARGEST_STEP)
-    result = ActuateResult(given, history, way, start, cycles)
+    begin = begin_of(given, start)
+    inverted = inverted_units(np.array([begin], np.uint64), given.pressed.finger.n_units)
+    shapes, _ = at_rest(given.pressed, inverted)
+    way = travel(given.pressed, shapes, by_unit, cycles, LARGEST_STEP)
+    result = ActuateResult(given, history, way, pattern_of(given, begin), cycles)
     if result.problem:
         hint = "; pressures are in MPa, of which 150 kPa are 0.15" if result.times_beyond else ""
         raise ActuationError(result, result.problem, hint)
     return replace(result, branches=branches(given.pressed, way)) if unstable else result
-
-
-def _start(given: PressedInput, pattern: str) -> Shapes:
-    """The shape at rest that a way begins with. Raises UsageError where there is none."""
-    n_units = given.pressed.finger.n_units
-    if not re.fullmatch(f"[01]{{{n_units}}}", pattern):
-        raise UsageError(Field("start"), f" {pattern}: expected {n_units} digits, 0 or 1")
-    inverted = np.array([[digit == "1"] for digit in pattern])
-    shapes, settled = at_rest(given.pressed, inverted)
-    status = Status(settled.status[0])
-    if status is not Status.STABLE:
-        raise UsageError(
-            Field("start"), f" {pattern}: expected a stable state, found {status.text}"
-        )
-    return shapes

@@ -9,7 +9,7 @@ from dpgcli.actuation.alone import thresholds_alone
 from dpgcli.actuation.directions import Directions
 from dpgcli.actuation.pulses import Intervals, intervals
 from dpgcli.api.inputs import Settings, SpecInput
-from dpgcli.api.pressed_states import check_state, code_of, pattern_of, patterns_of
+from dpgcli.api.pressed_states import begin_of, pattern_of, patterns_of
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.tables import Table, TableResult
 from dpgcli.api.transitions import pressure_lines
@@ -101,8 +101,7 @@ def lookup(spec: SpecInput, *, start: str = "", settings: Settings = ()) -> Look
 
 def lookup_of(given: PressedInput, start: str = "") -> LookupResult:
     """The same, of what was read before."""
-    begin = code_of(given, "start", start, may_lack=True)
-    check_state(given, "start", begin)
+    begin = begin_of(given, start)
     pressed, line_of = given.pressed, given.pressure.line_of
     reach = thresholds_alone(pressed).reach
     code = np.array([begin], np.uint64)

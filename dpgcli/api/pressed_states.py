@@ -5,6 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from dpgcli.actuation.graph import rests
+from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest
 from dpgcli.api.arguments import check_texts
 from dpgcli.api.pressure import PressedInput
@@ -13,17 +15,28 @@ from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
 
 
-def code_of(given: PressedInput, field: str, pattern: str, *, may_lack: bool = False) -> int:
-    """The code of a pattern; of an empty one, if it may be, that of rest.
-
-    Raises UsageError for what is none.
-    """
+def code_of(given: PressedInput, field: str, pattern: str) -> int:
+    """The code of a pattern. Raises UsageError for what is none."""
     check_texts(**{field: pattern})
     n_units = given.pressed.finger.n_units
-    said = pattern or "0" * n_units if may_lack else str(pattern)
-    if not re.fullmatch(f"[01]{{{n_units}}}", said):
+    if not re.fullmatch(f"[01]{{{n_units}}}", str(pattern)):
         raise UsageError(Field(field), f" {pattern}: expected {n_units} digits, 0 or 1")
-    return int(said, 2)
+    return int(pattern, 2)
+
+
+def begin_of(given: PressedInput, start: str) -> int:
+    """The code of the state to start from; of none, that in which the finger rests.
+
+    Raises UsageError for what is no pattern, or none of a stable state.
+    """
+    check_texts(start=start)
+    if start:
+        code = code_of(given, "start", start)
+    else:
+        codes, are_certain = rests(given.pressed, 1)
+        code = int(codes[0]) if are_certain[0] else 0
+    check_state(given, "start", code)
+    return code
 
 
 def check_state(given: PressedInput, field: str, code: int) -> None:
@@ -34,6 +47,14 @@ def check_state(given: PressedInput, field: str, code: int) -> None:
     if status is not Status.STABLE:
         said = f" {pattern_of(given, code)}: expected a stable state, found {status.text}"
         raise UsageError(Field(field), said)
+
+
+def unknown_rest(pressed: Pressed) -> str:
+    """Why it is not known in which state a finger rests before any pulse, for summaries."""
+    n_units = pressed.finger.n_units
+    _, settled = at_rest(pressed, np.zeros((n_units, 1), bool))
+    status = Status(settled.status[0]).text
+    return f"without a pulse the finger is in no certified state, {'0' * n_units} is {status}"
 
 
 def pattern_of(given: PressedInput, code: int) -> str:

@@ -12,7 +12,7 @@ from dpgcli.actuation.sequences import PulseSequence, pulse_sequence
 from dpgcli.actuation.tables import numbered
 from dpgcli.api.graded import Graded, graded_for
 from dpgcli.api.inputs import Settings, SpecInput
-from dpgcli.api.pressed_states import check_state, code_of, pattern_of, patterns_of
+from dpgcli.api.pressed_states import begin_of, code_of, pattern_of, patterns_of
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.scatter import (
     CONFIDENCE,
@@ -221,7 +221,7 @@ def pulses(
 ) -> PulsesResult:
     """The shortest sequence of pulses of pressure that leads from a state to another.
 
-    `end` and `start` are patterns such as "10110"; without a start all units are at rest.
+    `end` and `start` are patterns such as "10110"; without a start that in which the finger rests.
     Each pulse raises or lowers one line and lets it go. The sequence is replayed by path following.
     `scatter`, such as "dome_thickness_mm=2%,dome_height_mm=0.1mm", are standard deviations of
     values around those of the spec: so many `draws` of fingers, 1000 unless given, are followed.
@@ -248,9 +248,9 @@ def pulses_of(
     given: PressedInput, end: str, start: str = "", draws: Draws | None = None
 ) -> PulsesResult:
     """The same, of what was read before."""
-    begin, target = code_of(given, "start", start, may_lack=True), code_of(given, "end", end)
+    target = code_of(given, "end", end)
     check_size(given)
-    check_state(given, "start", begin)
+    begin = begin_of(given, start)
     keep_freed_memory()
     pressed, lines = given.pressed, given.pressure
     found = pulse_sequence(pressed, lines.line_of, begin, target)

@@ -132,7 +132,7 @@ class _Anew:
         assert pressure is not None, "the base has it"
         units = UnitSolutions.of(self.scene.finger)
         graph = state_graph(Pressed.of(units, pressure), pressure.line_of)
-        columns: Columns = {REACHABLE.name: graph.is_reached[self.codes.astype(np.int64)]}
+        columns: Columns = {REACHABLE.name: graph.reached.known[0, self.codes.astype(np.int64)]}
         for name, (line, sign) in directions(self.spec.design).items():
             columns[name] = _left_at(graph, self.codes, line, sign)
         return columns

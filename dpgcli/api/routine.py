@@ -23,7 +23,7 @@ from dpgcli.api.bodies import (
     with_body,
 )
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput
-from dpgcli.api.pressed_states import code_of
+from dpgcli.api.pressed_states import code_of, unknown_rest
 from dpgcli.api.pressure import pressed_input
 from dpgcli.api.pulses import check_size
 from dpgcli.api.tables import Table, TableResult
@@ -98,7 +98,9 @@ class RoutineResult(TableResult):
         yield from self._found() if self.exists else self._failures()
         if search.n_left_out:
             yield f"{counted(search.n_left_out, 'plan')} not tried: those of most pulses"
-        if n_unknown := search.known.graph.n_unknown:
+        if not len(search.known.graph.code):
+            yield f"no pulses are looked for: {unknown_rest(self.routine.task.pressed)}"
+        elif n_unknown := search.known.graph.n_unknown:
             yield f"{failed_searches(n_unknown)}: there may be other plans"
         if NOT_CHECKED in rows["status"].tolist():
             yield from self._unchecked()

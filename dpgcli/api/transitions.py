@@ -16,6 +16,7 @@ from dpgcli.actuation.transitions import Departure, StateGraph, state_graph
 from dpgcli.api.arguments import figure_path, path_of, table_path
 from dpgcli.api.inputs import Settings, SpecInput
 from dpgcli.api.predict import MOST_DRAWN
+from dpgcli.api.pressed_states import pattern_of, unknown_rest
 from dpgcli.api.pressure import PressedInput, pressed_input
 from dpgcli.api.scatter import Draws, ScatterInput, drawn_by
 from dpgcli.api.tables import Table, TableResult
@@ -113,6 +114,19 @@ class TransitionsResult(TableResult):
         if n_tied := int((graph.transitions.tied != 0).sum()):
             tied = counted(n_tied, "transition")
             yield f"ties in {tied}: the model does not say which of these units goes first"
+        yield from self._reachable()
+        if self.draws is not None:
+            yield from self.draws.lines
+        yield from pressure_lines(self.given)
+
+    def _reachable(self) -> Iterator[str]:
+        """Which states pulses reach, and from where."""
+        graph = self.graph
+        if graph.rest < 0:
+            yield f"not known what is reachable: {unknown_rest(self.given.pressed)}"
+            return
+        if graph.rest:
+            yield f"loads bring the finger at rest to {pattern_of(self.given, graph.rest)}"
         yield f"reachable from rest: {_listed(self.reachable)}"
         if graph.n_unknown and self.unreachable:
             yield (
@@ -121,9 +135,6 @@ class TransitionsResult(TableResult):
             )
         else:
             yield f"not reachable from rest with these lines: {_listed(self.unreachable)}"
-        if self.draws is not None:
-            yield from self.draws.lines
-        yield from pressure_lines(self.given)
 
     def to_networkx(self) -> "nx.MultiDiGraph[str]":
         """States as nodes, transitions as edges, with what is known of both as attributes."""

@@ -107,7 +107,7 @@ def facts(plan: "Plan") -> dict[str, Any]:
         "n_finger_solves": plan.n_finger_solves,
         "tolerance": plan.request.tolerance,
         "residual_limit_N": plan.residual_limit,
-        "bar_flexibility_mm": plan.bar_flexibility,
+        "bar_flexibility_mm": spelled(plan.bar_flexibility),
         "accuracy_level": plan.accuracy_level and plan.accuracy_level.name,
         "error_bound_mm": spelled(plan.error_bound),
         "model_error": plan.scene.model_error.text,
@@ -271,6 +271,8 @@ def _what(plan: "Plan") -> str:
 
 
 def _bar_error(plan: "Plan") -> str:
+    if plan.bar_flexibility == float("inf"):
+        return "how far the bars' flexibility moves the tip under the loads is not bounded"
     bound = f"the tip by less than {plan.bar_flexibility:.2g} mm"
     if plan.scene.finger.is_rigid:
         return f"bars 1000 times as stiff as the stiffest spring would move {bound}"

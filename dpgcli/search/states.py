@@ -104,7 +104,7 @@ class _States:
         found = PressedDesigns(self.units, self.scene.pressure, self.codes.shape[1])
         columns = {name: self._left_at(found, way, is_stable) for name, way in ways.items()}
         if REACHABLE.name in names:
-            columns[REACHABLE.name] = found.reached.is_reached[self.owner, self.code.astype(int)]
+            columns[REACHABLE.name] = found.reached.known[self.owner, self.code.astype(int)]
         return columns
 
     def _left_at(self, found: "PressedDesigns", way: Direction, is_stable: Flags) -> Array:

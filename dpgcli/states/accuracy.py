@@ -162,8 +162,11 @@ def dropped_bars(units: UnitSolutions) -> Array:
 def bar_flexibility(units: UnitSolutions) -> Array:
     """Bound on how far the bars' flexibility moves the tip (mm), in any state, (design,).
 
-    Twice the sum, over units, of what each unit's bars do to first order.
+    Twice the sum, over units, of what each unit's bars do to first order; infinite under dead
+    loads, which bars bear as well.
     """
+    if units.finger.is_loaded:
+        return np.full(units.wells.exists.shape[1], np.inf)
     unit = units.first_order
     per_unit = np.abs(unit.chord) + units.finger.straight_length * unit.turn
     shape = (units.finger.n_units, per_unit.shape[1])

@@ -70,7 +70,8 @@ class Plan:
 
     `selection` is None where all states are wanted. `residual_limit` (N) is the largest residual
     that a stable state may have, in the unit with the largest forces. `bar_flexibility` (mm)
-    bounds how far the bars' flexibility moves the tip: what dropping them costs, or would.
+    bounds how far the bars' flexibility moves the tip: what dropping them costs, or would; it is
+    infinite under dead loads.
     `accuracy_level` was chosen for the target error, if there is one; `error_bound` (mm) is what it
     promises for every tip, and infinite where nothing can be promised before the work.
     """

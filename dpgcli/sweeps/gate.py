@@ -277,7 +277,7 @@ def failed_searches(columns: Columns, names: Collection[str]) -> list[str]:
     """What is not known of columns with these names, where searches failed: in lines."""
     found = {metric.unknown: int(is_open.sum()) for metric, is_open in _bounds(columns, names)}
     return [
-        f"searches failed in {counted(n, 'design')} ({name}): {MEANINGS[name]}"
+        f"searches failed or did not decide in {counted(n, 'design')} ({name}): {MEANINGS[name]}"
         for name, n in found.items()
     ]
 

@@ -79,7 +79,7 @@ class Metrics:
         block = {name: values.reshape(self.n_designs, -1) for name, values in rows.items()}
         block["reach"] = np.hypot(block["tip_x_mm"], block["tip_y_mm"])
         stable = block["status"] == Status.STABLE
-        is_lost = block["status"] == Status.NOT_CONVERGED
+        is_lost = np.isin(block["status"], UNDECIDED)
         self.n_stable += stable.sum(axis=1)
         self.n_unknown_states += is_lost.sum(axis=1)
         for metric in METRICS:
@@ -158,6 +158,7 @@ class Metrics:
 
 
 SHAPES = (Output.SHAPES,)
+UNDECIDED = (Status.MARGINAL, Status.NOT_CONVERGED)  # a saddle has states beside it
 UNKNOWN_STATES, UNKNOWN_GRASPS = "n_unknown_states", "n_unknown_grasps"
 UNKNOWN_DIRECTIONS = "n_unknown_directions"
 
@@ -253,7 +254,8 @@ UNDER_PRESSURE = (
     _under_pressure(
         UNKNOWN_DIRECTIONS,
         "",
-        "directions of pressure in which searches failed: more states may be reached",
+        "directions of pressure in which searches failed, or 1 where the state at rest is not "
+        "known: more states may be reached",
         lambda d: d.n_unknown_directions,
         Kind.COUNT,
     ),
@@ -301,7 +303,7 @@ METRICS = (
     ),
     _count(
         UNKNOWN_STATES,
-        "patterns whose search failed: there may be more states",
+        "patterns that are marginal or not_converged: there may be more states",
         lambda m: m.n_unknown_states,
     ),
     _count(

@@ -59,3 +59,50 @@ def test_transitions_are_under_the_loads() -> None:
     assert [step["reached_at_pressure"] for step in steps] == ["001", "011", "111"]
     pressures = [float(step["pressure_MPa"]) for step in steps]
     assert 0.1495 < pressures[0] < pressures[1] < pressures[2]
+
+
+LED_ON = ("finger.units=2", "loads.tip_moment_N_mm=-55", "pressure={}")
+HIGHER = "finger.overrides.2.geometry.dome_height_mm=7.5"
+
+
+def test_pulses_begin_where_loads_leave_the_finger() -> None:
+    """Under this couple the first unit flips by itself: 10 is where the finger rests."""
+    settings = [*LED_ON, HIGHER]
+    states = dpg.predict(SPEC, settings=settings).to_pandas().set_index("pattern")
+    assert states["status"].to_dict()["00"] == "another_pattern"
+    assert states["reached_pattern"]["00"] == "10"
+    found = dpg.transitions(SPEC, settings=settings)
+    assert found.reachable == ("10", "11")
+    assert found.graph.rest == 0b10
+    assert "loads bring the finger at rest to 10" in found.summary
+    assert dpg.pulses(SPEC, end="11", settings=settings).start == "10"
+    assert dpg.lookup(SPEC, settings=settings).start == "10"
+    assert dpg.actuate(SPEC, pressure="0:0.01", settings=settings).start == "10"
+
+
+def buckled(tmp_path: Path, force: float) -> Path:
+    """Three units between a force and the base: without inverted ones they are straight."""
+    spec = tmp_path / "straight.yaml"
+    text = SPEC.read_text().replace("units: 5", "units: 3\n  law: push_only")
+    spec.write_text(f"{text}\npressure: {{}}\nloads: {{tip_force_x_N: {force}}}\n")
+    return spec
+
+
+@pytest.mark.parametrize(("force", "n_unknown"), [(0.0, 0), (-0.5, 1)])
+def test_beyond_buckling_it_is_not_known_where_the_finger_rests(
+    tmp_path: Path, force: float, n_unknown: int
+) -> None:
+    """000 is a saddle, and the two states beside it are not looked for: no bound may hold."""
+    spec = buckled(tmp_path, force)
+    found = dpg.transitions(spec)
+    assert (found.graph.rest, found.graph.n_unknown > 0) == (-n_unknown, n_unknown > 0)
+    is_said = any("000 is marginal" in line for line in found.summary)
+    assert is_said is (n_unknown == 1)
+    space = [{"key": "finger.geometry.unit_separation_mm", "values": [3.0]}]
+    sweep = {"base": str(spec), "space": space}
+    rules = ["n_stable <= 8", "reach_max_mm < 50", "n_reachable < 9"]
+    result = dpg.sweep(sweep, executor="serial", require=rules)
+    rows = result.designs
+    assert rows["n_unknown_states"].tolist() == [n_unknown]
+    assert rows["n_unknown_directions"].tolist() == [n_unknown]
+    assert [verdict.is_met for verdict in result.verdicts] == [n_unknown == 0] * 3

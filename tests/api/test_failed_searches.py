@@ -98,7 +98,10 @@ def test_designs_count_failed_searches_and_requirements_warn(tmp_path: Path) -> 
     dpg.sweep(sweep, output=tmp_path / "out", executor="serial")
     (verdict,) = dpg.check(tmp_path / "out" / "designs.parquet", require=["n_reachable > 3"])
     assert len(verdict.rows) == 2
-    assert any("searches failed in 2 designs" in str(warning) for warning in verdict.warnings)
+    assert any(
+        "searches failed or did not decide in 2 designs" in str(warning)
+        for warning in verdict.warnings
+    )
 
 
 @pytest.mark.parametrize(

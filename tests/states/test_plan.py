@@ -158,6 +158,12 @@ def test_bar_flexibility_bounds_what_rigid_bars_cost(
     assert 0.05 * bound <= moved[both].max() <= bound
 
 
+def test_under_loads_it_is_not_bounded(graded_finger: Fingers) -> None:
+    """A force along the finger stretches bars by as much as it is large."""
+    pulled = graded_finger(3, 7, 1e4).changed(tip_force_x=np.array([[0.1]]))
+    assert explain(Scene(pulled, ())).bar_flexibility == np.inf
+
+
 def test_residual_limit_is_what_the_tolerance_allows(graded_finger: Fingers) -> None:
     finger = graded_finger(3, 82, 1e4)
     plan = explain(Scene(finger, ()), Request(tolerance=1e-9))
