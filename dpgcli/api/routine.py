@@ -98,9 +98,7 @@ class RoutineResult(TableResult):
         yield from self._found() if self.exists else self._failures()
         if search.n_left_out:
             yield f"{counted(search.n_left_out, 'plan')} not tried: those of most pulses"
-        if not len(search.known.graph.code):
-            yield f"no pulses are looked for: {unknown_rest(self.routine.task.pressed)}"
-        elif n_unknown := search.known.graph.n_unknown:
+        if n_unknown := search.known.graph.n_unknown:
             yield f"{failed_searches(n_unknown)}: there may be other plans"
         if NOT_CHECKED in rows["status"].tolist():
             yield from self._unchecked()
@@ -309,9 +307,7 @@ def planned(
     keep_freed_memory()
     found = prospect(Task(given.scene, pressed.pressed, begin), *codes)
     if not len(found.graph.code):
-        raise UsageError(
-            "a routine begins at rest: expected a stable state there, found none that is certified"
-        )
+        raise UsageError(f"a routine begins at rest: {unknown_rest(pressed.pressed)}")
     return given, found
 
 

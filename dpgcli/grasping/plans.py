@@ -56,10 +56,15 @@ class Prospect:
     coming: Clearance
     closed: int | None = None
 
+    @property
+    def rest(self) -> int:
+        """The code of the state that fingers rest in before any pulse."""
+        return int(self.graph.code[0])
+
     @cached_property
     def openings(self) -> Sequences:
         """Pulses from rest."""
-        return routes(self.graph, self.reach, 0)
+        return routes(self.graph, self.reach, self.rest)
 
     @cached_property
     def _all(self) -> tuple[Plan, ...]:

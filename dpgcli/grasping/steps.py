@@ -106,7 +106,7 @@ def routine_of(search: Search) -> Routine:
     plan, known = search.plan, search.known
     if plan is None:
         return Routine(search, ())
-    opening = replayed(known.task.pressed, known.task.lines.line_of, 0, plan.opening)
+    opening = replayed(known.task.pressed, known.task.lines.line_of, known.rest, plan.opening)
     steps: list[Step] = []
     for step in _steps(known, plan, opening):
         steps.append(step)
@@ -213,7 +213,7 @@ def routine_rows(routine: Routine) -> Columns:
     payload = np.array([float(rows.get("payload_N", [np.nan])[0]) for rows in told])
     friction = routine.task.scene.friction
     weight = None if friction is None else friction.weight
-    first = "0" * routine.task.scene.finger.n_units
+    first = f"{routine.search.known.rest:0{routine.task.scene.finger.n_units}b}"
 
     def of(name: str, kind: type) -> Array:
         return np.array([rows[name][0] for rows in told], kind)

@@ -305,9 +305,19 @@ def test_a_routine_that_does_not_hold_is_an_error(monkeypatch: pytest.MonkeyPatc
 
 
 def test_fingers_that_do_not_rest_begin_nothing() -> None:
-    """A weight of the units that no straight finger bears."""
-    with pytest.raises(dpg.UsageError, match="a routine begins at rest"):
-        dpg.routine(SPEC, approach_from=BEGIN, settings={"loads.unit_mass_g": 1e6})
+    """A force that the straight finger buckles under."""
+    pushed = {"finger.law": "push_only", "loads.tip_force_x_N": -0.5}
+    with pytest.raises(dpg.UsageError, match="begins at rest: .* 000 is marginal"):
+        dpg.routine(SPEC, approach_from=BEGIN, settings=pushed)
+
+
+def test_fingers_begin_where_loads_leave_them() -> None:
+    """This couple flips two units before any pulse."""
+    graded = {"3": {"geometry": {"dome_height_mm": 7.5}}}
+    loads = {"loads.tip_moment_N_mm": -52, "finger.overrides": graded}
+    found = dpg.routine(SPEC, approach_from=BEGIN, settings=loads)
+    assert found.table["pattern_before"].tolist()[0] == "110"
+    assert found.routine.search.known.openings[0b110] == ()
 
 
 @pytest.mark.slow
