@@ -307,7 +307,7 @@ def test_a_routine_that_does_not_hold_is_an_error(monkeypatch: pytest.MonkeyPatc
 def test_fingers_that_do_not_rest_begin_nothing() -> None:
     """A force that the straight finger buckles under."""
     pushed = {"finger.law": "push_only", "loads.tip_force_x_N": -0.5}
-    with pytest.raises(dpg.UsageError, match="begins at rest: .* 000 is marginal"):
+    with pytest.raises(dpg.UsageError, match="000 is marginal"):
         dpg.routine(SPEC, approach_from=BEGIN, settings=pushed)
 
 
