@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from dpgcli.files.design_spec import swept_base
 from dpgcli.files.parts import FINGERPRINT
 from dpgcli.files.row_source import RowSource, opened_rows
 from dpgcli.files.scene_file import canonical, checked, scene_of
+from dpgcli.files.scene_file.settings import changed
+from dpgcli.files.yaml_file import Document
 from dpgcli.reports.explorer.content import BestDesign, Explored, best_rows, shown_rows
 from dpgcli.reports.explorer.poses import StateTips
 from dpgcli.reports.explorer.shapes import (
@@ -40,10 +43,12 @@ TIPS = ("status", "tip_x_mm", "tip_y_mm", "tip_angle_rad", "energy_mJ")
 
 def explored(folder: Path, space: DesignSpace) -> Explored:
     """What is to be explored of the sweep in a folder, as far as its tables say it."""
-    rows = shown_rows(space)
+    narrowed = space.narrowed
+    rows = shown_rows(narrowed)
     with opened_rows(folder / DESIGNS, has_states=False) as source:
         try:
-            base = checked(swept_base(space.metadata))
+            document = swept_base(space.metadata)
+            base = checked(document)
             best = [_best(source, *found) for found in best_rows(space).items()]
         except (SpecError, UsageError):  # a table of somebody else, or of another version
             return Explored(rows)
@@ -55,7 +60,16 @@ def explored(folder: Path, space: DesignSpace) -> Explored:
         *(["one finger, in its own frame"] * is_gripper),
         *([WITHOUT_BODY] * (base.design.body is not None)),
     ]
-    return Explored(rows, best, keys, canonical(base.model_dump(exclude_none=True)), shapes)
+    hidden = {key: space.designs[name] for name, key in keys.items() if name not in narrowed.designs}
+    return Explored(rows, best, keys, _shown_base(document, hidden), shapes)
+
+
+def _shown_base(document: Document, hidden: Columns) -> dict[str, Any] | None:
+    """The base with values that no column shows, by key; None where designs differ in them."""
+    if any(len(distinct(values)) > 1 for values in hidden.values()):
+        return None
+    values = {key: values[0].item() for key, values in hidden.items()}
+    return canonical(checked(changed(document, values)).model_dump(exclude_none=True))
 
 
 def _best(source: RowSource, row: int, metrics: list[str]) -> BestDesign:

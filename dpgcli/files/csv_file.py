@@ -43,6 +43,7 @@ Tabular: TypeAlias = Union[str, Path, "pd.DataFrame", Mapping[str, Any]]
 """A CSV file, a data frame (of pandas, or what has `to_pandas`), or columns by name."""
 
 FRAME = "data frame"
+NO_NUMBERS = "a file without numbers"
 MAX_BYTES = 64 * 1024 * 1024
 MOST_NAMED = 100  # columns
 MOST_LINES, MOST_CELLS = 1_000_000, 2_000_000  # in 600 MB of memory
@@ -220,10 +221,22 @@ class Sheet:
         close = [near for name in wanted for near in get_close_matches(name, self.names, n=1)]
         hint = f"is it {close[0]}?" if close else hint
         expected = f"a column {' or '.join(wanted)}"
+        return located(Location(self.file), "header", expected, self._named(), hint)
+
+    @cached_property
+    def has_numbers(self) -> bool:
+        """Whether a cell is one. A file without any may be no table, and its header a password.
+
+        Messages end up in logs: they do not quote such a header.
+        """
+        return self.file == FRAME or any(is_number(cell) for row in self.rows for cell in row)
+
+    def _named(self) -> str:
+        if not self.has_numbers:
+            return NO_NUMBERS
         names = [self.titles.get(name, name) for name in self.names if name]
         more = f" and {len(names) - MOST_NAMED:,} more" if len(names) > MOST_NAMED else ""
-        found = ", ".join(names[:MOST_NAMED]) + more
-        return located(Location(self.file), "header", expected, found, hint)
+        return ", ".join(names[:MOST_NAMED]) + more
 
 
 def name_of(source: Tabular) -> str:
@@ -386,7 +399,8 @@ def _renamed(sheet: Sheet, wanted: Collection[str], header: int) -> Iterator[Pro
 def _form_problems(sheet: Sheet, header: int) -> Iterator[Problem]:
     top = Location(sheet.file, header)
     for name in (name for name, count in Counter(sheet.names).items() if name and count > 1):
-        yield located(top, "header", "each column once", f"{shown(name)} again")
+        found = shown(name) if sheet.has_numbers else "one"
+        yield located(top, "header", "each column once", f"{found} again")
     longest = max(map(len, sheet.rows), default=0)
     if sheet.titles and sheet.separator != "\t" and 0 < longest < len(sheet.names):
         expected = f"{longest} titles, as many as cells below"

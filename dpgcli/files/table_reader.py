@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -176,7 +177,8 @@ def _check_room(path: Path, metadata: Any, names: list[str]) -> None:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
     columns = (group.column(place) for group in groups for place in range(group.num_columns))
-    needed = sum(c.total_uncompressed_size for c in columns if c.path_in_schema in names)
+    wanted = frozenset(names)
+    needed = sum(c.total_uncompressed_size for c in columns if c.path_in_schema in wanted)
     needed += 8 * metadata.num_rows * len(names)
     if needed > memory:
         found = f"{needed / 1e9:,.1f} GB, and this machine has {memory / 1e9:,.1f} GB"
@@ -197,13 +199,13 @@ def _readable(source: str, described: Any) -> list[str]:
 
 def check_names(source: str, described: Any, what: str, needed: Iterable[str]) -> None:
     """Raise UsageError where a schema lacks columns that it needs, or has some twice."""
-    names = described.names
-    if missing := [name for name in needed if name not in names]:
+    counts = Counter(described.names)
+    if missing := [name for name in needed if name not in counts]:
         raise UsageError(
             f"{source} is no table of {what}: no column {', '.join(missing)}; "
             f"dpg sweep writes one, {what}.parquet"
         )
-    if twice := sorted({name for name in names if names.count(name) > 1}):
+    if twice := sorted(name for name, count in counts.items() if count > 1):
         raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
 
 
@@ -236,8 +238,8 @@ def swept_in(described: Any) -> list[str]:
 
 
 def _in_our_order(names: list[str], swept: list[str]) -> list[str]:
-    first = ["design", *swept, "calibration"]
-    return first + [name for name in names if name not in first]
+    first = dict.fromkeys(("design", *swept, "calibration"))
+    return [*first, *(name for name in names if name not in first)]
 
 
 def is_number(kind: Any) -> bool:
@@ -273,11 +275,11 @@ def column_of(source: str, name: str, column: Any, kind: str) -> NDArray[Any]:
 def _plain(source: str, table: Any) -> Columns:
     """The columns of three plain types."""
     names = table.column_names
-    swept = swept_in(table.schema)
+    needed = {*NEEDED, *swept_in(table.schema)}
     columns: Columns = {}
     for name in names:
         column = table.column(name)
-        if name in (*NEEDED, *swept):
+        if name in needed:
             columns[name] = column_of(source, name, column, _kind(name))
         elif (plain := READERS[_kind(name)](column)) is not None:
             columns[name] = plain

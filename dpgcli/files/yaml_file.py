@@ -33,6 +33,8 @@ _TEXT = frozenset(_TAG + name for name in ("str", "timestamp", "value", "merge")
 # What ruamel.yaml is known to let through on malformed input, besides its own errors.
 _LEAKS = (ValueError, LookupError, AttributeError, TypeError, AssertionError, OverflowError)
 
+NAMED = re.compile(r"\b(alias|handle) '.*'")  # what ruamel.yaml quotes of a file, but characters
+
 
 @dataclass(frozen=True)
 class Document:
@@ -101,10 +103,17 @@ def parse_document(file: str, text: str) -> Document:
     walk = _Walk(Location(file))
     start, data = walk.read(text)
     if not isinstance(data, dict):
-        wrong = located(start, "document", "a mapping of keys to values", shown(data))
+        wrong = located(start, "document", "a mapping of keys to values", _kind(data))
         raise SpecError(in_order([*walk.problems, wrong]))
     own = without_free_keys(data)
     return Document(file, own, {(): start, **walk.places}, in_order(walk.problems))
+
+
+def _kind(data: Any) -> str:
+    """What stands where keys should, not quoted: it may be a password, and messages are in logs."""
+    if isinstance(data, str):
+        return "text without keys"
+    return shown(data) if data is None or isinstance(data, list) else "a single value"
 
 
 def without_free_keys(data: dict[str, Any]) -> dict[str, Any]:
@@ -191,11 +200,12 @@ class _Walk:
         """A syntax error in one line."""
         mark = _mark(error)
         place = self.at(mark.line, mark.column) if mark else self.start
-        problem = getattr(error, "problem", None) or str(error) or type(error).__name__
+        problem = getattr(error, "problem", None) or type(error).__name__
         wanted, _, found = " ".join(problem.split()).rpartition("but ")
         around = [getattr(error, "context", None), wanted.rstrip(", ")]
         where = ", ".join(" ".join(part.split()) for part in around if part)
-        said = re.sub("^(found|got) ", "", found) + (f" ({where})" if where else "")
+        found = NAMED.sub(r"\1", re.sub("^(found|got) ", "", found))
+        said = found + (f" ({where})" if where else "")
         return located(place, "syntax", "valid YAML", shortened(said, 120))
 
     def value(self, node: Node, path: KeyPath = (), depth: int = 0) -> Any:
@@ -275,7 +285,8 @@ class _Walk:
         if isinstance(node.value, str) and node.tag in _TEXT:
             return node.value
         if not isinstance(node.value, str) or node.tag not in _TYPED:
-            self.wrong(place, path, "plain values", f"the tag {shortened(str(node.tag))}")
+            found = f"the tag {shortened(str(node.tag))}" if path else "a tag"
+            self.wrong(place, path, "plain values", found)
             return None
         try:
             number = self.yaml.constructor.construct_object(node)

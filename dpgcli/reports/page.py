@@ -28,7 +28,7 @@ TAGS = {  # a table that is too wide is scrolled alone; a head is told to be one
 
 def markdown(space: DesignSpace) -> str:
     """A design space as GitHub-flavored Markdown."""
-    return _markdown(sections(space))
+    return _markdown(sections(space.narrowed))
 
 
 def html(space: DesignSpace, explored: Explored | None = None) -> str:
@@ -39,6 +39,7 @@ def html(space: DesignSpace, explored: Explored | None = None) -> str:
     """
     from dpgcli.reports.maps import figures
 
+    space = space.narrowed
     head, *tables = _html(_markdown(sections(space))).split("<h2>")
     drawn = f"Figures</h2>\n{figures(space)}\n"
     body = "<h2>".join((head, *_explorer(space, explored), *tables[:1], drawn, *tables[1:]))

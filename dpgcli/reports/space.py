@@ -1,15 +1,19 @@
 """A table of designs, as reports read it: what is swept, which rows are usable, values as text."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 
 from dpgcli.arrays import Columns, Indices, distinct
 from dpgcli.design.outputs import Trust
+from dpgcli.files.table_reader import OTHERS
 from dpgcli.records import dataclass
 from dpgcli.sweeps.gate import swept_names
+from dpgcli.text import enumerated
+
+MOST_COLUMNS = 100  # of values that are swept, and that we have no name for: a page is to be read
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,7 @@ class DesignSpace:
     units: Mapping[str, str]
     metadata: Mapping[str, str] = field(default_factory=dict)
     trusts: Mapping[str, Sequence[Trust]] = field(default_factory=dict)
+    left_out: str = ""  # in words: columns of the table that are not here
 
     def __len__(self) -> int:
         return len(self.designs["design"])
@@ -36,6 +41,32 @@ class DesignSpace:
         """The swept columns that have more than one value; all of them where none has."""
         rows = np.arange(len(self))
         return [name for name in self.swept if self.n_values(name, rows) > 1] or self.swept
+
+    @cached_property
+    def narrowed(self) -> "DesignSpace":
+        """The space that a page has room for: of too many columns those that vary, and not all.
+
+        Columns that we have a name for are all there.
+        """
+        others = [name for name in self.designs if name not in OTHERS]
+        if len(others) <= MOST_COLUMNS:
+            return self
+        varied = [name for name in others if self._varies(name)]
+        n_constant, n_beyond = len(others) - len(varied), max(0, len(varied) - MOST_COLUMNS)
+        lost = {*others} - {*varied[:MOST_COLUMNS]}
+        constant, beyond = f"{n_constant:,} that have one value", f"{n_beyond:,} behind those here"
+        said = enumerated([constant] * (n_constant > 0) + [beyond] * (n_beyond > 0))
+        return replace(
+            self,
+            designs={name: found for name, found in self.designs.items() if name not in lost},
+            left_out=f"Of {len(self.designs):,} columns {len(lost):,} are left out: {said}.",
+        )
+
+    def _varies(self, name: str) -> bool:
+        """Whether a column has more than one value."""
+        values = self.designs[name]
+        known = values[~np.isnan(values)]
+        return bool(np.any(known != known[:1]))
 
     @cached_property
     def usable(self) -> Indices:

@@ -68,7 +68,8 @@ class PageSection(NamedTuple):
 
 def sections(space: DesignSpace) -> list[PageSection]:
     """All sections about a space, the best designs first."""
-    counted = PageSection("Design space", [_extent(space), *base_lines(space.metadata)])
+    lines = [_extent(space), *filter(None, [space.left_out]), *base_lines(space.metadata)]
+    counted = PageSection("Design space", lines)
     if not len(space):
         return [counted]
     return [
@@ -90,7 +91,7 @@ def _extent(space: DesignSpace) -> str:
         f"{name} ({space.span(name, rows)}, {space.n_values(name, rows):,} values)"
         for name in space.swept
     ]
-    return f"{len(space):,} designs over {', '.join(spans)}."
+    return f"{len(space):,} designs{' over ' * bool(spans)}{', '.join(spans)}."
 
 
 def _counts(space: DesignSpace) -> PageTable:

@@ -157,3 +157,16 @@ def test_the_same_tables_give_the_same_page(tmp_path: Path) -> None:
     assert (
         page.index("<h2>The best designs") < page.index("<h2>Explorer") < page.index("<h2>Best and")
     )
+
+
+def test_values_without_a_column_on_the_page_are_in_its_spec(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = swept(tmp_path, space=[{"key": HEIGHT, "values": [5.5]}])
+    monkeypatch.setattr("dpgcli.reports.space.MOST_COLUMNS", 0)
+    found = explored(folder, space_in(folder))
+    assert found.base
+    assert found.base["finger"]["geometry"]["dome_height_mm"] == 5.5
+    assert not {*space_in(folder).swept} & {*space_in(folder).narrowed.designs}
+    several = swept(tmp_path / "b")
+    assert explored(several, space_in(several)).base is None

@@ -2,6 +2,7 @@
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -366,3 +367,28 @@ def test_a_hinge_of_another_size_is_taken_when_its_unit_is_said(
         read_moments(path)
     said = read_moments(path, choice=Choice(units={"moment": "N mm"}))
     assert said.moment.tolist() == [moment / 2, moment]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hunter2",
+        "user: x\npassword: hunter2",
+        "hunter2,x\na,b",
+        "hunter2,hunter2\na,b",
+        "machine a login hunter2\nmachine b login c",
+        "-----BEGIN hunter2-----\nMII=\n-----END",
+    ],
+)
+@pytest.mark.parametrize("read", [read_curve, read_moments, read_table])
+def test_a_file_without_numbers_is_not_quoted(path: Path, text: str, read: Any) -> None:
+    path.write_text(text)
+    with pytest.raises(SpecError) as error:
+        read(path)
+    assert "hunter2" not in str(error.value)
+
+
+def test_columns_of_a_table_are_named(path: Path) -> None:
+    path.write_text("way,pull\n1,x\n")
+    with pytest.raises(SpecError, match="found way, pull"):
+        read_curve(path)

@@ -100,18 +100,43 @@ def test_foreign_tags_are_refused_and_not_constructed():
         ("a: b: c", "a.yaml:1:5: syntax: expected valid YAML"),
         ("a: [1,\nb: 2", "a.yaml:2:5: syntax: expected valid YAML"),
         ("a: 1\n---\nb: 2\n", "a.yaml:2:1: syntax: expected valid YAML, found another document"),
-        ("a: *b", "a.yaml:1:4: syntax: expected valid YAML, found undefined alias 'b'"),
+        ("a: *b", "a.yaml:1:4: syntax: expected valid YAML, found undefined alias"),
         ("a: 1\nb: \x00", "a.yaml:2:4: syntax: expected printable characters, found '\\x00'"),
         ("", "a.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
         ("# only\n", "a.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
         ("[1]", "a.yaml:1:1: document: expected a mapping of keys to values, found a list"),
-        ("\n5", "a.yaml:2:1: document: expected a mapping of keys to values, found 5"),
+        ("\n5", "a.yaml:2:1: document: expected a mapping of keys to values, found a single value"),
         ("%YAML 3.1\n---\na: 1", "a.yaml:1:1: syntax: expected valid YAML"),
     ],
 )
 def test_a_file_that_is_no_mapping_has_one_problem_with_its_place(text, start):
     (problem,) = problems_of(text)
     assert problem.startswith(start)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hunter2",
+        "hunter2\nAWS_KEY=hunter2",
+        "- hunter2",
+        "'hunter2",
+        "*hunter2",
+        "!hunter2 x",
+        "!hunter2!x y",
+        "&hunter2\n&hunter2 x",
+        "a: 1\n*hunter2",
+        "a: *hunter2",
+        "{hunter2: {a",
+        "%hunter2",
+        '"\\hunter2"',
+        "hunter2\n: [",
+        "2020-99-99 hunter2",
+        "root:hunter2:0:0:/root",
+    ],
+)
+def test_what_is_no_yaml_mapping_is_not_quoted(text):
+    assert "hunter" not in " ".join(problems_of(text))
 
 
 def test_twenty_levels_are_read_and_one_more_is_refused():
