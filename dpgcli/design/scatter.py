@@ -7,6 +7,7 @@ bars. A key's draws depend on the seed and the key alone.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -24,12 +25,12 @@ from dpgcli.design.dimensions import (
     unit_range,
 )
 from dpgcli.design.geometry import REFERENCE, snap_pressure
-from dpgcli.design.problems import Issue
+from dpgcli.design.problems import Issue, number, of_design
 from dpgcli.design.resolve import Resolution, resolve
-from dpgcli.design.rules import HINGE_STIFFNESS
+from dpgcli.design.rules import DERIVATIONS, FORCE_LINEARITY, HINGE_STIFFNESS, Derivation
 from dpgcli.design.scene import Scene
 from dpgcli.design.snap_pressures import SNAP, SNAP_PRESSURE
-from dpgcli.design.uncertainty import tolerance_issues
+from dpgcli.design.uncertainty import given, tolerance_issues
 from dpgcli.mechanics.finger import KEYS, Finger
 from dpgcli.records import dataclass
 
@@ -55,6 +56,7 @@ OF_FINGERS = (
     LINEAR_STIFFNESS,
     HINGE_COUPLING,
 )
+WIDTH_FROM = {"unit_cell_mm": "chamber_width_mm"}  # which makes the chamber's, unless it is given
 SCATTERED = (*OF_UNITS, *OF_FINGERS)
 
 
@@ -88,6 +90,31 @@ def scatter_issues(design: Design, spread: Mapping[str, Tolerance]) -> Iterator[
     """Keys that have no value here, or that a percentage says nothing about."""
     own = replace(design, tolerances=spread)
     yield from tolerance_issues(own, [*resolve(own).values])
+    moved = (key for key, tolerance in spread.items() if tolerance.size > 0.0)
+    for key, other in product(moved, DERIVATIONS):
+        if _is_fixed(key, other, design):
+            yield _fixed(key, other, design)
+
+
+def _is_fixed(key: str, other: Derivation, design: Design) -> bool:
+    """Whether a lattice value is given that a dimension which scatters would move.
+
+    A rule says what it would be, as long as it is none of a calibration; else the value of the
+    whole finger is no more that of a unit of another size.
+    """
+    if WIDTH_FROM.get(key, key) not in other.needs or not given(design, other.key):
+        return False
+    sections = (design.finger, *design.overrides.values())
+    known = {WIDTH_FROM.get(size, size) for section in sections for size in section.geometry}
+    is_checked = other.origin is None and known.issuperset(other.needs)
+    is_of_unit = key in OF_UNITS and other.key in design.finger.lattice
+    return is_checked or (is_of_unit and other is not FORCE_LINEARITY)
+
+
+def _fixed(key: str, other: Derivation, design: Design) -> Issue:
+    value = number(of_design(given(design, other.key)[0], 0))
+    hint = f"scatter {other.key} instead, or take it out of the spec: it would follow {key}"
+    return Issue((key,), f"no {other.key} given in the spec", value, hint)
 
 
 def scattered(

@@ -10,11 +10,12 @@ import pandas as pd
 from dpgcli.reports.drawing import own_figure, svg_text, titled
 from dpgcli.reports.space import DesignSpace
 from dpgcli.reports.summary import METRICS, varies
+from dpgcli.text import counted
 
 COUNTED = ("n_stable",)  # drawn beside what is ranked
 MOST_VECTORS = 2000  # beyond, points are drawn as pixels
 MOST_POINTS = 20_000
-FARTHEST = 1e100  # on an axis; rigid bars have an infinite stiffness
+FARTHEST = 1e100  # on an axis, which Matplotlib computes with; rigid bars' stiffness is infinite
 MOST_TICKS = 8  # with a text each
 NO_METADATA = dict.fromkeys(("Creator", "Format", "Type"))
 NO_MATPLOTLIB = "No figures: they need Matplotlib, pip install matplotlib."
@@ -26,14 +27,20 @@ def figures(space: DesignSpace) -> str:
     metrics = [name for name in every_one if name in space.designs and varies(space, name)]
     if not metrics or not space.varied:
         return "<p>No metric varies.</p>"
-    designs = pd.DataFrame(space.designs)
+    designs, n_beyond = _drawable(pd.DataFrame(space.designs), metrics)
     every = 1 if _is_grid(space, designs) else len(designs) // MOST_POINTS + 1
     try:
         svg = _maps(space, designs[::every], metrics)
     except ImportError:
         return f"<p>{escape(NO_MATPLOTLIB)}</p>"
-    caption = escape(_caption(space, every))
+    caption = escape(_caption(space, every, n_beyond))
     return f'<p>{caption}</p>\n<figure class="maps">\n{svg}</figure>'
+
+
+def _drawable(designs: pd.DataFrame, metrics: Sequence[str]) -> tuple[pd.DataFrame, int]:
+    """Designs without values of metrics that are too far away to draw, and how many these are."""
+    is_beyond = designs[metrics].abs() > FARTHEST
+    return designs.assign(**designs[metrics].mask(is_beyond)), int(is_beyond.to_numpy().sum())
 
 
 def _maps(space: DesignSpace, designs: pd.DataFrame, metrics: Sequence[str]) -> str:
@@ -58,7 +65,7 @@ def _title(space: DesignSpace, metric: str) -> str:
     return f"{space.label(metric)}, {which} over {', '.join(map(space.label, hidden))}"
 
 
-def _caption(space: DesignSpace, every: int) -> str:
+def _caption(space: DesignSpace, every: int, n_beyond: int) -> str:
     is_line = len(space.varied) == 1
     text = "Designs without a state are left out." if is_line else "Gray: designs without a state."
     if hidden := space.varied[2:]:
@@ -66,6 +73,8 @@ def _caption(space: DesignSpace, every: int) -> str:
         named = ", ".join(f"{space.label(name)} {space.span(name, rows)}" for name in hidden)
         text += f" A place stands for all designs there, of every {named}: each map shows the best"
         text += " value of these, as its title says."
+    if n_beyond:
+        text += f" {counted(n_beyond, 'value')} beyond {FARTHEST:g} are left out."
     return text + (f" One design in {every:,} is drawn." if every > 1 else "")
 
 

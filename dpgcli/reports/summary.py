@@ -136,7 +136,7 @@ def _extremes_of(space: DesignSpace, name: str, is_largest_best: bool) -> Iterat
     if is_alike(merit):
         ends = {"all alike": merit.max()}
     for word, end in ends.items():
-        first, *others = rows[np.isclose(merit, end, rtol=RELATIVE_EQUALITY, atol=0)]
+        first, *others = rows[_are_close(merit, end, RELATIVE_EQUALITY)]
         yield Extreme(name, word, int(first), len(others))
 
 
@@ -150,7 +150,7 @@ def bars_alone(space: DesignSpace, rows: Indices) -> Flags:
     stiffness = bar_stiffness(space.metadata) if bars is None else bars[rows]
     n_units = space.designs[N_UNITS][rows] if N_UNITS in space.designs else np.nan
     in_series = stiffness / n_units
-    return np.isclose(space.designs[STIFFEST][rows], in_series, rtol=BARS_ALONE, atol=0)
+    return _are_close(space.designs[STIFFEST][rows], in_series, BARS_ALONE)
 
 
 def in_short(space: DesignSpace) -> tuple[str, PageTable]:
@@ -232,7 +232,13 @@ def _left_out(space: DesignSpace) -> Iterator[str]:
 
 def is_alike(values: Any) -> bool:
     """Whether values differ by no more than rounding."""
-    return bool(np.isclose(values.max(), values.min(), rtol=RELATIVE_EQUALITY, atol=0))
+    return bool(_are_close(values.max(), values.min(), RELATIVE_EQUALITY))
+
+
+def _are_close(values: Any, others: Any, relative: float) -> Flags:
+    """Which values differ from others relatively little; 1e308 and -1e308 do not, without a word."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.isclose(values, others, rtol=relative, atol=0))
 
 
 def varies(space: DesignSpace, name: str) -> bool:

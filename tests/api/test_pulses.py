@@ -320,11 +320,10 @@ def test_values_without_a_spec_have_no_scatter() -> None:
 
 
 def test_draws_none_of_which_is_a_finger_say_why() -> None:
-    """A stroke that is given beside heights that scatter disagrees with them."""
-    spec = {"finger.lattice.stroke_mm": 3.5, "finger.overrides": None}
-    with pytest.raises(UsageError, match="no draw is a finger: finger") as caught:
-        dpg.pulses(GRADED, end="11111", scatter="dome_height_mm=0.1mm", settings=spec, draws=20)
-    assert "as the geometry has it" in str(caught.value)
+    """Heights that are hardly more than the separation, and some of them less, which no dome is."""
+    spec = {"finger.geometry.dome_height_mm": 3.001, "finger.overrides": None}
+    with pytest.raises(UsageError, match="no draw is a finger: their values are impossible"):
+        dpg.pulses(GRADED, end="11111", scatter="dome_height_mm=3mm", settings=spec, draws=1)
 
 
 def test_too_many_units_are_refused() -> None:

@@ -143,6 +143,43 @@ def test_a_snap_pressure_that_is_given_is_that_of_the_given_dome(design: Design)
     np.testing.assert_allclose(found, nominal * thick**2.5 * tall**1.2, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("where", "moved", "others"),
+    [
+        ("lattice.stroke_mm=3.5", "dome_height_mm unit_separation_mm", "elastic_modulus_MPa"),
+        ("overrides.4-5.lattice.stroke_mm=4.5", "dome_height_mm", "channel_width_mm"),
+        ("lattice.segment_height_mm=10.75", "unit_cell_mm", "dome_height_mm"),
+        ("lattice.bistable_stiffness_N_per_mm=12", "dome_thickness_mm", "elastic_modulus_MPa"),
+        ("lattice.force_linearity=0.1", "", "dome_height_mm dome_thickness_mm"),
+        (
+            "overrides.1-5.lattice.bistable_stiffness_N_per_mm=12",
+            "",
+            "dome_height_mm dome_thickness_mm",
+        ),
+    ],
+)
+def test_a_value_that_is_given_does_not_follow_what_scatters(
+    where: str, moved: str, others: str
+) -> None:
+    """And no other one is refused: of these, some draws are fingers."""
+    settings = ["pressure={}", f"finger.{where}"]
+    if "overrides" not in where:
+        settings.insert(0, "finger.overrides={}")
+    if "1-5" in where:
+        settings.insert(0, "finger.overrides={}")
+    given = read_spec(GRADED, settings).design
+    value = where.partition("=")[2]
+    for key in moved.split():
+        (issue,) = scatter_issues(given, {key: HEIGHTS})
+        assert (issue.path, issue.found) == ((key,), value)
+        assert where.split(".")[-1 if "." not in value else -2].partition("=")[0] in issue.expected
+        assert not [*scatter_issues(given, {key: Tolerance(0.0, False)})]
+        assert scattered(given, {key: HEIGHTS}, 20, 1).are_wrong.all()
+    for key in others.split():
+        assert not [*scatter_issues(given, {key: HEIGHTS})]
+        assert not scattered(given, {key: HEIGHTS}, 20, 1).are_wrong.all()
+
+
 def test_what_says_nothing_here_is_an_issue(design: Design) -> None:
     hints = {
         "wall_compliance_mm_per_N": "walls are rigid",

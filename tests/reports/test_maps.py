@@ -77,3 +77,31 @@ def test_names_and_units_are_no_formulas(swept: dict[str, Any], word: str) -> No
     names = (*designs, "reach_max_mm")
     svg = figures(DesignSpace(designs, dict.fromkeys(names, word)))
     assert word in "".join(texts(svg))
+
+
+@pytest.mark.parametrize(
+    ("values", "n_beyond"),
+    [
+        ([-1e308, 1e308], 4),
+        ([1e-320, 1e308], 2),
+        ([1.0, -1e101], 2),
+        ([1e99, -1e99], 0),
+        ([INF, 1.0], 2),
+        ([INF, NAN], 0),  # one value, which is on no map
+        ([NAN, NAN], 0),
+        ([5e-324, 1e-323], 0),
+        ([7.0, 7.0], 0),
+    ],
+)
+@pytest.mark.parametrize("swept", [{"a": [1, 2, 3, 4]}, {"a": [1, 2], "b": [1, 2]}])
+def test_values_too_far_away_to_draw_are_left_out_in_words(
+    swept: dict[str, Any], values: list[float], n_beyond: int
+) -> None:
+    """They ended in Matplotlib's overflow, of the differences of its ticks."""
+    designs = grid(**swept)
+    designs["reach_max_mm"] = np.resize(values, 4)
+    designs["stiffness_min_N_per_mm"] = np.arange(4.0)
+    svg = figures(DesignSpace(designs, {}))
+    assert "stiffness" in "".join(texts(svg))
+    said = f"{n_beyond} values beyond 1e+100 are left out."
+    assert (said in svg, "values beyond" in svg) == (bool(n_beyond), bool(n_beyond))

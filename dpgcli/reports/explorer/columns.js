@@ -39,14 +39,16 @@ const made = (tag, properties = {}, ...children) => {
   return element;
 };
 
-// ---- scales: where a value is on an axis, 0 to 1; what is infinite lies at its end
+// ---- scales: where a value is on an axis, 0 to 1; what is infinite lies at its end, as does what
+// differences and quotients of doubles do not reach
 
+const FARTHEST = 1e100;
 for (const column of numbers) {
-  const known = column.values.filter((value) => value !== null && Number.isFinite(value));
+  const known = column.values.filter((value) => value !== null && Math.abs(value) <= FARTHEST);
   column.low = known.reduce((a, b) => Math.min(a, b), Infinity);
   column.high = known.reduce((a, b) => Math.max(a, b), -Infinity);
   if (!known.length) [column.low, column.high] = [0, 1];
-  column.isLog = column.low > 0 && column.high > 1000 * column.low;
+  column.isLog = column.low > 1 / FARTHEST && column.high > 1000 * column.low;
   const through = column.isLog ? Math.log : (value) => value;
   const start = through(column.low);
   const span = through(column.high) - start;

@@ -355,6 +355,22 @@ def test_a_space_without_states_has_a_page(opened: Open) -> None:
     assert passing(browser) == 6
 
 
+@pytest.mark.parametrize(
+    "values", [[1e308, -1e308], [np.inf, 1.0], [5e-324, 1e-323], [1e-320, 1e308], [np.nan] * 2]
+)
+def test_values_that_no_axis_reaches_are_at_its_end(opened: Open, values: list[float]) -> None:
+    designs = {**hostile().designs, "reach_max_mm": np.resize(values, 6)}
+    browser = opened(html(DesignSpace(designs, {})))
+    places = "return columnOf('reach_max_mm').places.every((p) => isNaN(p) || (p >= 0 && p <= 1))"
+    assert browser.execute_script(places)
+    for option in browser.find_elements("css selector", "#explorer-x option"):
+        if "reach max" in option.get_attribute("textContent"):
+            option.click()
+    assert browser.execute_script("return chosen.x === columnOf('reach_max_mm')")
+    assert browser.get_log("browser") == []
+    assert passing(browser) == 6
+
+
 def luminance(color: str) -> float:
     channels = np.array([int(part) for part in re.findall(r"\d+", color)[:3]]) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
