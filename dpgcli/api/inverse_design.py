@@ -16,7 +16,7 @@ from dpgcli.arrays import Columns, keep_freed_memory
 from dpgcli.design.dimensions import UNITS
 from dpgcli.design.outputs import doubts_about
 from dpgcli.design.scene import Scene
-from dpgcli.errors import Field, NothingSelectedError, UsageError
+from dpgcli.errors import Field, NothingSelectedError, OutputError, UsageError
 from dpgcli.files.design_spec import design_spec
 from dpgcli.files.goal_file import GoalFile
 from dpgcli.files.scene_file import Spec, scene_of
@@ -262,9 +262,27 @@ def found_for(
             study.store.drop()
             raise
         if output is not None:
-            found = replace(found, removed=found._write(output))
+            found = _written(found, output)
         study.store.drop()
     return found
+
+
+def _written(found: InverseDesignResult, output: Path) -> InverseDesignResult:
+    """What was found, in its folder; beside it, where the search is done and that takes it no more.
+
+    Raises what is in the way, and says where the designs are.
+    """
+    from dpgcli.files.goal_output import folder_beside
+
+    try:
+        return replace(found, removed=found._write(output))
+    except (OutputError, UsageError) as error:
+        try:
+            beside = folder_beside(output)
+            found._write(beside)
+        except (OSError, OutputError):  # such as a disk that is full
+            raise error from None
+        raise type(error)(error.message, f"; what was found is in {beside}") from error
 
 
 def _result(given: GoalFile, searched: Searched) -> InverseDesignResult:

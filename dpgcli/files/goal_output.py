@@ -3,7 +3,9 @@
 import json
 import re
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
+from tempfile import mkdtemp
 
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
@@ -32,6 +34,24 @@ def check_folder(folder: Path, given: GoalFile) -> None:
     """
     tables = ((folder / name, Mark.TABLE) for name in (BEST, TRACE))
     check_outputs(given.files, *tables, *((path, Mark.FOUND) for path in _specs(folder)))
+
+
+def folder_beside(folder: Path) -> Path:
+    """A new folder for what cannot go into this one: of its name and a number, or a temporary one.
+
+    Raises OSError where there can be neither.
+    """
+    named = folder if folder.name.strip(".") else folder.resolve()
+    for number in count(2):
+        beside = named.with_name(f"{named.name}_{number}")
+        try:
+            beside.mkdir()
+        except FileExistsError:
+            continue
+        except OSError:  # such as a folder around it that is not ours
+            return Path(mkdtemp(prefix="design_"))
+        return beside
+    raise AssertionError("there is no last number")
 
 
 def _specs(folder: Path) -> list[Path]:

@@ -1,5 +1,6 @@
 """Inverse design from Python: goals as data, results as tables and specs, certified anew."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,10 @@ from dpgcli.api import reached as module
 from dpgcli.api.inputs import spec_document
 from dpgcli.errors import NothingSelectedError, SpecError, UsageError
 from dpgcli.files.design_spec import spec_text
+from dpgcli.files.goal_output import folder_beside
 from dpgcli.files.scene_file import checked
 from dpgcli.files.yaml_file import read_document
+from dpgcli.search.search import search
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 Goal = dict[str, Any]
@@ -117,6 +120,55 @@ def test_specs_that_somebody_edited_stay(
     with pytest.raises(dpg.OutputError, match=f"{name}: it was edited since dpg wrote it; move"):
         dpg.inverse_design(goal(), tmp_path)
     assert (tmp_path / name).read_text() == edited
+
+
+def edit(folder: Path) -> None:
+    (folder / "design_7.yaml").write_text("finger: {}\n")
+
+
+@pytest.mark.parametrize("harm", [edit, shutil.rmtree])
+@pytest.mark.parametrize("is_beside_there", [False, True])
+def test_what_was_found_is_kept_where_its_folder_takes_it_no_more(
+    goal: Callable[..., Goal],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    harm: Callable[[Path], None],
+    is_beside_there: bool,
+) -> None:
+    """Somebody works in it, or removes it, while the search goes on until its time is up."""
+    folder = tmp_path / "out"
+    beside = tmp_path / ("out_3" if is_beside_there else "out_2")
+    if is_beside_there:
+        (tmp_path / "out_2").mkdir()
+
+    def searched(*args: Any) -> Any:
+        found = search(*args)
+        harm(folder)
+        return found
+
+    monkeypatch.setattr("dpgcli.api.inverse_design.search", searched)
+    few = goal(vary={STROKE: {"from": 3, "to": 4}})
+    with pytest.raises(dpg.OutputError, match=f"; what was found is in .*{beside.name}$"):
+        dpg.inverse_design(few, folder, budget=30, evaluations=40)
+    names = {path.name for path in beside.iterdir()}
+    assert {"best.parquet", "trace.parquet", "design_1.yaml"} <= names
+    if harm is edit:
+        assert [path.name for path in folder.iterdir()] == ["design_7.yaml"]
+    if is_beside_there:
+        assert not [*(tmp_path / "out_2").iterdir()]
+
+
+def test_a_folder_beside_is_a_temporary_one_where_there_can_be_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any) -> None:
+        raise PermissionError
+
+    monkeypatch.chdir(tmp_path)
+    assert folder_beside(Path()).name == f"{tmp_path.name}_2"
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(Path, "mkdir", refused)
+    assert folder_beside(tmp_path / "no" / "out").parent == tmp_path
 
 
 @pytest.mark.parametrize("first", ["finger: {}", "# Written by dpg: design 99 of the sweep x"])
