@@ -11,8 +11,11 @@ from dpgcli.grasping.grasp import BLOCK, LANE
 from dpgcli.records import dataclass
 
 # Measured on one core of a 2020s server, in seconds, times the square of the number of units.
-STATE_SECONDS = {Way.PLACE: 1.5e-4, Way.CLOSE: 1.5e-4, Way.INSERT: 7.5e-4}
-RAMP_SECONDS = 3e-4  # of a state, each time that pressures change
+STATE_SECONDS = {Way.PLACE: 1.5e-4, Way.INSERT: 7.5e-4}
+RAMP_SECONDS = 3e-4  # of a state of a routine, each time that pressures change
+STEP_SECONDS = 0.015  # of pressures that close fingers, however many states and units
+CLOSING_SECONDS = 0.5  # of what happens on their way, likewise
+CLOSED_SECONDS, CHANGE_SECONDS = 5e-3, 2.4e-5  # of a state, and at each step, times the units
 MOVING_SECONDS = 3e-3  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
 PAIR_SECONDS = 3.5e-3  # of two fingers in different states that come together
@@ -56,12 +59,19 @@ class Work:
         16
         """
         square = self.n_units**2
+        steps = self.n_ramps * STEP_SECONDS
         let_go = self.n_rows * MOVING_SECONDS * square if self.is_moving else 0.0
-        one = STATE_SECONDS[self.way] + self.n_ramps * RAMP_SECONDS
-        placed = self.n_states * one * square
         pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
-        met = placed + let_go + pulled + self.n_pairs * self.pair_seconds * square
-        return START_SECONDS + self.effort * met + self.n_rows * ROW_SECONDS
+        met = self._placed + let_go + pulled + self.n_pairs * self.pair_seconds * square
+        return START_SECONDS + steps + self.effort * met + self.n_rows * ROW_SECONDS
+
+    @property
+    def _placed(self) -> float:
+        """Seconds until fingers touch a disc, with the published law."""
+        if self.way is not Way.CLOSE:
+            return self.n_states * STATE_SECONDS[self.way] * self.n_units**2
+        each = CLOSED_SECONDS + self.n_ramps * CHANGE_SECONDS
+        return CLOSING_SECONDS + self.n_states * self.n_units * each
 
     @property
     def peak_bytes(self) -> int:

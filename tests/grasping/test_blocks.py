@@ -3,6 +3,7 @@
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -134,3 +135,24 @@ def test_each_pair_is_there_once() -> None:
         (7, 0),
         (6, 1),
     ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n_units", "n_steps"), [(2, 600), (5, 300)])
+def test_fingers_that_close_in_many_steps_take_what_was_said(n_units: int, n_steps: int) -> None:
+    """Each step has its price, however few states and units there are."""
+    pressures = 0.15 * np.minimum(np.linspace(0, 2, n_steps), np.linspace(2, 0, n_steps))
+    gripper = CONFIGS / "gripper.yaml"
+    settings = {"finger.units": n_units}
+    start = process_time()
+    dpg.grasp(
+        gripper, object="disc:20", at=(35, 0), approach="close", pressure=pressures,
+        settings=settings,
+    )  # fmt: skip
+    took = process_time() - start
+    assert took / 3 < Work(2, 1, n_units, 2, False, Way.CLOSE, n_steps).seconds < 3 * took
+
+
+def test_a_hundred_thousand_steps_take_long() -> None:
+    """12 to 15 ms each: they were said to take a minute for two units."""
+    assert 1200 < Work(2, 1, 2, 2, False, Way.CLOSE, 100_000).seconds < 2400
