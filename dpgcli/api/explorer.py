@@ -60,7 +60,9 @@ def explored(folder: Path, space: DesignSpace) -> Explored:
         *(["one finger, in its own frame"] * is_gripper),
         *([WITHOUT_BODY] * (base.design.body is not None)),
     ]
-    hidden = {key: space.designs[name] for name, key in keys.items() if name not in narrowed.designs}
+    hidden = {
+        key: space.designs[name] for name, key in keys.items() if name not in narrowed.designs
+    }
     return Explored(rows, best, keys, _shown_base(document, hidden), shapes)
 
 
@@ -69,7 +71,10 @@ def _shown_base(document: Document, hidden: Columns) -> dict[str, Any] | None:
     if any(len(distinct(values)) > 1 for values in hidden.values()):
         return None
     values = {key: values[0].item() for key, values in hidden.items()}
-    return canonical(checked(changed(document, values)).model_dump(exclude_none=True))
+    base: dict[str, Any] = canonical(
+        checked(changed(document, values)).model_dump(exclude_none=True)
+    )
+    return base
 
 
 def _best(source: RowSource, row: int, metrics: list[str]) -> BestDesign:

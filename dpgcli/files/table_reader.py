@@ -22,6 +22,7 @@ from dpgcli.files.content import opened
 from dpgcli.files.seal import is_whole_in
 from dpgcli.files.trust import outputs_of, trusts_in
 from dpgcli.sweeps.metrics import METRICS
+from dpgcli.text import counted
 
 TEXTS = ("calibration", "status", "reason", "accuracy_level", "reachable_patterns")
 TEXT, WHOLE, NUMBERS = "text", "whole numbers", "numbers"
@@ -41,6 +42,7 @@ DAMAGED = (
 PLAIN = frozenset(("PLAIN", "PLAIN_DICTIONARY", "RLE_DICTIONARY", "RLE", "BIT_PACKED"))
 NOT_YET = "Not yet implemented"  # of pyarrow
 ROWS_AT_ONCE = 1000  # of texts in full
+NO_VALUE = "no value in any row"
 NO_ROOM = "it takes more memory than there is"
 
 
@@ -136,7 +138,7 @@ def with_dictionaries(stream: BinaryIO, file: Any, names: list[str]) -> Any:
     Of the others not more than some rows are there in full: a text that repeats takes no room.
     """
     metadata = file.metadata
-    texts = [f.name for f in file.schema_arrow if f.name in TEXTS and is_text(f.type)]
+    texts = [f.name for f in file.schema_arrow if f.name in TEXTS and _is_string(f.type)]
     texts = [name for name in names if name in texts]
     by_hand = [name for name in texts if not _is_read_as_dictionary(metadata, name)]
     options = {"page_checksum_verification": True, "metadata": metadata}
@@ -219,7 +221,7 @@ def check_kinds(source: str, described: Any, kinds: Mapping[str, str]) -> None:
 
 def _may_hold(kind: Any, wanted: str) -> bool:
     """Whether a type may hold values: empty texts come back from CSV as numbers, or as nothing."""
-    if wanted == TEXT and (is_text(kind) or pa.types.is_null(kind)):
+    if wanted == TEXT and (is_text(kind) or _is_bytes(kind) or pa.types.is_null(kind)):
         return True
     return is_number(kind)
 
@@ -252,8 +254,20 @@ def is_number(kind: Any) -> bool:
 
 def is_text(kind: Any) -> bool:
     """Whether values of a type are texts."""
+    return _is_string(kind) or bool(pa.types.is_string_view(kind))
+
+
+def _is_string(kind: Any) -> bool:
+    """The same of types that PyArrow makes dictionaries of."""
     kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _is_bytes(kind: Any) -> bool:
+    """Whether values of a type are bytes, which may be those of texts."""
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    kinds = (pa.types.is_binary, pa.types.is_large_binary, pa.types.is_binary_view)
+    return any(is_kind(kind) for is_kind in kinds)
 
 
 def _kind(name: str) -> str:
@@ -261,14 +275,27 @@ def _kind(name: str) -> str:
 
 
 def _wrong_type(source: str, name: str, kind: str, found: Any) -> UsageError:
-    return UsageError(f"{source}: column {name}: expected {kind}, found {found}")
+    said = NO_VALUE if pa.types.is_null(found) else found
+    return UsageError(f"{source}: column {name}: expected {kind}, found {said}")
+
+
+def _misfit(kind: str, column: Any) -> str:
+    """What a column of numbers has that whole ones have not; for others its type."""
+    if len(column) and column.null_count == len(column):
+        return NO_VALUE
+    if kind != WHOLE or not is_number(column.type):
+        return str(column.type)
+    if column.null_count:
+        return f"{counted(column.null_count, 'row')} without one"
+    return f"{column.type} beyond 63 bits" if pa.types.is_integer(column.type) else "others as well"
 
 
 def column_of(source: str, name: str, column: Any, kind: str) -> NDArray[Any]:
     """The values of a column that has to be there, of a kind. Raises UsageError for others."""
     plain = READERS[kind](column)
     if plain is None:
-        raise _wrong_type(source, name, kind, column.type)
+        found = _misfit(kind, column)
+        raise UsageError(f"{source}: column {name}: expected {kind}, found {found}")
     return plain
 
 
@@ -288,10 +315,10 @@ def _plain(source: str, table: Any) -> Columns:
 
 def texts_in(column: Any) -> NDArray[Any] | None:
     """Text, empty where there is none; None for a column of anything else."""
-    if is_text(column.type):
+    if is_text(column.type) or _is_bytes(column.type):
         try:
-            return _looked_up(column)
-        except UnicodeDecodeError:
+            return _looked_up(column if _is_string(column.type) else column.cast(pa.string()))
+        except (UnicodeDecodeError, pa.ArrowInvalid):
             return None
     numbers = numbers_in(column)
     is_empty = column.null_count == len(column) or (numbers is not None and np.isnan(numbers).all())

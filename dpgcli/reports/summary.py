@@ -236,7 +236,7 @@ def is_alike(values: Any) -> bool:
 
 
 def _are_close(values: Any, others: Any, relative: float) -> Flags:
-    """Which values differ from others relatively little; 1e308 and -1e308 do not, without a word."""
+    """Which values differ relatively little from others; 1e308 and -1e308 do not, in silence."""
     with np.errstate(over="ignore"):
         return np.asarray(np.isclose(values, others, rtol=relative, atol=0))
 

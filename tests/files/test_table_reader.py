@@ -97,10 +97,47 @@ def test_whole_numbers_of_64_bits_keep_their_sign(tmp_path: Path) -> None:
     assert found["own"].tolist() == [2.0**64] * N
 
 
-@pytest.mark.parametrize("kind", [pa.string(), pa.large_string(), pa.dictionary("int8", "string")])
+KINDS_OF_TEXT = [
+    pa.string(),
+    pa.large_string(),
+    pa.string_view(),
+    pa.binary(),
+    pa.large_binary(),
+    pa.binary_view(),
+]
+
+
+@pytest.mark.parametrize("kind", [*KINDS_OF_TEXT, pa.dictionary("int8", "string")], ids=str)
 def test_text_is_text_and_nothing_is_empty(tmp_path: Path, kind: Any) -> None:
-    found = read(tmp_path, reason=pa.array(["a", None, "", "b"]).cast(kind))
+    values = pa.array(["a", None, "", "ü"]).cast(kind)
+    found = read(tmp_path, reason=values)
+    assert found["reason"].tolist() == ["a", "", "", "ü"]
+    of_memory = designs_in(pa.table({**COLUMNS, "reason": values}), "t").columns
+    assert of_memory["reason"].tolist() == ["a", "", "", "ü"]
+
+
+@pytest.mark.parametrize("kind", [pa.large_string(), pa.binary(), pa.large_binary()], ids=str)
+def test_dictionaries_of_any_text_are_text(kind: Any) -> None:
+    values = pa.array(["a", None, "", "b"]).cast(kind).dictionary_encode()
+    found = designs_in(pa.table({**COLUMNS, "reason": values}), "t").columns
     assert found["reason"].tolist() == ["a", "", "", "b"]
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "found"),
+    [
+        ("n_stable", pa.nulls(N), "no value in any row"),
+        ("n_stable", pa.nulls(N, pa.float64()), "no value in any row"),
+        ("height_mm", pa.nulls(N), "no value in any row"),
+        ("n_stable", NOT_WHOLE["gaps"], "1 row without one"),
+        ("n_stable", NOT_WHOLE["beyond 63 bits"], "uint64 beyond 63 bits"),
+        ("n_stable", NOT_WHOLE["fractions"], "others as well"),
+        ("status", NOT_WHOLE["beyond 63 bits"], "uint64"),
+    ],
+)
+def test_what_a_column_has_is_said(tmp_path: Path, column: str, values: Any, found: str) -> None:
+    with pytest.raises(UsageError, match=f"column {column}: expected .*, found {found}$"):
+        read(tmp_path, **{column: values})
 
 
 def test_columns_that_nobody_can_use_are_left_out(tmp_path: Path) -> None:
