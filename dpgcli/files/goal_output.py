@@ -3,9 +3,8 @@
 import json
 import re
 from collections.abc import Sequence
-from itertools import count
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import gettempdir
 
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
@@ -37,21 +36,29 @@ def check_folder(folder: Path, given: GoalFile) -> None:
 
 
 def folder_beside(folder: Path) -> Path:
-    """A new folder for what cannot go into this one: of its name and a number, or a temporary one.
+    """A new folder for what cannot go into this one, of its name and a number.
 
-    Raises OSError where there can be neither.
+    It is among the temporary files where it cannot be beside it. Raises OSError where there can be
+    neither.
     """
     named = folder if folder.name.strip(".") else folder.resolve()
-    for number in count(2):
-        beside = named.with_name(f"{named.name}_{number}")
+    try:
+        return _numbered(named)
+    except OSError:  # such as a folder around it that is not ours
+        return _numbered(Path(gettempdir()) / named.name)
+
+
+def _numbered(named: Path) -> Path:
+    """The first new folder of this name with a number behind it, from 2 on."""
+    number = 2
+    while True:
         try:
+            beside = named.with_name(f"{named.name}_{number}")
             beside.mkdir()
         except FileExistsError:
-            continue
-        except OSError:  # such as a folder around it that is not ours
-            return Path(mkdtemp(prefix="design_"))
-        return beside
-    raise AssertionError("there is no last number")
+            number += 1
+        else:
+            return beside
 
 
 def _specs(folder: Path) -> list[Path]:

@@ -161,14 +161,11 @@ def test_what_was_found_is_kept_where_its_folder_takes_it_no_more(
 def test_a_folder_beside_is_a_temporary_one_where_there_can_be_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refused(*_: Any) -> None:
-        raise PermissionError
-
     monkeypatch.chdir(tmp_path)
     assert folder_beside(Path()).name == f"{tmp_path.name}_2"
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(Path, "mkdir", refused)
-    assert folder_beside(tmp_path / "no" / "out").parent == tmp_path
+    assert folder_beside(tmp_path / "no" / "out") == tmp_path / "out_2"
+    assert (tmp_path / "out_2").is_dir()
 
 
 @pytest.mark.parametrize("first", ["finger: {}", "# Written by dpg: design 99 of the sweep x"])
