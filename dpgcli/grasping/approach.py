@@ -77,13 +77,14 @@ class Approach:
 
     `load` (batch,) is 1 where the body is there in full. `margin` (batch,) is what more of it they
     bear before a unit resets, if that is known: infinite where none does, NaN where the search
-    fails.
+    fails. Of fingers that have closed `stops` are where they began, and at each pressure since.
     """
 
     shapes: ContactShapes
     load: Array
     resets: tuple[Reset, ...]
     margin: Array | None = None
+    stops: tuple[ContactShapes, ...] = ()
 
 
 class Way(StrEnum):

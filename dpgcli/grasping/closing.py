@@ -48,7 +48,7 @@ def driven(
     """
     shapes, resets, n = start.shapes, list(start.resets), len(start.load)
     before = 0.0 * pressures[0] if begin is None else begin
-    there = replace(own, depth=np.zeros(1))
+    there, stops = replace(own, depth=np.zeros(1)), [shapes]
     if begin is None:
         shapes = with_travels(replace(there, ramp=Ramp(volumes, before, 0.0 * before)), shapes)
     for target in pressures:
@@ -58,7 +58,8 @@ def driven(
         resets += [_told_by_pressure(told, ramp, own.n_fingers) for told in came.resets]
         is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
         shapes, before = replace(came.shapes, is_there=is_sound), target
-    return replace(start, shapes=shapes, resets=tuple(resets))
+        stops.append(shapes)
+    return replace(start, shapes=shapes, resets=tuple(resets), stops=tuple(stops))
 
 
 def at_rest(own: Obstructed, came: Approach, volumes: DomeVolumes) -> Approach:

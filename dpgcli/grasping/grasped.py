@@ -162,11 +162,13 @@ class Placed:
         sizes = [len(part.codes) for part in parts]
         margins = [part.grown.margin for part in parts if part.grown.margin is not None]
         margin = np.concatenate(margins) if margins else None
+        stops = zip(*(part.grown.stops for part in parts), strict=True)
         resets = _resets_joined([part.grown.resets for part in parts], sizes)
+        came = Approach(shapes, load, resets, margin, tuple(map(ContactShapes.joined, stops)))
         return cls(
             np.concatenate([part.codes for part in parts]),
             replace(parts[0].own, depth=np.concatenate([part.own.depth for part in parts])),
-            Approach(shapes, load, resets, margin),
+            came,
             np.concatenate([part.status for part in parts]),
         )
 

@@ -1,17 +1,21 @@
 """Fingers that overlap about a body come together from where they just touch: see `meeting`.
 
 Each has met the body as if it were alone. Where the two do not overlap then, that is all. Where
-they do, their bases come together, and they touch the body and each other: only these pay.
+they do, their bases come together, and they touch the body and each other: only these pay. So it is
+with fingers that close: those that overlap before, or where a pressure is reached, close once more,
+from where they come together.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Flags, Indices, distinct
 from dpgcli.design.scene import Scene
 from dpgcli.grasping.approach import Approach, Load
+from dpgcli.grasping.closing import Closing, closed
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.grasp import blocks, described, grown
@@ -27,6 +31,7 @@ from dpgcli.grasping.meeting import (
 )
 from dpgcli.grasping.release import together
 from dpgcli.grasping.shapes import ContactShapes, with_lost
+from dpgcli.grasping.travels import with_reasons
 from dpgcli.mechanics.face import Face
 from dpgcli.mechanics.mirror import Axis
 from dpgcli.mechanics.terms import Formulate
@@ -45,56 +50,89 @@ ROWS = 2**12  # that are looked at at once
 class Joined:
     """Fingers that have come together: those of some `rows`, with what they are in the end.
 
-    `own` and `shapes` are those of both, or of one of two that are mirror images.
+    `own` and `shapes` are those of both, or of one of two that are mirror images. `touched` (row,)
+    says which have touched the body.
     """
 
     rows: Indices
     fingers: tuple[Grasped, Grasped]
     own: Obstructed
     shapes: ContactShapes
+    touched: Flags
 
     def take(self, index: Indices) -> "Joined":
         """Some of the rows, by their places here."""
         upper, lower = (finger.take_lanes(index) for finger in self.fingers)
         own, shapes = self.own.take_lanes(index), self.shapes.take_lanes(index)
-        return Joined(self.rows[index], (upper, lower), own, shapes)
+        return Joined(self.rows[index], (upper, lower), own, shapes, self.touched[index])
 
 
 def joined(
-    parts: Sequence[Placed], lanes: Sequence[Indices], axis: Axis, is_on_axis: Flags
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    axis: Axis,
+    is_on_axis: Flags,
+    closing: Closing | None = None,
 ) -> Iterator[Joined]:
     """The rows whose fingers overlap about their body, come together: those at `lanes` of parts.
 
     Two in one state are mirror images if the body is on the axis, or as long as neither touches it.
+    Then they close, if the parts have.
     """
     n_units = parts[0].own.units.finger.n_units
+    ways = list(zip(*map(_ways, parts), strict=True))
+    parts = ways[0]
     codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
-    touched = [_are_touched(part)[index] for part, index in zip(parts, lanes, strict=True)]
+    touched = [
+        _are_touched(part)[index] for way in ways for part, index in zip(way, lanes, strict=True)
+    ]
     is_alike = (codes[0] == codes[1]) & (is_on_axis | ~np.any(touched, axis=0))
-    travel = _overlap(parts, lanes, axis, is_alike)
-    others = (travel > 0.0) & ~is_alike
-    alike = np.flatnonzero((travel > 0.0) & is_alike)
+    overlaps = [_overlap(way, lanes, axis, is_alike) for way in ways]
+    travel, is_met = overlaps[0], np.max(overlaps, axis=0) > 0.0
+    others, alike = is_met & ~is_alike, np.flatnonzero(is_met & is_alike)
     for some in blocks(len(alike), n_units) if len(alike) else ():
         rows = alike[some]
         own = axis.take_lanes(rows)
-        met = _mirrored(parts[0], lanes[0][rows], own, rows)
+        met = _mirrored(parts[0], lanes[0][rows], own, rows, closing)
         is_off = ~np.broadcast_to(is_on_axis, len(travel))[rows]
         if is_off.any():
-            both = met.fingers[0], _mirrored(parts[1], lanes[1][rows], own, rows).fingers[0]
-            is_left = is_off & np.any([(f.push > 0.0).any(axis=0) for f in both], axis=0)
+            also = _mirrored(parts[1], lanes[1][rows], own, rows, closing)
+            is_left = is_off & (met.touched | also.touched)
             others[rows[is_left]] = True
-            met = replace(met, fingers=both).take(np.flatnonzero(~is_left))
+            both = replace(met, fingers=(met.fingers[0], also.fingers[0]))
+            met = both.take(np.flatnonzero(~is_left))
         yield met
     rest = np.flatnonzero(others)
     for some in pair_blocks(len(rest), n_units):
         rows = rest[some]
         few = [index[rows] for index in lanes]
-        yield _paired(parts, few, axis.take_lanes(rows), rows, travel[rows])
+        yield _paired(parts, few, axis.take_lanes(rows), rows, travel[rows], closing)
+
+
+def _ways(part: Placed) -> list[Placed]:
+    """Fingers as they met the body and, if they have closed since, at each pressure."""
+    came = part.grown
+    resets = tuple(reset for reset in came.resets if reset.pressure is None)
+    return [
+        replace(
+            part,
+            grown=Approach(shapes, came.load, resets),
+            status=np.where(shapes.is_there, np.uint8(Status.STABLE), part.status),
+        )
+        if came.stops
+        else part
+        for shapes in came.stops or (came.shapes,)
+    ]
 
 
 def _are_touched(part: Placed) -> Flags:
     """Which lanes touch their body."""
-    return np.asarray((part.own.without_rounding(part.grown.shapes.push) > 0.0).any(axis=0))
+    return _touching(part.own, part.grown.shapes)
+
+
+def _touching(own: Obstructed, shapes: ContactShapes) -> Flags:
+    push = own.without_rounding(shapes.push[: own.n_on_bodies])
+    return np.asarray((push > 0.0).any(axis=0))
 
 
 def _overlap(
@@ -140,23 +178,29 @@ def _ended(part: Placed) -> Array:
     return part.own.faces[0].with_end().shape(part.grown.shapes.coordinates).nodes
 
 
-def _mirrored(part: Placed, lanes: Indices, axis: Axis, rows: Indices) -> Joined:
+def _mirrored(
+    part: Placed, lanes: Indices, axis: Axis, rows: Indices, closing: Closing | None
+) -> Joined:
     """Those that are mirror images: each comes to the axis."""
     shapes, status = part.grown.shapes.take_lanes(lanes), part.status[lanes]
     own = replace(part.own.take_lanes(lanes), axis=axis, is_mirrored=True)
     x = shapes.coordinates
     coming = replace(own, depth=np.zeros(1), apart=beyond_axis(own, x))
     came = grown(coming, x, shapes.inverted, status == Status.STABLE, None, shapes.push)
-    rest = _told(came, came.shapes)
-    status = with_lost(status, rest.shapes.is_there)
+    rest, status = _closed(own, _told(came, came.shapes), status, closing)
     (found,) = described(own, [part.codes[lanes]], rest, status)
     found = bearing_sideways(found, own, rest)
     found = replace(found, resets=(*resets_of(part.grown.resets, lanes), *found.resets))
-    return Joined(rows, (found, found), own, rest.shapes)
+    return _joined(rows, (found, found), own, rest)
 
 
 def _paired(
-    parts: Sequence[Placed], lanes: Sequence[Indices], axis: Axis, rows: Indices, travel: Array
+    parts: Sequence[Placed],
+    lanes: Sequence[Indices],
+    axis: Axis,
+    rows: Indices,
+    travel: Array,
+    closing: Closing | None,
 ) -> Joined:
     """Others: both fingers are unknown."""
     bare, start = together(parts, lanes, None)
@@ -165,13 +209,31 @@ def _paired(
     coming = apart(own, travel)
     came = coming_together(coming, start.coordinates, start.inverted, status, None, start.push)
     rest = _told(came, coming.at_rest(came.shapes))
+    rest, status = _closed(own, rest, status, closing)
     codes = [part.codes[index] for part, index in zip(parts, lanes, strict=True)]
-    fingers = described(own, codes, rest, with_lost(status, rest.shapes.is_there))
+    fingers = described(own, codes, rest, status)
     upper, lower = (
         replace(finger, resets=(*resets_of(part.grown.resets, index), *finger.resets))
         for finger, part, index in zip(fingers, parts, lanes, strict=True)
     )
-    return Joined(rows, (upper, lower), own, rest.shapes)
+    return _joined(rows, (upper, lower), own, rest)
+
+
+def _closed(
+    own: Obstructed, rest: Approach, status: NDArray[np.uint8], closing: Closing | None
+) -> tuple[Approach, NDArray[np.uint8]]:
+    """What becomes of fingers that have come together, as pressures change; nothing without."""
+    if closing is None:
+        return rest, with_lost(status, rest.shapes.is_there)
+    came = closed(own, rest, closing)
+    return came, with_reasons(own, came.shapes, status)
+
+
+def _joined(
+    rows: Indices, fingers: tuple[Grasped, Grasped], own: Obstructed, rest: Approach
+) -> Joined:
+    touched = np.any([_touching(own, shapes) for shapes in (rest.shapes, *rest.stops)], axis=0)
+    return Joined(rows, fingers, own, rest.shapes, touched)
 
 
 def _told(came: Approach, shapes: ContactShapes) -> Approach:

@@ -267,6 +267,7 @@ class Layout:
         n_between = self.n_gaps - self.n_on_bodies
         travel = np.zeros((0, 1)) if self.motion is None else self.motion.travel
         deep = [(self.n_on_bodies, self.depth), (n_between, self.apart)]
+        deep.append((self.n_travels, np.zeros(1)))
         deep += [] if travel is None else [(len(travel), travel)]
         deep.append((len(self.sticking), np.zeros(1)))
         n_lanes = max(own.shape[-1] for _, own in deep)

@@ -163,9 +163,10 @@ def grasps(
         fingers = [told(part) for part in different] * (len(parts) // len(different))
         rows = np.array(lanes)
         known = Grasps(scene, body, seen_from, tuple(fingers), rows, centers, closing=closing)
-        is_met = len(parts) > 1 and closing is None
-        on_axis = np.asarray(body.is_mirrored)
-        met = list(joined(parts, lanes, seen_from[0].axis, on_axis)) if is_met else []
+        met: list[Joined] = []
+        if len(parts) > 1:
+            on_axis = np.asarray(body.is_mirrored)
+            met = list(joined(parts, lanes, seen_from[0].axis, on_axis, closing))
         return _with_payload(_with_met(known, met), parts, lanes, None, met)
     found, moved, rest = let_go(parts, lanes, motion, scene.held, later)
     rows = np.tile(np.arange(len(pairs[0])), (len(parts), 1))
@@ -222,7 +223,8 @@ def columns_of(scene: Scene, closing: Closing | None) -> tuple[Column, ...]:
         left_out.update((*OF_BODIES, BETWEEN))
     if not turns(scene.body, scene.held):
         left_out.add(ANGLE)
-    left_out.update(OF_CLOSING if closing is None else (BETWEEN,))
+    if closing is None:
+        left_out.update(OF_CLOSING)
     if is_moving(scene):
         left_out.add(BETWEEN)
     if scene.friction is None:
