@@ -25,7 +25,8 @@ HALVINGS = 50
 class Clearance(NamedTuple):
     """The least gap on a way, mm, and the share of it at which a body meets a finger, (lane,).
 
-    Where it does the gap is 0; where it does not the share is 1.
+    Where it does the gap is 0; where it does not the share is 1. Of fingers that are not there the
+    gap is not known, NaN, and bodies come no part of the way.
     """
 
     gap: Array
@@ -40,7 +41,8 @@ class Clearance(NamedTuple):
 def outlines(own: Grasped, frame: FingerFrame, height: Array, length: Array) -> Outlines:
     """The outlines of a finger's phalanges in the gripper's frame, (phalanx, lane).
 
-    `height` is that of the domes' axis, `length` that of the last segment, mm, (1,).
+    `height` is that of the domes' axis, `length` that of the last segment, mm, (1,). None are those
+    of fingers that are not there.
     """
     nodes = own.nodes
     base = np.stack((nodes.base_x, nodes.base_y))
@@ -53,7 +55,11 @@ def outlines(own: Grasped, frame: FingerFrame, height: Array, length: Array) -> 
     upright = np.concatenate((upright, upright[:, -1:]), axis=1)
     roof = face + 2.0 * height * upright
     around = np.stack((face[:, :-1], face[:, 1:], roof[:, 1:], roof[:, :-1]), axis=3)
-    return np.asarray(shapely.polygons(np.moveaxis(frame.placed(around), 0, -1)))
+    corners = np.moveaxis(frame.placed(around), 0, -1)
+    found = np.full(corners.shape[:2], None, object)
+    is_there = np.isfinite(corners).all(axis=(0, 2, 3))
+    found[:, is_there] = shapely.polygons(corners[:, is_there])
+    return found
 
 
 def clearance(around: Outlines, body: Body, begin: Array, end: Array) -> Clearance:
@@ -79,7 +85,7 @@ def clearance(around: Outlines, body: Body, begin: Array, end: Array) -> Clearan
             high[lanes] = np.where(is_met, middle, high[lanes])
         is_met = _least(few, body, start, start) <= 0.0
         high[lanes] = np.where(is_met, 0.0, high[lanes])
-    return Clearance(gap, high)
+    return Clearance(gap, np.where(np.isnan(gap), 0.0, high))
 
 
 def _least(around: Outlines, body: Body, begin: Array, end: Array) -> Array:

@@ -88,8 +88,10 @@ class _Furthest:
 def searched(known: Prospect) -> Search:
     """The routine among the plans of a prospect."""
     failed = _Furthest(known.nearest_miss, STAGES.index(Stage.APPROACH), known.n_left_out)
-    if n_met := int((~known.coming.is_clear).sum()):
-        failed.failures[Stage.APPROACH, COLLIDES] = n_met
+    gap = known.coming.gap
+    for why, are_so in ((COLLIDES, gap == 0.0), (Status.NOT_CONVERGED.text, np.isnan(gap))):
+        if are_so.any():
+            failed.failures[Stage.APPROACH, why] = int(are_so.sum())
     if known.coming.is_clear.any() and not known.plans:
         code = int(known.opened[known.coming.is_clear][0])
         failed.add(Plan(code, known.openings[code]), Stage.CLOSE, NO_PULSES)

@@ -120,10 +120,15 @@ def _draw_ghost(axes: Any, around: Points, away: Array) -> None:
 
 def _at_rest(found: Grasps, row: int) -> Body | None:
     """The body where it has come to rest; where it was, if there is no answer."""
-    body, center = found.body, found.centers[:, row]
+    body, center, n_rows = found.body, found.centers[:, row], found.pairs.shape[1]
     if body is None or np.isnan(center).any():
         return body
-    return at_place(body, center, float(np.broadcast_to(found.turned, found.pairs.shape[1])[row]))
+    turned, opened = (
+        float(np.broadcast_to(by, n_rows)[row]) for by in (found.turned, found.opened)
+    )
+    if isinstance(body, Jaws):
+        body = replace(body, gap=body.gap + opened)
+    return at_place(body, center, turned)
 
 
 def _body(found: Grasps, row: int) -> Points:

@@ -155,3 +155,27 @@ def test_curled_fingers_have_the_faces_of_the_contact(grasped: Grasps) -> None:
         np.testing.assert_allclose([c[0] for c in corners], face[:, :-1].T, atol=1e-12)
         np.testing.assert_allclose([c[1] for c in corners], face[:, 1:].T, atol=1e-12)
     assert shapely.is_valid(polygons).all()
+
+
+def test_fingers_that_are_not_there_have_no_gap() -> None:
+    """One lane of two is; the body comes no part of the way past the other."""
+    around = np.concatenate((WALLS, np.full(WALLS.shape, None)), axis=1)
+    begin, end = np.array([[90.0, 90.0], [0.0, 0.0]]), np.array([[40.0, 40.0], [0.0, 0.0]])
+    for body in BODIES.values():
+        both, alone = (clearance(a, body, b, e) for a, b, e in (
+            (around, begin, end), (WALLS, begin[:, :1], end[:, :1]),
+        ))  # fmt: skip
+        assert both.gap[0] == alone.gap[0] and np.isnan(both.gap[1])
+        assert both.share[0] == alone.share[0] and both.share[1] == 0.0
+        assert both.is_clear.tolist() == [bool(alone.is_clear[0]), False]
+
+
+def test_outlines_of_what_is_not_there_are_none() -> None:
+    grasps = dpg.grasp("configs/gripper.yaml", object="disc:20", at=(40.0, 0.0), patterns="10000")
+    own, frame = grasps.grasps.fingers[0], grasps.grasps.frames[0]
+    nowhere = own.take_lanes(np.array([0, 0]))
+    nowhere.face[..., 1] = np.nan
+    height, length = np.array([10.75]), np.array([13.5])
+    alone, both = (outlines(each, frame, height, length)[:, 0] for each in (own, nowhere))
+    assert shapely.equals(alone, both).all()
+    assert (outlines(nowhere, frame, height, length)[:, 1] == None).all()  # noqa: E711

@@ -11,17 +11,25 @@ from shapely import LineString, Point, affinity
 
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import Body, Disc, Friction, Jaws, Polygon
+from dpgcli.design.pressure import History, Pressure
 from dpgcli.design.scene import Gripper, Held, Scene
 from dpgcli.grasping import joining
+from dpgcli.grasping.approach import Approach, Way
+from dpgcli.grasping.closing import Closing, driven
+from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
+from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.table import BETWEEN, Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.finger import STUDY, Finger
+from dpgcli.mechanics.laws import PUBLISHED, PushOnly
+from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.mechanics.terms import chain_potential
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
 
 Fingers = Callable[..., Finger]
 THICKNESS = 1.5
+AREA = 31.61  # mm², of the study's dome: it snaps at 0.1495 MPa
 
 
 def codes(*patterns: str) -> Any:
@@ -129,6 +137,8 @@ class Found(NamedTuple):
     q: Array
     push: Array
     unit: Array
+    joint: Obstructed
+    shapes: ContactShapes
 
     @property
     def cells(self) -> Any:
@@ -141,8 +151,16 @@ class Found(NamedTuple):
         return self.grasps.take(finger, 0)
 
 
-def joined(drawn: Drawn, own: Any) -> Found:
-    """What becomes of a pair, which touches the disc and each other."""
+def through(finger: Finger, *pressures: float) -> Closing:
+    """All units on one line, from no pressure through these, MPa."""
+    n = finger.n_units
+    line = Pressure(("A",), np.zeros(n, int), np.array([[AREA]]), None)
+    volumes, history = DomeVolumes(np.full((n, 1), AREA)), History(np.array(pressures)[:, None])
+    return Closing(volumes, line, history)
+
+
+def joined(drawn: Drawn, own: Any, peak: float | None = None) -> Found:
+    """What becomes of a pair, which touches the disc and each other; it may close on it."""
     kept: list[Any] = []
     whole = joining.described
 
@@ -153,7 +171,9 @@ def joined(drawn: Drawn, own: Any) -> Found:
     pair = [codes(text) for text in drawn.patterns]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(joining, "described", watched)
-        found = grasps(drawn.scene, chain_potential, drawn.disc, pair)
+        by = None if peak is None else through(drawn.finger, peak, 0.0)
+        way = Way.PLACE if by is None else Way.CLOSE
+        found = grasps(drawn.scene, chain_potential, drawn.disc, pair, way, by)
     (joint, shapes), rows = kept[-1], grasp_rows(found)
     assert rows["status"].tolist() == [Status.STABLE]
     assert rows["n_contacts"][0] > 0 and rows["between_fingers_N"][0] > 0.0
@@ -161,7 +181,7 @@ def joined(drawn: Drawn, own: Any) -> Found:
     unit = np.repeat(np.broadcast_to(lengths, (joint.n_own // 2, 1))[:, 0], 2)
     both = Both(own, drawn, shapes.inverted[:, 0])
     push = np.where(shapes.push[:, 0] > 1e-12, shapes.push[:, 0], 0.0)
-    return Found(found, both, shapes.coordinates[:, 0], push, unit)
+    return Found(found, both, shapes.coordinates[:, 0], push, unit, joint, shapes)
 
 
 QUICK = (2, 6)
@@ -188,12 +208,15 @@ PRESSED = (
     47,
     48,
 )
+CLOSED = [(2, 0.04), (0, 0.2), (3, 0.2), (6, 0.2)]
 SEEDS = [pytest.param(s, marks=[] if s in QUICK else pytest.mark.slow, id=str(s)) for s in PRESSED]
+SEEDS += [pytest.param(c, marks=pytest.mark.slow, id=f"{c[0]} at {c[1]}") for c in CLOSED]
 
 
 @pytest.fixture(scope="module", params=SEEDS)
 def found(request: Any, own: Any) -> Found:
-    return joined(Drawn(request.param), own)
+    seed, *peak = np.ravel(request.param)
+    return joined(Drawn(int(seed)), own, *peak)
 
 
 def test_they_balance_without_penetration(found: Found) -> None:
@@ -294,6 +317,55 @@ def test_trust_constr_finds_the_same_minima(seed: int, own: Any) -> None:
         options={"gtol": 1e-9, "xtol": 1e-12, "maxiter": 600},
     )
     assert best.x / unit == pytest.approx(found.q, abs=2e-5)
+
+
+def driven_on(found: Found, pressures: Array) -> list[ContactShapes]:
+    """Shapes of a pair at these pressures, MPa, reached one after the other without an event."""
+    steps = np.broadcast_to(pressures[:, None, None], (len(pressures), found.both.n, 1))
+    start = Approach(found.shapes, np.ones(1), ())
+    volumes = through(found.both.drawn.finger, 0.0).volumes
+    came = driven(found.joint, start, volumes, steps)
+    assert not came.resets and all(stop.is_there.all() for stop in came.stops)
+    return [found.joint.relabeled(stop) for stop in came.stops[1:]]
+
+
+def swept(both: Both, q: Array) -> Array:
+    """What domes sweep, mm³, (batch,)."""
+    extensions = (one.extensions(q[finger::2]) for finger, one in enumerate(both.own))
+    return np.asarray(AREA * sum(sum(own) for own in extensions))
+
+
+@pytest.mark.parametrize("seed", [2, pytest.param(11, marks=pytest.mark.slow)])
+def test_under_pressure_they_balance_and_pay_for_what_they_do(
+    seed: int, own: Any, slsqp: Any
+) -> None:
+    """Optimality, SciPy's minimum at a pressure, and dΠ = −ΣA x dp from one to another."""
+    found, pressures = joined(Drawn(seed), own), np.linspace(0.01, 0.05, 21)
+    both, unit = found.both, found.unit
+    shapes = driven_on(found, pressures)
+    q, push = shapes[-1].coordinates[:, 0], shapes[-1].push[:, 0]
+    cells = np.flatnonzero(push > 1e-12)
+    assert cells.min() < 2 * both.n <= cells.max(), "a disc's and a finger's"
+    gaps = both.gaps(cells, q[:, None])[:, 0]
+    assert np.abs(gaps).max() <= 1e-9
+
+    def energy(q: Array, p: float = pressures[-1]) -> Array:
+        return np.asarray(both.energy(q) - p * swept(both, q))
+
+    def of_cells(q: Array) -> Array:
+        return both.gaps(cells, q)
+
+    rest = found.gradient(energy, q) - push[cells] @ found.gradient(of_cells, q)
+    assert np.abs(rest / unit).max() <= 1e-9, "N"
+    best = slsqp(energy, of_cells, found.gradient, q, unit)
+    assert best.x / unit == pytest.approx(q, abs=2e-5)
+    volumes = [float(swept(both, there.coordinates)[0]) for there in shapes]
+    first, last = (
+        float(energy(shapes[k].coordinates, pressures[k])[0]) for k in (0, -1)
+    )
+    weights = np.array([1.0, *[4.0, 2.0] * 9, 4.0, 1.0]) / 3.0 * 0.002  # Simpson
+    assert last - first == pytest.approx(-weights @ volumes, rel=1e-8)
+    assert abs(last - first) > 0.1
 
 
 EVERY = np.arange(8, dtype=np.uint64)
@@ -445,8 +517,52 @@ def test_a_body_keeps_mirrored_pairs_from_giving_way(reference_finger: Fingers) 
     assert kept["between_fingers_N"][0] > 0.1
 
 
+@pytest.mark.parametrize(
+    ("law", "half"),
+    [
+        (PUBLISHED, 12.0),
+        (PUBLISHED, 4.0),
+        pytest.param(PushOnly(PUBLISHED), 12.0, marks=pytest.mark.slow),
+    ],
+)
+def test_mirrored_pairs_close_as_on_a_plate_at_their_axis(
+    law: Any, half: float, graded_finger: Fingers
+) -> None:
+    """Events, states and forces; the wider ones only meet under pressure, and part again."""
+    finger = replace(graded_finger(3, 5, force_linearity=0.03), law=law)
+    by = through(finger, 0.25, 0.0)
+    scene = Scene(finger, (), Gripper(2.0 * half, 0.0), THICKNESS, body=FAR)
+    pair = codes("000"), codes("000")
+    rows = grasp_rows(grasps(scene, chain_potential, FAR, pair, Way.CLOSE, by))
+    corners = np.array([[-5.0, 90.0, 90.0, -5.0], [-half - 9.0, -half - 9.0, -half, -half]])
+    plate = Polygon(np.zeros(2), corners)
+    alone = Scene(finger, (), None, THICKNESS, body=plate)
+    other = grasp_rows(grasps(alone, chain_potential, plate, [codes("000")], Way.CLOSE, by))
+    assert rows["events"][0] == other["events"][0] != ""
+    assert rows["pattern_after"].tolist() == other["pattern_after"].tolist()
+    assert rows["between_fingers_N"] == pytest.approx(-other["finger_force_y_N"], abs=1e-9)
+    assert rows["status"].tolist() == [Status.STABLE] and not rows["overlaps"].any()
+
+
+@pytest.mark.slow
+def test_a_pair_that_closes_is_the_mirror_image_of_the_other(reference_finger: Fingers) -> None:
+    finger = reference_finger(3)
+    by, rows = through(finger, 0.05, 0.0), []
+    for y, pair in ((0.3, ("111", "110")), (-0.3, ("110", "111"))):
+        disc = Disc(np.array([10.0, y]), 11.8)
+        scene = Scene(finger, (), Gripper(25.0, 0.0), THICKNESS, body=disc)
+        both = [codes(text) for text in pair]
+        rows.append(grasp_rows(grasps(scene, chain_potential, disc, both, Way.CLOSE, by)))
+    one, other = rows
+    assert one["between_fingers_N"][0] > 0.01 and one["status"].tolist() == [Status.STABLE]
+    for name in ("squeeze_N", BETWEEN, "max_contact_N", "aperture_mm"):
+        assert one[name] == pytest.approx(other[name], rel=1e-9), name
+    after = [rows["pattern_after"][0].split("/") for rows in (one, other)]
+    assert after[0] == after[1][::-1]
+
+
 def test_bodies_that_move_leave_fingers_to_pass(reference_finger: Fingers) -> None:
-    """So does closing on a body: the tables have no column that says otherwise."""
+    """The tables have no column that says otherwise."""
     scene = Scene(reference_finger(3), (), Gripper(25.0, 0.0), THICKNESS, body=ON_AXIS)
     for other in (replace(scene, held=Held.FREE), replace(scene, body=None)):
         assert BETWEEN not in {column.name for column in columns_of(other, None)}
