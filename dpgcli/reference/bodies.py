@@ -5,7 +5,7 @@ convex body with straight sides meets sides of the face with its corners, and co
 with the side that these are furthest in front of; nothing else of two polygons can touch.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -96,6 +96,13 @@ class ExactBody(Protocol):
     def lowered(self, by: "mpf") -> "ExactBody":
         """Further along −y."""
 
+    @property
+    def middle(self) -> Vector:
+        """The center of its area."""
+
+    def seen(self, place: Callable[[Vector], Vector], side: int) -> "ExactBody":
+        """With every point at its `place`; a mirror image if the side is −1."""
+
     def face(self, stations: Sequence["mpf"]) -> list[Vector]:
         """F_0 … F_n by the nodes B_0, T_0, B_1, …"""
 
@@ -119,6 +126,16 @@ def exact(body: Body) -> ExactBody:
     return _Straight(thickness, list(zip(numbers[::2], numbers[1::2], strict=True)))
 
 
+def face_of(thickness: "mpf", stations: Sequence["mpf"]) -> list[Vector]:
+    """The face of a finger with a layer of a thickness, by its nodes."""
+    nodes = []
+    for k in range(0, len(stations), 4):
+        x, y, top_x, top_y = stations[k : k + 4]
+        _, along = measured((top_x - x, top_y - y))
+        nodes.append((x - thickness * along[0] / 2, y - thickness * along[1] / 2))
+    return nodes
+
+
 @dataclass(frozen=True)
 class _Faced:
     """Base of bodies: the face of a finger with a layer of some thickness."""
@@ -127,12 +144,7 @@ class _Faced:
 
     def face(self, stations: Sequence["mpf"]) -> list[Vector]:
         """Half a layer inside B on the line to T."""
-        nodes = []
-        for k in range(0, len(stations), 4):
-            x, y, top_x, top_y = stations[k : k + 4]
-            _, along = measured((top_x - x, top_y - y))
-            nodes.append((x - self.thickness * along[0] / 2, y - self.thickness * along[1] / 2))
-        return nodes
+        return face_of(self.thickness, stations)
 
     def gap_of(self, stations: list["mpf"], place: Place) -> "mpf":
         """By the part of the face beside it."""
@@ -155,6 +167,15 @@ class _Round(_Faced):
     def lowered(self, by: "mpf") -> "_Round":
         """Further along −y."""
         return replace(self, center=(self.center[0], self.center[1] - by))
+
+    @property
+    def middle(self) -> Vector:
+        """The center."""
+        return self.center
+
+    def seen(self, place: Callable[[Vector], Vector], side: int) -> "_Round":
+        """With its center there."""
+        return replace(self, center=place(self.center))
 
     def places(self, face: list[Vector]) -> list[Place]:
         """The nearest place of each side, along the face."""
@@ -193,6 +214,19 @@ class _Straight(_Faced):
     def lowered(self, by: "mpf") -> "_Straight":
         """Further along −y."""
         return replace(self, corners=[(x, y - by) for x, y in self.corners])
+
+    @property
+    def middle(self) -> Vector:
+        """The mean of triangles from the origin to the sides."""
+        sides = [self._side(part) for part in range(len(self.corners))]
+        areas = [cross(start, end) for start, end in sides]
+        pairs = list(zip(areas, sides, strict=True))
+        x, y = (sum(a * (start[k] + end[k]) for a, (start, end) in pairs) for k in (0, 1))
+        return x / (3 * sum(areas)), y / (3 * sum(areas))
+
+    def seen(self, place: Callable[[Vector], Vector], side: int) -> "_Straight":
+        """With corners there, and itself to the left of its sides again."""
+        return replace(self, corners=[place(corner) for corner in self.corners][::side])
 
     def places(self, face: list[Vector]) -> list[Place]:
         """Corner by corner of the body the sides that it is over, then side by side nodes."""

@@ -6,8 +6,8 @@ makes of the optimality conditions of a set of contacts: balance with their push
 The set is right where no contact pulls and no other place is penetrated.
 """
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -91,9 +91,10 @@ def extended_contact(
         if isinstance(body, StraightBody) and np.isfinite(body.stiffness):
             whole = _Yielding(bars, *extended(np.array([body.stiffness])))
             start = [*start, *extended(np.array([yielded]))]
-        search, here = _Search(whole, exact(body), digits, lost), start
+        alone, here = Alone(whole, exact(body)), start
+        search = Search(whole, alone, digits, lost)
         try:
-            found = search.with_contacts(here, search.closed(here, mpmath.mpf(NEAR)))
+            found = search.with_contacts(here, alone.closed(here, mpmath.mpf(NEAR)))
         except (ZeroDivisionError, ValueError):  # nodes that coincide, or a mechanism
             return None
         if found is None:
@@ -163,21 +164,79 @@ class _Yielding:
         return self.own.strokes_opened(unknowns[:-1], step[:-1])
 
 
-class _Balance(NamedTuple):
+@dataclass(frozen=True)
+class Alone:
+    """A finger and its body: where they may touch."""
+
+    bars: Energy | _Yielding
+    body: ExactBody
+
+    def closed(self, unknowns: list["mpf"], within: "mpf") -> list[Place]:
+        """The places at which the body is within so much, mm."""
+        body = self._body_at(unknowns)
+        face = body.face(self._stations(unknowns))
+        return [p for p in body.places(face) if body.gap(face, p) <= within]
+
+    def gap(self, unknowns: list["mpf"], place: Place) -> "mpf":
+        """The gap at a place, mm."""
+        return self._body_at(unknowns).gap_of(self._stations(unknowns), place)
+
+    def _stations(self, unknowns: list["mpf"]) -> list["mpf"]:
+        """The nodes B_0, T_0, B_1, … at unknowns."""
+        return [0, 0, 0, self.bars.units[0].height, *self.bars.nodes(unknowns)]
+
+    def _body_at(self, unknowns: list["mpf"]) -> ExactBody:
+        """The body where it is."""
+        yields = isinstance(self.bars, _Yielding)
+        return self.body.lowered(unknowns[-1]) if yields else self.body
+
+
+P = TypeVar("P", bound=Hashable)
+
+
+class Whole(Protocol):
+    """The energy of all that touches."""
+
+    @property
+    def scale(self) -> "mpf":
+        """The length that steps are compared with, mm."""
+
+    def at(self, unknowns: list["mpf"]) -> Expansion:
+        """The energy, expanded along `moved`."""
+
+    def moved(self, unknowns: list["mpf"], step: list["mpf"]) -> list["mpf"]:
+        """Unknowns a step further."""
+
+    def strokes_opened(self, unknowns: list["mpf"], step: list["mpf"]) -> "mpf":
+        """The largest opening of a unit by a step, in strokes."""
+
+
+class Touched(Protocol[P]):
+    """Where things may touch."""
+
+    def closed(self, unknowns: list["mpf"], within: "mpf") -> list[P]:
+        """The places at which gaps are at most so large, mm."""
+
+    def gap(self, unknowns: list["mpf"], place: P) -> "mpf":
+        """The gap at a place, mm."""
+
+
+@dataclass(frozen=True)
+class Balance(Generic[P]):
     """Unknowns in balance with pushes at places, and the Lagrangian's expansion there."""
 
     unknowns: list["mpf"]
-    push: dict[Place, "mpf"]
+    push: dict[P, "mpf"]
     slopes: list[list["mpf"]]
     hessian: list[list["mpf"]]
 
 
 @dataclass(frozen=True)
-class _Search:
-    """Newton's method on the optimality conditions of contacts, of one finger and body."""
+class Search(Generic[P]):
+    """Newton's method on the optimality conditions of contacts."""
 
-    bars: Energy | _Yielding
-    body: ExactBody
+    bars: Whole
+    touched: Touched[P]
     digits: int
     lost: int
 
@@ -188,29 +247,14 @@ class _Search:
 
         return mpf(10) ** -(2 * self.digits // 5)
 
-    def stations(self, unknowns: list["mpf"]) -> list["mpf"]:
-        """The nodes B_0, T_0, B_1, … at unknowns."""
-        return [0, 0, 0, self.bars.units[0].height, *self.bars.nodes(unknowns)]
-
-    def closed(self, unknowns: list["mpf"], within: "mpf") -> list[Place]:
-        """The places at which the body is within so much, mm."""
-        body = self.body_at(unknowns)
-        face = body.face(self.stations(unknowns))
-        return [p for p in body.places(face) if body.gap(face, p) <= within]
-
-    def body_at(self, unknowns: list["mpf"]) -> ExactBody:
-        """The body where it is."""
-        yields = isinstance(self.bars, _Yielding)
-        return self.body.lowered(unknowns[-1]) if yields else self.body
-
-    def with_contacts(self, here: list["mpf"], active: list[Place]) -> _Balance | None:
+    def with_contacts(self, here: list["mpf"], active: list[P]) -> Balance[P] | None:
         """The equilibrium with the right set of contacts; None where there is none."""
         for _ in range(MOST_SETS):
             found = self._balanced(here, active)
             if found is None:
                 return None
             held = [place for place in active if found.push[place] >= 0]
-            closed = self.closed(found.unknowns, self.tolerance * self.bars.scale * 100)
+            closed = self.touched.closed(found.unknowns, self.tolerance * self.bars.scale * 100)
             pulling = set(active) - set(held)
             now = [place for place in closed if place not in pulling]
             if set(now) == set(active):
@@ -218,7 +262,7 @@ class _Search:
             here, active = found.unknowns, now
         return None
 
-    def _balanced(self, here: list["mpf"], active: list[Place]) -> _Balance | None:
+    def _balanced(self, here: list["mpf"], active: list[P]) -> Balance[P] | None:
         """Newton's method on balance and closed gaps."""
         from mpmath import lu_solve, matrix
 
@@ -235,7 +279,7 @@ class _Search:
             own, push = step[:size], step[size:]
             largest = max(map(abs, own)) / self.bars.scale
             if largest <= self.tolerance:
-                return _Balance(here, dict(zip(active, push, strict=True)), steps, hessian)
+                return Balance(here, dict(zip(active, push, strict=True)), steps, hessian)
             fraction = 1 / max(1, self.bars.strokes_opened(here, own) / LARGEST_OPENING)
             here = self.bars.moved(here, [fraction * part for part in own])
             bent = None if largest > BENT_AGAIN else bent
@@ -247,17 +291,17 @@ class _Search:
 
         return mpf(10) ** -(self.digits // 3)
 
-    def _gap_by_steps(self, here: list["mpf"], place: Place) -> Callable[[dict[int, "mpf"]], "mpf"]:
+    def _gap_by_steps(self, here: list["mpf"], place: P) -> Callable[[dict[int, "mpf"]], "mpf"]:
         """The gap at a place by steps of single unknowns, along the curved update."""
 
         def gap(steps: dict[int, "mpf"]) -> "mpf":
             whole = [steps.get(row, 0) for row in range(len(here))]
             moved = self.bars.moved(here, whole) if steps else here
-            return self.body_at(moved).gap_of(self.stations(moved), place)
+            return self.touched.gap(moved, place)
 
         return gap
 
-    def is_minimum(self, found: _Balance) -> bool:
+    def is_minimum(self, found: Balance[P]) -> bool:
         """Whether the Lagrangian bends upwards along all motions that contacts leave.
 
         It does where it does everywhere with contacts as very stiff springs.

@@ -1,5 +1,7 @@
 """The reference for contact against closed forms, and its sets of contacts."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.reference.bodies import RoundBody, exact
-from dpgcli.reference.contact import _Balance, _Search, extended_contact, penetration
+from dpgcli.reference.contact import Alone, Balance, Search, extended_contact, penetration
 from dpgcli.reference.equilibria import energy_of
 from dpgcli.reference.units import extended_units
 
@@ -112,9 +114,9 @@ def test_curvature_counts_on_the_motions_that_contacts_leave(along: int, is_mini
     """Downhill across the contact, which holds that back; up or down along it."""
     with mpmath.workdps(50):
         bars = energy_of(unit(), extended_units(unit()), [])
-        search = _Search(bars, exact(RoundBody(CENTER, 8.0, 0.0)), 50, 0)
+        search = Search(bars, Alone(bars, exact(RoundBody(CENTER, 8.0, 0.0))), 50, 0)
         zero, one = mpmath.mpf(0), mpmath.mpf(1)
         hessian = [[-one, zero], [zero, along * one]]
-        found = _Balance([zero, zero], {}, [[one, zero]], hessian)
+        found = Balance([zero, zero], {}, [[one, zero]], hessian)
         assert search.is_minimum(found) is is_minimum
-        assert not search.is_minimum(found._replace(slopes=[]))
+        assert not search.is_minimum(replace(found, slopes=[]))
