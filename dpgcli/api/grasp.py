@@ -118,16 +118,18 @@ class GraspResult(TableResult):
 
     def _mirrored_lines(self) -> Iterator[str]:
         """What is taken of two fingers in one state that come together."""
-        mark = "" if self.grasps.body is None else Load.MEETING
-        are_reset = [
-            bool(text) and mark in text and "/" not in text for text in self.rows["resets"]
-        ]
-        is_alike = np.array(["/" not in text for text in self.rows["pattern"]], bool)
-        if n_reset := int((is_alike & np.array(are_reset, bool)).sum()):
-            yield (
-                f"{counted(n_reset, 'mirrored pair')} reset together: which finger goes first the "
-                "model does not say, and one alone may end in another state"
-            )
+        rows, mark = self.rows, "" if self.grasps.body is None else Load.MEETING
+        are_reset = [bool(text) and mark in text and "/" not in text for text in rows["resets"]]
+        is_alike = np.array(["/" not in text for text in rows["pattern"]], bool)
+        told = [("reset", np.array(are_reset, bool))]
+        if "events" in rows:
+            told.append(("snapped or reset", (rows["events"] != "") & (rows[BETWEEN] > 0.0)))
+        for happened, are_so in told:
+            if n_so := int((is_alike & are_so).sum()):
+                yield (
+                    f"{counted(n_so, 'mirrored pair')} {happened} together: which finger goes "
+                    "first the model does not say, and one alone may end in another state"
+                )
         if n_aside := int((is_alike & (self.rows["status"] == Status.MARGINAL)).sum()):
             yield f"{counted(n_aside, 'mirrored pair')} giving way to one side: marginal"
 

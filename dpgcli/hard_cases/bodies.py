@@ -2,7 +2,7 @@
 
 Those are plates along a phalanx, shorter than it or beyond its end; a wedge that points at a
 phalanx; and a block that the end of the face comes down on. Each is placed by the face of the free
-state, and reaches into it by so much.
+state, and reaches into it by so much. Those of two fingers are in `pairs`.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,6 +26,7 @@ from dpgcli.hard_cases.discs import (
     free_state,
     others,
 )
+from dpgcli.hard_cases.pairs import two_fingers
 from dpgcli.hard_cases.variants import Variant, changed, repeated, rigid, with_bars
 from dpgcli.mechanics.finger import Finger
 from dpgcli.reference.bodies import RoundBody, StraightBody
@@ -148,6 +149,7 @@ def bodies(base: Finger) -> Iterator[Variant]:
         yield from _at(JAWS, *bars, depth, stiffness)
     for by in GRAZING:
         yield from _at(JAWS, *hard, by, 1.0)
+    yield from two_fingers(base)
 
 
 def _at(

@@ -47,8 +47,8 @@ class Case:
 
     @property
     def inverted(self) -> Flags:
-        """The pattern as flags, (unit, 1)."""
-        return np.array([[digit == "1"] for digit in self.pattern])
+        """The pattern as flags, (unit, 1); of two fingers those of the upper one first."""
+        return np.array([[digit == "1"] for digit in self.pattern.replace("/", "")])
 
     @property
     def has_own_guess(self) -> bool:
@@ -115,4 +115,5 @@ def _cases(subject: str, family: Family, base: Finger) -> Iterator[Case]:
 
 def _by_chain_alone(variant: Variant) -> bool:
     """Whether bars do not give way, or there is pressure or a body."""
-    return variant.finger.is_rigid or bool(variant.pressure) or variant.body is not None
+    has_contact = variant.body is not None or variant.grip is not None
+    return variant.finger.is_rigid or bool(variant.pressure) or has_contact

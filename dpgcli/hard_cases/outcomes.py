@@ -1,5 +1,6 @@
 """Answers to hard cases, and what they are worth."""
 
+from dataclasses import field
 from enum import StrEnum
 
 import numpy as np
@@ -55,11 +56,13 @@ class Touch:
     """What a finger against a body is said to feel: pushes (contact,) N, in the reference's order.
 
     `walls` (unit,) mm are what they make walls yield, and the body has `yielded` by so much, mm.
+    Between two fingers it has `moved` (3,) along x and y, mm, and turned, rad.
     """
 
     push: Array
     walls: Array
     yielded: float = 0.0
+    moved: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)

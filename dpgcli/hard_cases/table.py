@@ -46,12 +46,12 @@ def rows(outcomes: Sequence[Outcome]) -> Columns:
         "family": np.array([case.family for case in cases]),
         "case": np.array([case.variant.label for case in cases]),
         "formulation": np.array([case.formulation for case in cases]),
-        "n_units": np.array([len(case.pattern) for case in cases]),
+        "n_units": np.array([case.variant.finger.n_units for case in cases]),
         "pattern": np.array([case.pattern.encode() for case in cases]),
         "verdict": np.array([outcome.verdict.value for outcome in outcomes]),
         "fails": np.array([outcome.is_failure for outcome in outcomes]),
         "status": np.array([answer.status for answer in answers], np.uint8),
-        "reached_pattern": np.array([texts(answer.reached)[0] for answer in answers]),
+        "reached_pattern": np.array([_reached(outcome) for outcome in outcomes]),
         "residual_N": np.array([answer.residual for answer in answers]),
         "residual_floor_N": np.array([answer.residual_floor for answer in answers]),
         "condition": np.array([answer.condition for answer in answers]),
@@ -62,6 +62,12 @@ def rows(outcomes: Sequence[Outcome]) -> Columns:
         "true_threshold_error": np.array([outcome.true_threshold_error for outcome in outcomes]),
         "true_force_error_N": np.array([outcome.true_force_error for outcome in outcomes]),
     }
+
+
+def _reached(outcome: Outcome) -> bytes:
+    """The pattern that a finger is in, or upper/lower that two are in."""
+    n_units = outcome.case.variant.finger.n_units
+    return b"/".join(texts(outcome.answer.reached.reshape(-1, n_units).T))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
 from dpgcli.reference.bodies import Body
+from dpgcli.reference.gripper import Grip
 
 LONG_FINGER = 30  # units, from which on one pattern has to do: extended precision is slow
 
@@ -31,7 +32,8 @@ class Variant:
 
     The solver gets lengths in another unit, with `scale` of these units in a mm. With a sign
     `pressure` the pressure on all domes goes that way, and what is asked for is where the first of
-    them loses its place. With a `body` in the way the state is one against it.
+    them loses its place. With a `body` in the way the state is one against it, with a `grip` one of
+    two fingers, and patterns are those of the upper and the lower one, such as "110/011".
     """
 
     label: str
@@ -41,6 +43,7 @@ class Variant:
     scale: float = 1.0
     pressure: int = 0
     body: Body | None = None
+    grip: Grip | None = None
 
 
 class Family(NamedTuple):

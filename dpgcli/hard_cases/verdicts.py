@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from dpgcli.arrays import Array
-from dpgcli.hard_cases import contacts, thresholds
+from dpgcli.hard_cases import contacts, grips, thresholds
 from dpgcli.hard_cases.cases import Case
 from dpgcli.hard_cases.outcomes import Answer, Outcome, Verdict
 from dpgcli.mechanics.coordinates import FingerPotential, Internal
@@ -49,6 +49,8 @@ def answered(case: Case) -> Answer:
     """Solve a case in its own unit of length; the answer is in mm."""
     if case.variant.pressure:
         return thresholds.answered(case)
+    if case.variant.grip is not None:
+        return grips.answered(case)
     if case.variant.body is not None:
         return contacts.answered(case)
     scale = case.variant.scale
@@ -133,6 +135,8 @@ def dense(band: Array) -> Array:
 
 def judged(case: Case, answer: Answer) -> Outcome:
     """The answer's verdict and true errors by extended precision."""
+    if case.variant.grip is not None:
+        return grips.judged(case, answer)
     if case.variant.body is not None:
         return contacts.judged(case, answer)
     if answer.status != Status.STABLE:

@@ -1,12 +1,14 @@
 """Bodies in the way of a finger in extended precision: the places of its face, and their gaps.
 
 The face is drawn from the finger's nodes here. A disc meets the nearest place of each side. A
-convex body with straight sides meets sides of the face with its corners, and corners of the face
-with the side that these are furthest in front of; nothing else of two polygons can touch.
+body with straight sides meets sides of the face with its corners, and corners of the face with the
+side that these are furthest in front of, or with notches any; nothing else of two polygons can
+touch.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -40,9 +42,9 @@ class RoundBody:
 
 @dataclass(frozen=True)
 class StraightBody:
-    """A convex body by its corners in the finger's frame, itself to the left of its sides; mm.
+    """A body by its corners in the finger's frame, itself to the left of its sides; mm.
 
-    `thickness` is that of the finger's layer. It yields along −y with a `stiffness`, N/mm.
+    Where it has notches nodes of the face may touch each side that they are over. `thickness` is that of the finger's layer. It yields along −y with a `stiffness`, N/mm.
     """
 
     corners: tuple[tuple[float, float], ...]
@@ -77,6 +79,7 @@ class StraightBody:
 
 
 Body = RoundBody | StraightBody
+BEHIND = 1.0  # mm: what is further behind a side is not at it
 
 
 class Place(NamedTuple):
@@ -240,7 +243,7 @@ class _Straight(_Faced):
             Place(number, True, part)
             for part in range(len(self.corners))
             for number, node in enumerate(face)
-            if self._facing(node) == part and _is_over(self._side(part), node)
+            if self._is_at(part, node) and _is_over(self._side(part), node)
         ]
 
     def gap(self, face: list[Vector], place: Place) -> "mpf":
@@ -250,6 +253,18 @@ class _Straight(_Faced):
         start, end = face[place.number : place.number + 2]
         _, along = measured(_between(start, end))
         return cross(_between(start, self.corners[place.part]), along)
+
+    def _is_at(self, part: int, node: Vector) -> bool:
+        """Whether a point that is over a side may touch it; with notches more than one may be."""
+        if self.is_convex:
+            return self._facing(node) == part
+        return bool(self._front(part, node) > -BEHIND)
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether it has no notches."""
+        sides = [_between(*self._side(part)) for part in range(len(self.corners))]
+        return all(cross(before, after) > 0 for before, after in pairwise([sides[-1], *sides]))
 
     def _facing(self, node: Vector) -> int:
         """The side that a point is furthest in front of, or least behind."""

@@ -6,6 +6,7 @@ of the end along the last strut. Fingers do not touch node to node here.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 from dpgcli.arrays import Array, Flags
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
-from dpgcli.reference.bodies import Body, ExactBody, Place, exact, face_of
+from dpgcli.reference.bodies import BEHIND, Body, ExactBody, Place, exact, face_of
 from dpgcli.reference.contact import NEAR, Search
 from dpgcli.reference.equilibria import (
     Energy,
@@ -31,8 +32,6 @@ from dpgcli.reference.vectors import Vector, cross, dot, measured
 
 if TYPE_CHECKING:
     from mpmath import mpf
-
-BEHIND = 1.0  # mm: what is further behind a side is beyond the finger
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,15 @@ class Grip:
         """What is between the fingers."""
         held = ("fixed", "guided", "free", "free to turn")[self.n_motions]
         return "nothing between" if self.body is None else f"{self.body.name}, {held}"
+
+    def with_motions(self, number: int) -> "Grip":
+        """With a body that has so many."""
+        return replace(self, n_motions=number)
+
+    def smaller(self, by: float) -> "Grip":
+        """With the body's edge moved inwards, mm."""
+        assert self.body is not None, "a grip with a body"
+        return replace(self, body=self.body.smaller(by))
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,9 @@ def extended_grip(
         units, bars = extended_units(finger), list[Energy]()
         start: list[mpf] = []
         for own, flags in zip(nodes, pattern, strict=True):
-            rests = [inverted_rest(unit)[1] * int(on) for unit, on in zip(units, flags, strict=True)]
+            rests = [
+                inverted_rest(unit)[1] * int(on) for unit, on in zip(units, flags, strict=True)
+            ]
             begin = rests if walls is None else extended(walls[len(bars)])
             bars.append(energy_of(finger, units, begin))
             start += bars[-1].unknowns(extended(own))
@@ -151,7 +161,7 @@ def _kind(spot: Spot) -> int:
     return spot.finger if isinstance(spot, OnBody) else 2
 
 
-def depth(finger: Finger, grip: Grip, nodes: Array, moved: Array) -> float:
+def depth(finger: Finger, grip: Grip, nodes: Array, moved: Array, apart: float = 0.0) -> float:
     """How deep fingers, nodes (finger, 4 n), are in the body and in each other, mm."""
     import mpmath
 
@@ -159,7 +169,7 @@ def depth(finger: Finger, grip: Grip, nodes: Array, moved: Array) -> float:
         units = extended_units(finger)
         bars = energy_of(finger, units, [mpmath.mpf(0)] * len(units))
         both = _Both(bars, bars, 0)
-        numbers = extended(np.array([grip.spacing, 0.0, grip.thickness]))
+        numbers = extended(np.array([grip.spacing, apart, grip.thickness]))
         touching = Touching(both, grip, *numbers)
         outlines = [touching.outline(extended(own)) for own in nodes]
         body = touching.bodies(extended(moved))
@@ -298,9 +308,7 @@ class Touching:
         return cross(_between(start, self._mirrored(point)), along)
 
 
-def _seen(
-    body: ExactBody, side: int, half: "mpf", by: Vector, angle: "mpf"
-) -> ExactBody:
+def _seen(body: ExactBody, side: int, half: "mpf", by: Vector, angle: "mpf") -> ExactBody:
     """A body, moved and turned about the center of its area, in a finger's frame."""
     from mpmath import cos, sin
 

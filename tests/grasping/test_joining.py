@@ -360,9 +360,7 @@ def test_under_pressure_they_balance_and_pay_for_what_they_do(
     best = slsqp(energy, of_cells, found.gradient, q, unit)
     assert best.x / unit == pytest.approx(q, abs=2e-5)
     volumes = [float(swept(both, there.coordinates)[0]) for there in shapes]
-    first, last = (
-        float(energy(shapes[k].coordinates, pressures[k])[0]) for k in (0, -1)
-    )
+    first, last = (float(energy(shapes[k].coordinates, pressures[k])[0]) for k in (0, -1))
     weights = np.array([1.0, *[4.0, 2.0] * 9, 4.0, 1.0]) / 3.0 * 0.002  # Simpson
     assert last - first == pytest.approx(-weights @ volumes, rel=1e-8)
     assert abs(last - first) > 0.1
