@@ -27,7 +27,7 @@ from dpgcli.states.units import UnitSolutions
 
 DEEPEST = 1e-9  # mm: penetration
 STATED_ERROR = 1e-9  # of a push, in N and as a share of the largest, and of a body's place in mm
-STAGES, STEP = 8, 0.5  # in which a body grows; mm, by which bases come together at most
+STAGES, STEP = 8, 0.8  # in which a body grows; mm, by which bases come together at most
 FAR = 4.0  # lengths of a finger: bases that far apart keep fingers from each other
 HELD = (Held.FIXED, Held.GUIDED, Held.FREE, Held.FREE)  # by the number of motions
 

@@ -44,7 +44,8 @@ class RoundBody:
 class StraightBody:
     """A body by its corners in the finger's frame, itself to the left of its sides; mm.
 
-    Where it has notches nodes of the face may touch each side that they are over. `thickness` is that of the finger's layer. It yields along −y with a `stiffness`, N/mm.
+    Where it has notches nodes of the face may touch each side that they are over. `thickness` is
+    that of the finger's layer. It yields along −y with a `stiffness`, N/mm.
     """
 
     corners: tuple[tuple[float, float], ...]

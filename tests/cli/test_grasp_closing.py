@@ -124,3 +124,16 @@ def test_gaps_closed_beyond_domes_at_rest_are_rows(call: Any, spec: str) -> None
     )
     (row,) = json.loads(result.stdout)
     assert (row["status"], row["pattern_after"]) == ("gap_closed", "")
+
+
+def test_fingers_that_meet_as_they_close_touch_each_other(call: Any, spec: str) -> None:
+    """Rows have the force between them, and summaries say what mirrored pairs leave open."""
+    options = ("--pressure", "0:0.2:0", "--set", "gripper.base_spacing_mm=25", "--format", "json")
+    body = ("--object", "disc:4", "--at", "60,0")
+    result = call("grasp", spec, *body, *CLOSE, *options)
+    assert result.exit_code == ExitCode.DONE
+    (row,) = json.loads(result.stdout)
+    assert row["status"] == "stable" and row["between_fingers_N"] > 0.1 and not row["overlaps"]
+    assert row["aperture_mm"] == pytest.approx(0.0, abs=1e-9) and row["n_contacts"] == 0
+    assert "1 state in which the fingers touch each other" in result.stderr
+    assert "1 mirrored pair snapped or reset together: which finger goes first" in result.stderr
