@@ -177,6 +177,7 @@ def joined(drawn: Drawn, own: Any, peak: float | None = None) -> Found:
     (joint, shapes), rows = kept[-1], grasp_rows(found)
     assert rows["status"].tolist() == [Status.STABLE]
     assert rows["n_contacts"][0] > 0 and rows["between_fingers_N"][0] > 0.0
+    assert peak is None or (rows["events"][0] != "") == (peak > 0.15), "they snap"
     lengths = joint.potentials(shapes.inverted)[0].coordinates.force_unit
     unit = np.repeat(np.broadcast_to(lengths, (joint.n_own // 2, 1))[:, 0], 2)
     both = Both(own, drawn, shapes.inverted[:, 0])
@@ -208,9 +209,12 @@ PRESSED = (
     47,
     48,
 )
-CLOSED = [(2, 0.04), (0, 0.2), (3, 0.2), (6, 0.2)]
+CLOSED = [(2, 0.2), (2, 0.04), (10, 0.2)]
 SEEDS = [pytest.param(s, marks=[] if s in QUICK else pytest.mark.slow, id=str(s)) for s in PRESSED]
-SEEDS += [pytest.param(c, marks=pytest.mark.slow, id=f"{c[0]} at {c[1]}") for c in CLOSED]
+SEEDS += [
+    pytest.param(c, marks=[] if c == CLOSED[0] else pytest.mark.slow, id=f"{c[0]} at {c[1]}")
+    for c in CLOSED
+]
 
 
 @pytest.fixture(scope="module", params=SEEDS)
