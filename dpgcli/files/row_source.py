@@ -102,8 +102,9 @@ class RowSource:
 
     @property
     def keys(self) -> dict[str, str]:
-        """The keys of the spec whose values columns hold, by column."""
-        said = {f.name: _texts_of(f).get("description", "") for f in self.schema}
+        """The keys of the spec whose values columns hold, by column; none of the needed ones."""
+        own = (field for field in self.schema if field.name not in self.needed)
+        said = {field.name: _texts_of(field).get("description", "") for field in own}
         begun = {name: text for name, text in said.items() if text.startswith(VALUE_OF)}
         return {name: text.removeprefix(VALUE_OF) for name, text in begun.items()}
 

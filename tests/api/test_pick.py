@@ -191,6 +191,19 @@ def test_swept_values_that_are_text_are_named(swept: Any) -> None:
         dpg.pick(table)
 
 
+@pytest.mark.parametrize("name", ["design", "calibration", "status", "n_stable"])
+def test_needed_columns_are_no_values_whatever_describes_them(swept: Any, name: str) -> None:
+    arrow = swept.designs.to_arrow().replace_schema_metadata(None)
+    place = arrow.schema.get_field_index(name)
+    said = {"description": f"value of {STROKE}"}
+    table = arrow.cast(arrow.schema.set(place, arrow.schema.field(place).with_metadata(said)))
+    pq.write_table(table, "said.parquet")
+    for source in (table, "said.parquet"):
+        found, usual = (dpg.pick(t, minimize="reach_min_mm") for t in (source, arrow))
+        pd.testing.assert_frame_equal(found.to_pandas(), usual.to_pandas())
+        assert found.lines == usual.lines
+
+
 @pytest.mark.parametrize(
     ("name", "values", "kind"),
     [
