@@ -24,7 +24,7 @@ from dpgcli.api.report import silent, summarize
 from dpgcli.api.tables import Table
 from dpgcli.errors import Field, Message, UsageError
 from dpgcli.files.output import check_not_read, check_outputs, sole_use
-from dpgcli.files.parts import FINGERPRINT, PartStore
+from dpgcli.files.parts import FINGERPRINT, PartStore, Work, work_of
 from dpgcli.files.table_reader import read_undamaged
 from dpgcli.files.trust import warnings_in
 from dpgcli.records import dataclass
@@ -301,4 +301,6 @@ def _store(folder: Path) -> PartStore:
         what = "no shard" if not here else "several sweeps"
         expected = f"{folder}: expected the output of one dpg sweep "
         raise UsageError(expected, Field("shard"), f", found {what}")
+    if work_of(here[0].said()) is Work.SEARCH:
+        raise UsageError(f"{folder} holds an unfinished search, no shard of a sweep")
     return here[0]

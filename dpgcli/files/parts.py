@@ -13,6 +13,7 @@ import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from enum import StrEnum
 from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -38,9 +39,26 @@ LISTS = ("states", "designs")
 SAID = "sweep.json"
 MOST_SAID = 2**26  # bytes
 FINGERPRINT, N_DESIGNS = "dpg.fingerprint", "dpg.designs"
+GOAL = "dpg.goal"  # what a search is of; a sweep has none
 BASE = "dpg.base"  # a name only: no result depends on it
 NO_CAUSE = (FINGERPRINT, BASE, TRUST, WARNINGS)
 SHA256 = "sha256"  # of all texts in sweep.json, the name of the base as well
+
+
+class Work(StrEnum):
+    """What parts in a folder are of."""
+
+    SWEEP = "sweep"
+    SEARCH = "search"
+
+
+def work_of(said: Mapping[str, str]) -> Work:
+    """Whose metadata these are.
+
+    >>> work_of({"dpg.goal": "{}"}).value, work_of({"dpg.designs": "3"}).value
+    ('search', 'sweep')
+    """
+    return Work.SEARCH if GOAL in said else Work.SWEEP
 
 
 def fingerprint(said: Mapping[str, str]) -> str:
@@ -165,7 +183,7 @@ class PartStore:
                     said = json.loads(stream.read(MOST_SAID))
             except (FileNotFoundError, ValueError, RecursionError):
                 return {}
-        if not _is_sweep(said):
+        if not _is_work(said):
             return {}
         is_whole = said.pop(SHA256, None) == _sha256(said)
         return said if is_whole and said[FINGERPRINT] == fingerprint(said) else {}
@@ -231,10 +249,13 @@ class PartStore:
         return gaps
 
 
-def _is_sweep(said: Any) -> bool:
-    """Whether this is the metadata of a sweep: texts, the number of its designs among them."""
+def _is_work(said: Any) -> bool:
+    """Whether this is metadata: texts, with the goal of a search or a sweep's number of designs."""
     is_text = isinstance(said, dict) and all(isinstance(text, str) for text in said.values())
-    return is_text and FINGERPRINT in said and COUNT.fullmatch(said.get(N_DESIGNS, "")) is not None
+    if not is_text or FINGERPRINT not in said:
+        return False
+    is_search = work_of(said) is Work.SEARCH
+    return is_search or COUNT.fullmatch(said.get(N_DESIGNS, "")) is not None
 
 
 def _is_description(path: Path) -> bool:

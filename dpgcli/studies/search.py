@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from dpgcli.errors import Field, UsageError, WorkplaceError
+from dpgcli.errors import WorkplaceError
 from dpgcli.files.access import reading, writing
 from dpgcli.files.goal_file import GoalFile
-from dpgcli.files.parts import FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
+from dpgcli.files.parts import FINGERPRINT, GOAL, PartStore, fingerprint
 from dpgcli.files.scene_file import canonical, canonical_json
 from dpgcli.files.table_writer import versions
 from dpgcli.records import dataclass
@@ -22,8 +22,7 @@ from dpgcli.search.descent import Residuals
 from dpgcli.search.designs import Designs
 from dpgcli.search.part import Found, Part
 from dpgcli.search.search import Limits, Task
-from dpgcli.studies.sweep import PARTS, stores
-from dpgcli.sweeps.differences import differences
+from dpgcli.studies.sweep import PARTS, check_unfinished, drop_parts
 from dpgcli.sweeps.executors import GO_ON, Backend, Chunk, Runner
 from dpgcli.sweeps.maker import HERE, Maker, check_maker, check_workers
 from dpgcli.temporary import temporary_folder
@@ -69,11 +68,10 @@ class SearchStudy:
         """All that its parts depend on, and the fingerprint of that."""
         goal = {key: value for key, value in self.given.said.items() if key != "base"}
         said = {
-            "dpg.goal": json.dumps(canonical(goal), sort_keys=True),
+            GOAL: json.dumps(canonical(goal), sort_keys=True),
             "dpg.goal_base": canonical_json(self.given.base),
             "dpg.seed": str(self.seed),
             "dpg.evaluations": str(self.limits.evaluations),
-            N_DESIGNS: "1",  # a search counts none before it is done
             "dpg.versions": versions(),
             "dpg.code": HERE.code,
         }
@@ -86,20 +84,9 @@ class SearchStudy:
 
     def begin(self, *, restart: bool = False) -> None:
         """Say what the parts are of. Raises UsageError where those of other work are there."""
-        for other in stores(self.folder):
-            if restart:
-                other.drop()
-            elif other.folder != self.store.folder:
-                said = other.said()
-                changed = ", ".join(differences(said, self.identity))
-                what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
-                raise UsageError(
-                    f"{self.folder} holds unfinished work {what}: finish it as it was, take "
-                    "another ",
-                    Field("output"),
-                    ", or drop it with ",
-                    Field("restart"),
-                )
+        if restart:
+            drop_parts(self.folder)
+        check_unfinished(self.folder, self.identity)
         check_workers(self.workplace, "search")
         self.store.say(self.identity)
         for damaged in self.store.damaged():

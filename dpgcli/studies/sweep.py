@@ -16,7 +16,7 @@ from dpgcli.design.outputs import Trust, of_space
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.access import inside, reading, writing
 from dpgcli.files.output import Mark
-from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint
+from dpgcli.files.parts import BASE, FINGERPRINT, N_DESIGNS, SAID, PartStore, fingerprint, work_of
 from dpgcli.files.scene_file import scene_of, spelled
 from dpgcli.files.seal import is_whole
 from dpgcli.files.sweep_file import Sweep
@@ -237,19 +237,8 @@ class Study:
             )
 
     def check_unfinished(self) -> None:
-        """Refuse to go on beside an unfinished sweep of other content; raises UsageError."""
-        for store in stores(self.folder):
-            if store.folder != self.store.folder:
-                said = store.said()
-                changed = ", ".join(differences(said, self.metadata))
-                what = f"that differs in {changed}" if said else f"whose {SAID} is damaged"
-                raise UsageError(
-                    f"{self.folder} holds an unfinished sweep {what}: "
-                    "finish it as it was, take another ",
-                    Field("output"),
-                    ", or drop it with ",
-                    Field("restart"),
-                )
+        """Refuse to go on beside unfinished work of other content; raises UsageError."""
+        check_unfinished(self.folder, self.metadata)
 
     def drop_unfinished(self) -> None:
         """Remove what unfinished sweeps left in the folder."""
@@ -302,6 +291,25 @@ class Study:
         """Join all parts into the two tables; then the parts go."""
         assemble([self.store], self.folder)
         self.drop_unfinished()
+
+
+def check_unfinished(folder: Path, metadata: dict[str, str]) -> None:
+    """Refuse parts in a folder of other work than this; raises UsageError."""
+    for store in stores(folder):
+        if store.folder.name == metadata[FINGERPRINT][:16]:
+            continue
+        said = store.said()
+        what = f"unfinished work whose {SAID} is damaged"
+        if said:
+            what = f"an unfinished {work_of(said)}"
+            if work_of(said) is work_of(metadata):
+                what += f" that differs in {', '.join(differences(said, metadata))}"
+        raise UsageError(
+            f"{folder} holds {what}: finish it as it was, take another ",
+            Field("output"),
+            ", or drop it with ",
+            Field("restart"),
+        )
 
 
 def assemble(parts_of: Sequence[PartStore], folder: Path) -> str:

@@ -581,7 +581,7 @@ def test_a_depfile_is_that_of_the_tables_beside_it(call: Any, domes: Path) -> No
         assert "another dpg is at work" in call(*other).stderr
     theirs = PartStore(domes / "out" / ".parts" / ("a" * 16))
     theirs.say({"dpg.designs": "3"})
-    assert "holds an unfinished sweep" in call(*other).stderr
+    assert "holds unfinished work whose sweep.json is damaged" in call(*other).stderr
     theirs.drop()
     assert "a shard makes none" in call(*other, "--shard", "1/2").stderr
     (domes / "out" / "run.json").write_text("{}")

@@ -70,7 +70,9 @@ def test_an_interrupted_search_goes_on_to_the_same_bytes(
     with pytest.raises(StoppedError):
         dpg.inverse_design(goal, tmp_path / "out")
     assert not (tmp_path / "out" / "best.parquet").exists()
-    with pytest.raises(UsageError, match="unfinished work that differs in seed: finish it as it"):
+    with pytest.raises(
+        UsageError, match="holds an unfinished search that differs in seed: finish it as"
+    ):
         dpg.inverse_design(goal, tmp_path / "out", seed=2)
     dpg.inverse_design(goal, tmp_path / "out")
     assert sorted(stopped) == [0, 1, 2]  # two were there
@@ -78,6 +80,28 @@ def test_an_interrupted_search_goes_on_to_the_same_bytes(
     stopped += [9]
     dpg.inverse_design(goal, tmp_path / "whole")
     assert files(tmp_path / "out") == files(tmp_path / "whole")
+
+
+def test_a_search_is_no_sweep(goal: dict[str, Any], stopped: list[int], tmp_path: Path) -> None:
+    """What is unfinished in a folder is told apart, whoever comes upon it."""
+    search, sweep, whole = (tmp_path / name for name in ("search", "sweep", "whole"))
+    axis = {"key": STROKE, "values": [2.5, 3.0]}
+    given: Any = {"base": goal["base"], "space": [axis]}
+    with pytest.raises(StoppedError):
+        dpg.inverse_design(goal, search)
+    for shards in ([search], [search, search]):
+        with pytest.raises(UsageError, match="search holds an unfinished search, no shard of a "):
+            dpg.merge(shards, whole)
+    with pytest.raises(UsageError, match="search holds an unfinished search: finish it as it was"):
+        dpg.sweep(given, search, executor="serial")
+    dpg.sweep(given, sweep, executor="serial", shard="1/2")
+    with pytest.raises(UsageError, match="sweep holds an unfinished sweep: finish it as it was"):
+        dpg.inverse_design(goal, sweep)
+    with pytest.raises(UsageError, match="search holds an unfinished search, no shard of a sweep"):
+        dpg.merge([sweep, search], whole)
+    stopped += [9]
+    dpg.inverse_design(goal, search)  # as it was
+    assert (search / "best.parquet").exists()
 
 
 def test_restart_and_damage(goal: dict[str, Any], stopped: list[int], tmp_path: Path) -> None:
