@@ -2,6 +2,9 @@
 
 import re
 from collections.abc import Sequence
+from math import isfinite
+from numbers import Real
+from typing import TypeGuard
 
 KeyPath = tuple[str | int, ...]
 
@@ -56,6 +59,26 @@ def number_in(text: str) -> float:
     (-0.75, nan, nan)
     """
     return float(text) if NUMBER.fullmatch(text.strip()) else float("nan")
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a number, and not beyond those with a decimal point.
+
+    >>> is_number(2), is_number(True), is_number("2"), is_number(10**400)
+    (True, False, False, False)
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        float(value)
+    except OverflowError:  # whole numbers, and fractions of them
+        return False
+    return True
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether a value is a number as `is_number` has it, and neither infinite nor NaN."""
+    return is_number(value) and isfinite(value)
 
 
 def quoted(value: object) -> str:

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from importlib import util
 from itertools import islice
-from numbers import Integral, Real
+from numbers import Integral
 from pathlib import Path
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, TypeVar
 
 from dpgcli.design.dimensions import LARGEST, SMALLEST
 from dpgcli.errors import Field, UsageError
-from dpgcli.text import quoted
+from dpgcli.text import is_number, quoted
 
 N_COORDINATES = 2
 BYTES = (bytes, bytearray, memoryview)  # whose items are numbers of letters
@@ -88,21 +88,6 @@ def check_numbers(**values: float | None) -> None:
     for field, value in values.items():
         if value is not None and not is_number(value):
             raise UsageError(Field(field), f" {quoted(value)}: expected a number")
-
-
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number, and not beyond those with a decimal point.
-
-    >>> is_number(2), is_number(True), is_number("2"), is_number(10**400)
-    (True, False, False, False)
-    """
-    if not isinstance(value, Real) or isinstance(value, bool):
-        return False
-    try:
-        float(value)
-    except OverflowError:  # whole numbers, and fractions of them
-        return False
-    return True
 
 
 def check_whole(**values: int | None) -> None:

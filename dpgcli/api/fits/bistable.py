@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dpgcli.api.arguments import as_texts, check_positive, chosen, files_of, is_number
+from dpgcli.api.arguments import as_texts, check_positive, chosen, files_of
 from dpgcli.api.data import check_resampling, table_choice
 from dpgcli.api.fits.result import (
     FitResult,
@@ -32,7 +32,7 @@ from dpgcli.files.measured import MeasuredCurve, read_curve
 from dpgcli.files.sections import Geometry
 from dpgcli.reports.fit_figures import bistable_figure, draw_fit
 from dpgcli.reports.fits import bistable_summary, value_rows
-from dpgcli.text import quoted
+from dpgcli.text import is_number, quoted
 
 
 def fit_bistable(

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from dpgcli.records import dataclass
 from dpgcli.search.goal import Goal, Objective, Range, Target
 from dpgcli.search.maps import MapEvaluation
 from dpgcli.sweeps.expressions import Expression
-from dpgcli.text import KeyPath
+from dpgcli.text import KeyPath, is_finite
 
 __all__ = ["GoalFile", "goal_in", "goal_of", "read_goal"]
 
@@ -183,7 +182,7 @@ def _varied(
 def _are_values(reader: SpaceReader, path: KeyPath, key: str, values: list[Any]) -> bool:
     """Whether a list has values that the key can have; else with a problem."""
     rigid = LINEAR_STIFFNESS if key.endswith(LINEAR_STIFFNESS) else ""
-    wrong = [v for v in values if not _is_number(v) and not (rigid and v == float("inf"))]
+    wrong = [v for v in values if not is_finite(v) and not (rigid and v == float("inf"))]
     if wrong or not values:
         reader.wrong(path, VARIED, shown(wrong[0]) if wrong else "no values")
         return False
@@ -199,7 +198,7 @@ def _ends(reader: SpaceReader, path: KeyPath, key: str, said: Any) -> tuple[floa
         reader.wrong(path, VARIED, found)
         return None
     for end, value in said.items():
-        if not _is_number(value):
+        if not is_finite(value):
             reader.wrong((*path, end), "a number", shown(value))
             return None
     low, high = said["from"], said["to"]
@@ -216,7 +215,3 @@ def _are_possible(reader: SpaceReader, path: KeyPath, key: str, values: Sequence
     first = values[int(np.argmin(possible))]
     reader.wrong(path, "values that the key can have", f"{first:g}", "dpg help spec")
     return False
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.patterns import select
 from dpgcli.sweeps.extent import MOST_PRESSED
 from dpgcli.sweeps.metrics import METRICS
-from dpgcli.text import KeyPath, quoted
+from dpgcli.text import KeyPath, is_finite, quoted
 
 HALF = 0.5  # the tolerance of what is so or not
 MOST_STATES = 2**12  # of a finger, among which the nearest is looked for
@@ -61,7 +60,7 @@ class TargetReader:
                 self.space.wrong((*path, key), "a known key", shown(key), hint)
         values = self._values(path, said.get("value"), quantity, is_flag=is_flag)
         tolerance = HALF if is_flag else said.get(tolerance_key)
-        if not (_is_number(tolerance) and float(tolerance or 0.0) > 0.0):
+        if not (is_finite(tolerance) and tolerance > 0.0):
             self.space.wrong((*path, tolerance_key), "a number > 0", shown(tolerance))
         if has_pattern:
             self._check_pattern((*path, "pattern"), said.get("pattern"))
@@ -113,7 +112,7 @@ class TargetReader:
         n = 2 if quantity == TIP else 1
         values = said if isinstance(said, list) else [said]
         is_right = len(values) == n and (n > 1) == isinstance(said, list)
-        if not (is_right and all(map(_is_number, values))):
+        if not (is_right and all(map(is_finite, values))):
             expected = "a number" if n == 1 else "two numbers in mm, such as [45, -30]"
             self.space.wrong((*path, "value"), expected, shown(said))
             return ()
@@ -142,7 +141,3 @@ class TargetReader:
                 yield len(select((pattern,), n_units))
             except NothingSelectedError:
                 yield 0
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

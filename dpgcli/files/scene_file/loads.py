@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from dpgcli.design.dimensions import LARGEST
 from dpgcli.design.loads import DIRECTION, DIRECTIONS, DOWN, FORCES, MASS, MOMENT, GivenLoads
 from dpgcli.files.sections import Bounded, Section
+from dpgcli.text import is_number
 
 TIP_FORCE = "tip_force_N"
 EXPECTED = {
@@ -41,7 +42,7 @@ def _masses(said: Any) -> Any:
 
 
 def _is_number(said: Any) -> bool:
-    return isinstance(said, int | float) and not isinstance(said, bool) and abs(said) <= LARGEST
+    return is_number(said) and abs(said) <= LARGEST
 
 
 Masses = Annotated[

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, WithJsonSchema
 
 from dpgcli.design.dimensions import LARGEST, LEAVE_ONE_OUT, Tolerance
 from dpgcli.files.sections import Section
+from dpgcli.text import is_number
 
 PERCENTAGE = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?) ?%")
 PERCENT: dict[str, Any] = {"type": "string", "pattern": f"^{PERCENTAGE.pattern}$"}
@@ -43,8 +44,7 @@ def beyond(value: object) -> str:
 
 
 def _tolerance(value: object) -> object:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    is_size = is_number and isinstance(value, int | float) and 0.0 <= value <= LARGEST
+    is_size = is_number(value) and 0.0 <= value <= LARGEST
     if value is not None and not is_size and share_of(value) is None:
         raise ValueError("no standard uncertainty")
     return value

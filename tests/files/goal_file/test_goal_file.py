@@ -106,6 +106,31 @@ def test_mistakes_in_targets(read: Read, target: str, said: str) -> None:
     assert any(said in problem for problem in found), found
 
 
+BIG = "1" + 400 * "0"
+
+
+@pytest.mark.parametrize(
+    ("vary", "target", "said"),
+    [
+        (f"{HEIGHT}: {{from: 4.5, to: {BIG}}}", "", f"vary.{HEIGHT}.to: expected a number"),
+        (f"{HEIGHT}: [{BIG}, 6.5]", "", f"vary.{HEIGHT}: expected a list of numbers"),
+        (f"finger.units: [{BIG}, 4]", "", "vary.finger.units: expected a list of numbers"),
+        (f"finger.units: {{from: 2, to: {BIG}}}", "", "vary.finger.units.to: expected a number"),
+        ("", f"quantity: tip, value: [{BIG}, -9], tolerance_mm: 1", "value: expected two numbers"),
+        ("", f"quantity: tip_x_mm, value: {BIG}, tolerance_mm: 1", "value: expected a number"),
+        ("", f"quantity: tip_x_mm, value: 4, tolerance_mm: {BIG}", "_mm: expected a number > 0"),
+    ],
+)
+def test_whole_numbers_beyond_double_precision_are_none(
+    read: Read, vary: str, target: str, said: str
+) -> None:
+    target = target or "quantity: tip_x_mm, value: 4, tolerance_mm: 1"
+    line = f"vary: {{{vary}}}" if vary else VARY
+    (found,) = problems(read, line, f'targets: [{{pattern: "11*", {target}}}]')
+    assert said in found
+    assert ", found a list" in found or ", found a number of more than 60 digits" in found
+
+
 @pytest.mark.parametrize(
     ("pattern", "said"),
     [
