@@ -183,9 +183,8 @@ class Runner(Generic[T]):
     def _open(self, n_workers: int) -> Iterator[Executor]:
         executor = self.workplace.make(n_workers)
         try:
-            yield executor
-        except self.workplace.lost as error:
-            raise WorkplaceError(f"{self.workplace.name} is lost. {GO_ON}") from error
+            with self.workplace.reached():
+                yield executor
         finally:
             executor.shutdown(wait=self.workplace.is_local)
 
@@ -212,6 +211,14 @@ class Backend:
     watch: Callable[[float], None] = lambda _: None
     close: Callable[[], object] = lambda: None
     hint: str = ""
+
+    @contextmanager
+    def reached(self) -> Iterator[None]:
+        """Have it said that the workplace is lost: WorkplaceError from what is raised then."""
+        try:
+            yield
+        except self.lost as error:
+            raise WorkplaceError(f"{self.name} is lost. {GO_ON}") from error
 
 
 def serial() -> Backend:

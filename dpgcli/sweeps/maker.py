@@ -60,9 +60,14 @@ def check_maker(maker: Maker, work: str = "sweep") -> None:
 
 
 def check_workers(workplace: Backend, work: str = "sweep") -> None:
-    """Ask all workers that are there; raises WorkplaceError for the first that is another."""
-    for worker, maker in workplace.ask(WHO).items():
-        if maker != HERE:
+    """Ask all workers that are there; raises WorkplaceError for the first that is another.
+
+    One that goes meanwhile is none: who comes in its place is asked again at its work.
+    """
+    with workplace.reached():
+        answers = workplace.ask(WHO)
+    for worker, maker in answers.items():
+        if maker != HERE and not isinstance(maker, workplace.lost):
             says = str(maker) if isinstance(maker, Maker) else f"another dpg, or none ({maker!r})"
             raise WorkplaceError(_mixed(f"worker {worker} of {workplace.name}", says, HERE, work))
 

@@ -13,7 +13,7 @@ from dpgcli.code import PACKAGE, sha256_of_code, versions_of_libraries
 from dpgcli.errors import UsageError, WorkplaceError
 from dpgcli.files import table_writer
 from dpgcli.studies import sweep as studies
-from dpgcli.sweeps.executors import Backend, serial
+from dpgcli.sweeps.executors import Backend, SerialExecutor, serial
 from dpgcli.sweeps.maker import HERE, NO_NUMBERS, WHO, check_workers, code_of
 from dpgcli.sweeps.pool import processes
 
@@ -140,6 +140,38 @@ def test_a_mixed_cluster_is_refused_before_the_work(answer: Any, named: str) -> 
         check_workers(mixed)
     assert named in str(refused.value)
     assert str(HERE) in str(refused.value)
+
+
+class GoneError(OSError):
+    """As Dask's CommClosedError."""
+
+
+class LostExecutor(SerialExecutor):
+    """Of a client that has lost its scheduler."""
+
+    def submit(self, *_: Any, **__: Any) -> Any:
+        raise GoneError("closed")
+
+
+def test_a_scheduler_that_goes_is_no_worker_of_another_kind(study: Any) -> None:
+    """Whether it answers for its workers that they are gone, or not at all."""
+
+    def silent(_: Any) -> dict[str, Any]:
+        raise GoneError("in broadcast: stream is closed")
+
+    def executor(_: int) -> LostExecutor:
+        return LostExecutor()
+
+    gone = {"tcp://a": GoneError("stream is closed")}
+    for ask in (silent, lambda _: gone):
+        lost = Backend("the cluster", executor, 2, lost=(GoneError,), ask=ask)
+        with pytest.raises(WorkplaceError, match=r"^the cluster is lost\. "):
+            study(HEIGHTS).compute(lost, lambda _: None)
+    mixed = Backend(
+        "the cluster", executor, 2, lost=(GoneError,), ask=lambda _: gone | {"b": OTHER}
+    )
+    with pytest.raises(WorkplaceError, match="worker b of the cluster has"):
+        check_workers(mixed)
 
 
 def test_all_workers_are_asked_before_a_sweep_is_begun(study: Any) -> None:
