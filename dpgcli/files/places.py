@@ -56,15 +56,15 @@ def few(problems: Iterable[Problem]) -> Iterator[Problem]:
 def shown(value: object) -> str:
     """A value as a message shows it, in the manner of YAML.
 
-    >>> shown(True), shown(float("inf")), shown("6.5"), shown(None)
-    ('true', '.inf', '"6.5"', 'nothing')
+    >>> shown(True), shown(float("inf")), shown("6.5"), shown(None), shown([4, 5])
+    ('true', '.inf', '"6.5"', 'nothing', 'a list of 2')
     """
     if value is None:
         return "nothing"
     if isinstance(value, dict):
         return "a section"
     if isinstance(value, list):
-        return "a list"
+        return f"a list of {len(value):,}" if value else "an empty list"
     if isinstance(value, float) and not math.isfinite(value):
         return str(value).replace("inf", ".inf").replace("nan", ".nan")
     if isinstance(value, int) and abs(value) >= 10**MAX_SHOWN:

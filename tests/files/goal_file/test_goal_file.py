@@ -97,6 +97,11 @@ def test_mistakes_in_what_varies(read: Read, line: str, said: str) -> None:
         ("quantity: tip, value: [4, 5], tolerance_mm: 0", "tolerance_mm: expected a number > 0"),
         ("quantity: energy_mJ, value: 4, tolerance_mm: 1", "did you mean tolerance_mJ?"),
         ("quantity: tip, value: 4, tolerance_mm: 1", "expected two numbers in mm"),
+        (
+            "quantity: tip, value: [4, 5, 6], tolerance_mm: 1",
+            "[45, -30], found a list of 3",
+        ),
+        ("quantity: tip, value: [], tolerance_mm: 1", "[45, -30], found an empty list"),
         ("quantity: tip_x_mm, value: [4], tolerance_mm: 1", "value: expected a number"),
         ("quantity: tip_x_mm, value: .nan, tolerance_mm: 1", "value: expected a number"),
     ],
@@ -128,7 +133,7 @@ def test_whole_numbers_beyond_double_precision_are_none(
     line = f"vary: {{{vary}}}" if vary else VARY
     (found,) = problems(read, line, f'targets: [{{pattern: "11*", {target}}}]')
     assert said in found
-    assert ", found a list" in found or ", found a number of more than 60 digits" in found
+    assert ", found a list of 2" in found or ", found a number of more than 60 digits" in found
 
 
 @pytest.mark.parametrize(
@@ -164,7 +169,7 @@ def test_a_pattern_that_too_many_states_match(read: Read) -> None:
         ("constraints: [3]", "a comparison, such as"),
         ("minimize: [mass_g]", 'a column of designs, or a key, found "mass_g" (the nearest is '),
         ("minimize: [reach_min_mm]\nmaximize: [reach_min_mm]", "each objective once"),
-        ("minimize: [[1]]", "expected a column of designs, or a key, found a list"),
+        ("minimize: [[1]]", "expected a column of designs, or a key, found a list of 1"),
         ("minimise: [reach_min_mm]", "did you mean minimize?"),
         ("targets: []", "one or more of targets, constraints, minimize, maximize, found none"),
         ("targets: 3", "expected a list of targets, found 3"),

@@ -150,13 +150,20 @@ def test_columns_as_values() -> None:
     assert read_forces(table)["force_N"].tolist() == [1.0, 0.0]
 
 
+CORNERS = (
+    "polygon: expected three to 64 corners in mm, such as [[0, -10], [20, 0], [0, 10]], "
+    "found a list of "
+)
+
+
 @pytest.mark.parametrize(
     ("polygon", "said"),
     [
         ("[[0, 0], [9], [9, 0]]", "polygon.1: expected a corner, two numbers in mm such as [20"),
         ("[[0, 0], 7, [9, 0]]", "polygon.1: expected a corner, two numbers in mm such as [20, 0]"),
         ("[[0, 0], [9, 0], [a, 3]]", 'polygon.2.0: expected a number in mm, found "a"'),
-        ("[[0, 0], [9, 0]]", "polygon: expected three to 64 corners in mm"),
+        ("[[0, 0], [9, 0]]", f"{CORNERS}2"),
+        (f"[{', '.join(65 * ['[0, 1]'])}]", f"{CORNERS}65"),
         ("[[0, 0], [0, 0], [3, 4]]", "polygon.0: expected sides with a length, found side 1-2 of"),
     ],
 )

@@ -433,7 +433,7 @@ EXPECTED = 'expected "published", "finite_elements" or the name of a calibration
         ("[]", [f"finger.calibration: {EXPECTED}, found an empty list"]),
         ("[null]", [f"finger.calibration.0: {EXPECTED}, found nothing"]),
         ("[published, 3]", [f"finger.calibration.1: {EXPECTED}, found 3"]),
-        ("[[published]]", [f"finger.calibration.0: {EXPECTED}, found a list"]),
+        ("[[published]]", [f"finger.calibration.0: {EXPECTED}, found a list of 1"]),
         (
             "[a.yaml, published, b.yaml, .nan]",
             [

@@ -104,7 +104,7 @@ def test_foreign_tags_are_refused_and_not_constructed():
         ("a: 1\nb: \x00", "a.yaml:2:4: syntax: expected printable characters, found '\\x00'"),
         ("", "a.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
         ("# only\n", "a.yaml:1:1: document: expected a mapping of keys to values, found nothing"),
-        ("[1]", "a.yaml:1:1: document: expected a mapping of keys to values, found a list"),
+        ("[1]", "a.yaml:1:1: document: expected a mapping of keys to values, found a list of 1"),
         ("\n5", "a.yaml:2:1: document: expected a mapping of keys to values, found a single value"),
         ("%YAML 3.1\n---\na: 1", "a.yaml:1:1: syntax: expected valid YAML"),
     ],

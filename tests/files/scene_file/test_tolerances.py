@@ -72,7 +72,7 @@ WRONG = [
     ("dome_height_mm", ".nan", ".nan"),
     ("dome_height_mm", ".inf", ".inf"),
     ("dome_height_mm", "true", "true"),
-    ("dome_height_mm", "[1]", "a list"),
+    ("dome_height_mm", "[1]", "a list of 1"),
     ("dome_height_mm", "1e13", "10000000000000.0 (at most 1e+12 in size)"),
 ]
 
