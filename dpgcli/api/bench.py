@@ -22,8 +22,8 @@ from dpgcli.benchmark.bench import COLUMNS, Bench, BenchRow, as_columns
 from dpgcli.calibration.known import Frame
 from dpgcli.errors import Field, UsageError
 from dpgcli.files.csv_file import Tabular
-from dpgcli.files.known_states import states_of
 from dpgcli.files.output import Mark, check_outputs
+from dpgcli.files.plausible_states import states_of
 from dpgcli.files.prediction import write_states
 from dpgcli.files.study_tables import write_bench, write_record
 from dpgcli.files.table_reader import read_record

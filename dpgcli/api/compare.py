@@ -18,7 +18,7 @@ from dpgcli.calibration.comparison import Comparison, frame_misfit
 from dpgcli.calibration.known import Frame, KnownStates, lattice_states
 from dpgcli.errors import Message
 from dpgcli.files.csv_file import Tabular, name_of
-from dpgcli.files.known_states import states_of
+from dpgcli.files.plausible_states import states_of
 from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
 from dpgcli.reports.comparison import comparison_summary, draw_comparison

@@ -13,6 +13,7 @@ from dpgcli.records import dataclass
 
 STIFFNESS = "hinge_stiffness_N_mm_per_rad"
 SIGNIFICANT_ERRORS = 3.0  # standard errors
+AT_REST = 1e-6  # of the largest rotation: with less a moment says nothing of a stiffness
 LARGEST_CHANGE = 0.05  # of the secant stiffness over the range
 
 
@@ -65,8 +66,9 @@ def fit_hinge(
 def _secants(moment: Array, rotation: Array) -> tuple[float, float]:
     """M/θ of the third of the range next to rest and of the outermost third, least squares."""
     size = np.abs(rotation) / np.abs(rotation).max()
-    inner, outer = (size > 0.0) & (size <= 1.0 / 3.0), size >= 2.0 / 3.0
-    inner = inner if inner.any() else (size > 0.0) & (size <= size[size > 0.0].min())
+    turned, outer = size > AT_REST, size >= 2.0 / 3.0
+    inner = turned & (size <= 1.0 / 3.0)
+    inner = inner if inner.any() else turned & (size <= size[turned].min())
     near, far = (
         float(moment[part] @ rotation[part] / (rotation[part] @ rotation[part]))
         for part in (inner, outer)

@@ -19,6 +19,7 @@ from dpgcli.mechanics.laws import PushOnly, Tabulated
 FEWEST_PUSHES = 2
 TOUCHING = 0.01  # of the largest push: with less a dome has let go of its neighbor
 SMALLEST_RISE = 0.03  # of the opening: less is noise of a pusher that hardly gives way
+SMALLEST_STROKE = 1e-6  # of the study's at the same height: less is none
 STIFFEST = 2.5e-4  # of the opening over the push: walls yield hundreds of times as much
 POWERS = {  # of a length by which the study's values scale, the material and the shape kept
     "segment_length": 1,
@@ -106,6 +107,11 @@ def _push(known: KnownStates, study: Mapping[str, float]) -> tuple[float, float]
     yielding, stroke = np.polyfit(push, opening, 1)  # pushes differ more, and are known better
     if yielding * np.ptp(push) > SMALLEST_RISE * stroke:
         raise FitError(f"push_N rises with opening_mm, by {1 / yielding:.3g} N/mm: a push falls")
+    if not stroke > SMALLEST_STROKE * study["stroke"]:
+        raise FitError(
+            f"opening_mm and push_N of an inverted unit: its push ends at {stroke:.3g} mm, "
+            "expected an opening > 0"
+        )
     return 1.0 / max(-yielding, STIFFEST * abs(stroke) / np.abs(push).max()), float(stroke)
 
 

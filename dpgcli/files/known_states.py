@@ -1,19 +1,17 @@
 """Known states from tables: tips, angles, openings and pushes by pattern; shapes as points."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from dpgcli.arrays import Array
 from dpgcli.calibration.known import KnownStates
 from dpgcli.errors import Problem, SpecError
-from dpgcli.files.csv_file import FRAME, Sheet, Tabular, read_sheet
+from dpgcli.files.csv_file import Sheet, Tabular, read_sheet
 from dpgcli.files.layout import NUMBER
 from dpgcli.files.places import Location, in_order, located, shown
-from dpgcli.mechanics.finger import Finger
 
 TIP = ("tip_x_mm", "tip_y_mm")
 TIP_ANGLE = "tip_angle_rad"
@@ -32,9 +30,6 @@ ENDS = '",; \t'  # what a spreadsheet writes around a comment
 POINT = ("x_mm", "y_mm")
 FEWEST_POINTS = 2
 MOST_UNITS = 2**18  # in all states: they are solved at once, in about 300 MB
-UNLIKELY = 30.0  # times what hinge and dome say, or as little of it: another unit
-ODD = 6.0  # times the stroke or the length that is known, or as little of it: another unit
-FARTHEST = 20.0  # times the finger's length from the origin, or as little of it: another unit
 
 
 def read_states(source: Tabular, n_units: int, shapes: Tabular | None = None) -> KnownStates:
@@ -118,131 +113,6 @@ def _frame(sheet: Sheet) -> tuple[dict[str, tuple[float, float]], list[Problem]]
         if frame.setdefault(key, point) != point:
             problems.append(located(place, key, "each point once", "another one"))
     return frame, problems
-
-
-def states_of(finger: Finger, source: Tabular, shapes: Tabular | None = None) -> KnownStates:
-    """Known states that can be those of this finger, in mm and rad.
-
-    Raises SpecError as `read_states`, `check_scale` and `check_loads` do, and for openings or
-    layers that are ten times too large or too small for it: centimeters.
-    """
-    known = read_states(source, finger.n_units, shapes)
-    check_scale(source, known, float(finger.straight_length[0]))
-    check_loads(source, known, finger)
-    if problems := [*_centimeters(source, shapes, known, finger)]:
-        raise SpecError(tuple(problems))
-    return known
-
-
-def _centimeters(
-    source: Tabular, shapes: Tabular | None, known: KnownStates, finger: Finger
-) -> Iterator[Problem]:
-    """Problems of openings of inverted units beside the stroke, and of layers beside the finger."""
-    inverted = known.openings[:, known.moments == 0.0][known.patterns[:, known.moments == 0.0]]
-    opened = float(np.max(inverted, initial=0.0, where=np.isfinite(inverted)))
-    lengths = [float(np.hypot(*np.diff(shape, axis=1)).sum()) for shape in known.shapes]
-    opening = "opening_mm" if finger.n_units == 1 else "opening1_mm"
-    stroke, length = float(finger.stroke.mean()), float(finger.straight_length[0])
-    for table, key, what, found, usual in (
-        (source, opening, "openings of inverted units", opened, stroke),
-        (shapes, "x_mm", "layers from base to tip", max(lengths, default=0.0), length),
-    ):
-        if found > 0.0 and not usual / ODD < found < usual * ODD:
-            place = Location(str(table) if isinstance(table, str | Path) else FRAME)
-            hint = "centimeters?" if found < usual else "is the unit another one?"
-            expected = f"{what} in mm, about {usual:.3g}"
-            yield located(place, key, expected, f"{found:.3g}, the largest", hint)
-
-
-def check_loads(source: Tabular, known: KnownStates, finger: Finger) -> None:
-    """Raise SpecError for moments and pushes of the wrong sign, or of another unit.
-
-    What a moment turns a finger by is between that of its hinges and that of its domes as well;
-    a push has the moment of a hinge that is as far open as the stroke.
-    """
-    place = Location(str(source) if isinstance(source, str | Path) else FRAME)
-    problems = []
-    hinge, lever = finger.hinge_stiffness.mean(), finger.segment_height.mean()
-    dome = finger.bistable_stiffness.mean() * lever**2
-    turned, under = _turns(known)
-    if len(turned) and hinge > 0.0:
-        stiffness = float(under @ turned / (turned @ turned)) * finger.n_units
-        expected = "moments in N mm, positive where they open the gaps (angles fall)"
-        found = f"{stiffness:.3g} N mm/rad a unit"
-        if stiffness <= 0.0:
-            problems.append(located(place, MOMENT, expected, found, "is the sign the other one?"))
-        elif not hinge / UNLIKELY < stiffness < UNLIKELY * (hinge + dome):
-            hint = "N m?" if stiffness < hinge else "N um?"
-            problems.append(located(place, MOMENT, expected, found, hint))
-    pushes = known.pushes[known.patterns & np.isfinite(known.pushes)]
-    usual = hinge * finger.stroke.mean() / lever**2
-    key = "push_N" if finger.n_units == 1 else "push1_N"
-    if len(pushes) and hinge > 0.0:
-        expected = f"pushes of domes in N, positive, about {usual:.2g}"
-        push = float(pushes[np.abs(pushes).argmax()])
-        found = f"{push:.3g}, the largest"
-        if push < 0.0:
-            problems.append(located(place, key, expected, found, "is the sign the other one?"))
-        elif not usual / UNLIKELY < push < UNLIKELY * usual:
-            problems.append(located(place, key, expected, found, "is the unit another one?"))
-    problems += _reversed(known, place, finger.n_units)
-    if problems:
-        raise SpecError(tuple(problems))
-
-
-def _reversed(known: KnownStates, place: Location, n_units: int) -> Iterator[Problem]:
-    """Problems of inverted units that, without a load, turn up or close where others open."""
-    free = known.moments == 0.0
-    curled = known.angles[-1, free & known.patterns.any(axis=0)]
-    opened = known.openings[:, free][known.patterns[:, free]]
-    opening = "opening_mm" if n_units == 1 else "opening1_mm"
-    for key, values, sign, expected in (
-        (TIP_ANGLE, -curled, "y", "angles that fall as the finger curls towards -y"),
-        (opening, opened, "it", "openings > 0 of inverted units"),
-    ):
-        values = values[np.isfinite(values)]
-        if len(values) and values.sum() < 0.0:
-            found = f"{abs(values.mean()):.3g} in the mean the other way"
-            yield located(place, key, expected, found, f"is the sign of {sign} the other one?")
-
-
-def _turns(known: KnownStates) -> tuple[Array, Array]:
-    """How far the end curls beyond its mean for the pattern (rad), and under which moments.
-
-    A straight finger does not turn without a moment.
-    """
-    turned, under = [], []
-    for pattern in np.unique(known.patterns, axis=1).T:
-        same = (known.patterns == pattern[:, None]).all(axis=0) & np.isfinite(known.angles[-1])
-        if same.any():
-            rest = np.zeros(int(not pattern.any()))
-            curl = np.concatenate((-known.angles[-1, same], rest))
-            moments = np.concatenate((known.moments[same], rest))
-            turned.append(curl - curl.mean())
-            under.append(moments - moments.mean())
-    together = np.concatenate([*turned, np.zeros(0)]), np.concatenate([*under, np.zeros(0)])
-    return together if together[1].any() else (np.zeros(0), np.zeros(0))
-
-
-def check_scale(source: Tabular, known: KnownStates, length: float) -> None:
-    """Raise SpecError for what cannot be a finger this long (mm): tips, shapes and angles."""
-    place = Location(str(source) if isinstance(source, str | Path) else FRAME)
-    problems = []
-    points = [shape for shape in known.shapes if shape.size]
-    shapes = np.concatenate(points, axis=1) if points else np.zeros((2, 0))
-    for key, what, places in (("tip_x_mm", "tips", known.tip), ("x_mm", "shapes", shapes)):
-        far = np.max(np.hypot(*places), initial=0.0, where=np.isfinite(places).all(axis=0))
-        if far > 0.0 and not length / FARTHEST < far < length * FARTHEST:
-            hint = "meters?" if far < length else "micrometers?"
-            expected = f"{what} of a finger {length:.4g} mm long, in mm"
-            found = f"the farthest at {far:.3g} from the origin"
-            problems.append(located(place, key, expected, found, hint))
-    turn = np.max(np.abs(known.angles), initial=0.0, where=np.isfinite(known.angles))
-    if turn > np.pi * len(known.patterns):  # a unit has two corners of less than 90 degrees
-        expected = f"angles of {len(known.patterns)} units in rad"
-        problems.append(located(place, TIP_ANGLE, expected, f"{turn:.3g}", "degrees?"))
-    if problems:
-        raise SpecError(tuple(problems))
 
 
 def _names(n_units: int) -> set[str]:

@@ -75,3 +75,11 @@ def test_rotations_that_hardly_differ_say_nothing_of_curvature() -> None:
 def test_three_points_that_stiffen_are_not_linear() -> None:
     found = fit_hinge(np.array([1.0, 5.0, 9.0]), np.array([0.2, 0.3, 0.4]))
     assert any("changes from 5 to 20" in text for text in found.fit.warnings), found.fit.warnings
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("least", [1e-300, 1e-12])
+def test_next_to_no_rotation_says_nothing_of_a_stiffness(least: float) -> None:
+    found = fit_hinge(np.array([2.0, 7.2, 9.6]), np.array([least, 0.3, 0.4]))
+    assert found.secants == pytest.approx((24.0, 24.0))
+    assert not found.fit.warnings

@@ -1,5 +1,7 @@
 """`dpg fit unit` and end moments in `compare`, from the command line."""
 
+from contextlib import suppress
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,7 @@ def test_what_is_fitted_is_compared_and_used(call: Any, folder: Path) -> None:
     assert "stiffness_error_percent" in compared.stdout
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -59,6 +62,31 @@ def test_what_is_fitted_is_compared_and_used(call: Any, folder: Path) -> None:
         (HEAD + GROUND + INVERTED.replace("0.8601", "860.1").replace("0.4778", "477.8"), "push_N"),
         (HEAD + GROUND.replace("0.08", "4.6") + INVERTED.replace("-0.", "-15."), "degrees?"),
         (HEAD + "ground,2.5,-0.08,0.00083,0\nground,-2.5,0.08,-0.00083,0\n", "moments in N mm"),
+        (
+            HEAD + GROUND + INVERTED.replace("3.4828", "0").replace("3.4904", "0"),
+            "opening_mm: expected openings > 0 of inverted units, found 0 at most",
+        ),
+        (
+            HEAD + GROUND + INVERTED.replace("3.4828", "1e-300").replace("3.4904", "1e-300"),
+            "opening_mm: expected openings > 0 of inverted units, found 1e-300 at most",
+        ),
+        (
+            HEAD + GROUND.replace("0.83", "8e-10") + INVERTED.replace("3.48", "3e-9"),
+            "opening_mm: expected openings in mm that are turns in rad times a height of 0.001 to",
+        ),
+        (
+            HEAD + GROUND.replace("0.08", "1e-300") + INVERTED.replace("-0.", "-1e-30"),
+            "chamber2_angle_rad: expected angles of 1 unit in rad, found 1e-300 at most",
+        ),
+        (
+            HEAD + GROUND.replace("0.08", "0") + INVERTED.replace("0.266", "0.3027"),
+            "chamber2_angle_rad: expected angles that fall as moments rise, found the same under",
+        ),
+        (
+            HEAD + GROUND.replace("2.5", "2.5e-12"),
+            "(is the unit another one, of moments or of angles?)",
+        ),
+        (HEAD + GROUND.replace("2.5", "2.5e4"), "(N um?)"),
     ],
 )
 def test_what_is_refused(call: Any, folder: Path, text: str, said: str) -> None:
@@ -67,6 +95,31 @@ def test_what_is_refused(call: Any, folder: Path, text: str, said: str) -> None:
     assert result.exit_code == 2
     assert said in result.stderr and "Traceback" not in result.stderr
     assert not (folder / "unit.yaml").exists()
+
+
+def test_pushes_that_end_at_no_opening_are_refused() -> None:
+    """Inverted rows under moments alone, whose openings nothing else is known of."""
+    table = pd.read_csv(StringIO(HEAD + GROUND + INVERTED.replace("inverted,0", "inverted,-5")))
+    for opening in (0.0, 1e-300):
+        wrong = table.assign(opening_mm=table.opening_mm.where(table.unit == "ground", opening))
+        with pytest.raises(FitError, match=r"its push ends at .* mm, expected an opening > 0"):
+            dpg.fit_unit(wrong)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("column", ["moment_N_mm", "chamber2_angle_rad", "opening_mm", "push_N"])
+@pytest.mark.parametrize("value", [0.0, 5e-324, 1e-300, 1e-12, 1.0, -1.0, 1e12, np.nan])
+def test_nothing_is_divided_by(column: str, value: float) -> None:
+    """Columns and rows of one value are fitted, or refused in words, without a warning."""
+    table = pd.read_csv(StringIO(HEAD + GROUND + INVERTED))
+    for rows in (slice(None), 0, 3):
+        changed = table.copy()
+        changed[column] = changed[column].astype(float)
+        changed.loc[rows, column] = value
+        for one in (changed, changed[changed.unit == "ground"], changed[changed.unit != "ground"]):
+            with suppress(SpecError, FitError):
+                dpg.fit_unit(one)
 
 
 @pytest.mark.parametrize("has_geometry", [True, False])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dpgcli.errors import SpecError
-from dpgcli.files.known_states import check_scale, read_states, states_of
+from dpgcli.files.known_states import read_states
+from dpgcli.files.plausible_states import check_scale, states_of
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 
 WHOLE = """\

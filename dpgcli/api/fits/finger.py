@@ -25,7 +25,7 @@ from dpgcli.errors import Field, UsageError
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
-from dpgcli.files.known_states import states_of
+from dpgcli.files.plausible_states import states_of
 from dpgcli.reports.comparison import draw_fitted
 from dpgcli.reports.fits import finger_summary, value_rows
 from dpgcli.text import number_in

@@ -30,7 +30,8 @@ from dpgcli.design.rules import HINGE_STIFFNESS
 from dpgcli.files.calibration import DataFile
 from dpgcli.files.calibration.results import finger_sections
 from dpgcli.files.csv_file import Tabular, name_of
-from dpgcli.files.known_states import check_loads, check_scale, read_states
+from dpgcli.files.known_states import read_states
+from dpgcli.files.plausible_states import check_lever, check_loads, check_scale
 from dpgcli.files.sections import Geometry
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 from dpgcli.reports.fit_figures import draw_turns
@@ -77,7 +78,9 @@ def fit_unit(
     has_pushes = bool(known.patterns.any())
     keys = as_texts("free", free) if has_pushes else (HINGES,)
     lever = _lever(at)
-    size = lever or lever_of(known) or STUDY["segment_height"]
+    if (seen := lever_of(known)) is not None:
+        check_lever(curve, known, seen)
+    size = lever or seen or STUDY["segment_height"]
     expected = uniform_finger(1, **study_unit(size) | {"hinge_stiffness": _hinge(at, size)})
     check_scale(curve, known, float(expected.straight_length[0]))
     check_loads(curve, known, expected)
