@@ -125,15 +125,19 @@ def approach(
     end: Array,
     *,
     to_reset: bool = False,
+    unfolded: bool = False,
     beyond: float | None = None,
 ) -> Approach:
     """Let bodies grow from one load to another, (batch,), about fingers in balance.
 
     With `to_reset` only as far as to where a first unit resets or snaps; nowhere beyond where a
     place that sticks begins to slide. With a load `beyond` the end they go on to there for their
-    margins, in the same batch.
+    margins, in the same batch. On the way to a margin, or if they are to stay `unfolded`, those
+    are lost that are folded where something happens.
     """
-    came = _Journey.at(obstructed, start, load, end, to_reset=to_reset, beyond=beyond)
+    came = _Journey.at(
+        obstructed, start, load, end, to_reset=to_reset, unfolded=unfolded, beyond=beyond
+    )
     while len(came.lanes) or len(came.waiting):
         if 2 * len(came.lanes) > sum(len(lanes) for lanes, *_ in came.waiting):
             came.go_on(obstructed)
@@ -166,6 +170,7 @@ class _Journey:
     last_kink: Array
     n_near: Indices
     to_reset: bool
+    unfolded: bool
     beyond: float | None
     arrived: ContactShapes
     are_beyond: Flags
@@ -183,6 +188,7 @@ class _Journey:
         end: Array,
         *,
         to_reset: bool,
+        unfolded: bool,
         beyond: float | None,
     ) -> "_Journey":
         """Before the first step."""
@@ -194,7 +200,7 @@ class _Journey:
         unknown = np.full(n, np.nan)
         return cls(
             shapes, load.copy(), end.copy(), lanes, none == 0, *counts, to_reset,
-            beyond, arrived, none > 0, unknown,
+            unfolded, beyond, arrived, none > 0, unknown,
         )  # fmt: skip
 
     def go_on(self, obstructed: Obstructed) -> None:
@@ -227,8 +233,13 @@ class _Journey:
         own = obstructed.take_lanes(lanes)
         ends = _told(own, few, ends)
         moved = _at_ends(own, few, ends)
+        is_watched = self.unfolded | self.are_beyond[lanes]
+        if is_watched.any():
+            moved.is_there[is_watched & own.are_folded(moved)] = False
         self.shapes.put(lanes, moved)
-        falls, goes = np.flatnonzero(_beyond(ends) > 0.0), np.flatnonzero(_beyond(ends) == 0.0)
+        self.load[lanes] = np.where(moved.is_there, self.load[lanes], ends.load)
+        falls = np.flatnonzero(moved.is_there & (_beyond(ends) > 0.0))
+        goes = np.flatnonzero(moved.is_there & (_beyond(ends) == 0.0))
         if len(falls):
             self.waiting.append((lanes[falls], ends.take_lanes(falls), moved.push[:, falls]))
         nothing = np.zeros((len(few.inverted), len(goes)), bool)

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dpgcli.actuation.folding import folded
-from dpgcli.arrays import Array, Flags
+from dpgcli.arrays import Array
 from dpgcli.design.pressure import History, Pressure
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
@@ -56,7 +55,7 @@ def driven(
         under = replace(there, ramp=ramp)
         came = approach(under, shapes, np.zeros(n), np.ones(n))
         resets += [_told_by_pressure(told, ramp, own.n_fingers) for told in came.resets]
-        is_sound = came.shapes.is_there & ~_are_folded(own, came.shapes)
+        is_sound = came.shapes.is_there & ~own.are_folded(came.shapes)
         shapes, before = replace(came.shapes, is_there=is_sound), target
         stops.append(shapes)
     return replace(start, shapes=shapes, resets=tuple(resets), stops=tuple(stops))
@@ -76,14 +75,6 @@ def at_rest(own: Obstructed, came: Approach, volumes: DomeVolumes) -> Approach:
 def _told_by_pressure(told: Reset, ramp: Ramp, n_fingers: int) -> Reset:
     own = ramp.take_lanes(told.lanes)
     return replace(told, pressure=np.tile(own.begin + told.load * own.change, (n_fingers, 1)))
-
-
-def _are_folded(own: Obstructed, shapes: ContactShapes) -> Flags:
-    """Lanes in which a finger has folded onto itself."""
-    systems = [potential.coordinates for potential in own.potentials(shapes.inverted)]
-    mine = [own.of_finger(shapes.coordinates, finger) for finger in range(own.n_fingers)]
-    are_folded = [folded(*finger) for finger in zip(systems, mine, strict=True)]
-    return np.asarray(np.any(are_folded, axis=0))
 
 
 def with_reach(own: Obstructed) -> Obstructed:

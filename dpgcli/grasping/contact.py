@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from dpgcli.actuation.domes import rest_between
+from dpgcli.actuation.folding import folded
 from dpgcli.arrays import Array, Flags, total
 from dpgcli.equilibrium.banded import WIDE
 from dpgcli.equilibrium.constraints import (
@@ -240,6 +241,14 @@ class Obstructed(Layout):
             if not isinstance(gaps, Heights):
                 slips |= gaps.are_slipping(coordinates, bound)
         return slips
+
+    def are_folded(self, shapes: ContactShapes) -> Flags:
+        """Lanes in which a finger has folded onto itself, (batch,)."""
+        found = np.zeros(shapes.coordinates.shape[1], bool)
+        for finger, potential in enumerate(self.potentials(shapes.inverted)):
+            mine = self.of_finger(shapes.coordinates, finger)
+            found |= folded(potential.coordinates, mine)
+        return found
 
     def is_open(self, shapes: ContactShapes) -> Flags:
         """Which units are in their inverted wells, (unit, batch).

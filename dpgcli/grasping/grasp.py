@@ -169,15 +169,7 @@ def described(
     Margins that are not known take as long again as all else, and are NaN unless they are wanted.
     """
     shapes = own.relabeled(grown.shapes)
-    potential = own.pressed(grown.shapes.inverted, grown.shapes.push, grown.load)
-    there = looked_at(potential, grown.shapes.coordinates)
-    settled = [_certified(own, grown, there, finger) for finger in range(own.n_fingers)]
-    is_there = status == Status.STABLE
-    worst = np.max([state.status for state in settled], axis=0)
-    status = np.where(is_there, worst, status)
-    for face, body in zip(own.faces, own.bodies, strict=False):
-        is_cut = is_there & _is_entered(face.shape(shapes.coordinates).nodes, body)
-        status = np.where(is_cut, np.uint8(Status.NOT_CONVERGED), status)
+    there, settled, status = judged(own, grown, status)
     margin, is_stable = np.full(len(status), np.nan), np.asarray(status == Status.STABLE)
     if with_margins:
         known = grown.margin
@@ -213,6 +205,25 @@ def described(
             )
         )
     return tuple(found)
+
+
+def judged(
+    own: Obstructed, grown: Approach, status: NDArray[np.uint8]
+) -> tuple[Equilibrium, list[Settled], NDArray[np.uint8]]:
+    """Equilibria of all fingers, and of each, certified with their contacts, and the statuses.
+
+    Those that are not stable before keep their `status`, (batch,).
+    """
+    shapes, is_there = grown.shapes, status == Status.STABLE
+    potential = own.pressed(shapes.inverted, shapes.push, grown.load)
+    there = looked_at(potential, shapes.coordinates)
+    settled = [_certified(own, grown, there, finger) for finger in range(own.n_fingers)]
+    worst = np.max([state.status for state in settled], axis=0)
+    status = np.where(is_there, worst, status)
+    for face, body in zip(own.faces, own.bodies, strict=False):
+        is_cut = is_there & _is_entered(face.shape(shapes.coordinates).nodes, body)
+        status = np.where(is_cut, np.uint8(Status.NOT_CONVERGED), status)
+    return there, settled, status
 
 
 def _pushes(own: Obstructed, shapes: ContactShapes, cells: slice, seen: Touching) -> Pushes:
@@ -275,10 +286,11 @@ def _certified(own: Obstructed, grown: Approach, there: Equilibrium, finger: int
 def _margins(own: Obstructed, grown: Approach, is_stable: Flags) -> Array:
     """What more of the load fingers bear before a unit resets; infinite beyond `MARGIN_TO`.
 
-    NaN where there is no state, or none is found on the way on.
+    NaN where there is no state, or none is found on the way on, or one that is folded.
     """
     shapes = replace(grown.shapes, is_there=grown.shapes.is_there & is_stable)
-    onwards = approach(own, shapes, grown.load, 0.0 * grown.load + MARGIN_TO, to_reset=True)
+    end = 0.0 * grown.load + MARGIN_TO
+    onwards = approach(own, shapes, grown.load, end, to_reset=True, unfolded=True)
     margin = np.where(onwards.shapes.is_there, np.inf, np.nan)
     for reset in onwards.resets:
         margin[reset.lanes] = reset.load - 1.0

@@ -182,7 +182,7 @@ def followed(
     pulled = replace(stuck, motion=replace(stuck.motion, hold=-pull))  # beyond 1 it pulls
     once = np.ones(pull.shape[1])
     begin = replace(freed.shapes, is_there=stands)
-    came = approach(pulled, begin, once, 2.0 * once, to_reset=True)
+    came = approach(pulled, begin, once, 2.0 * once, to_reset=True, unfolded=True)
     reset_at = _reset_at(came)
     slips_at = np.where(_stick(stuck, came, 2.0), np.inf, came.load)
     is_known = is_lost | np.isfinite(reset_at) | (stands & came.shapes.is_there)
